@@ -1,33 +1,17 @@
-//! Centre and sweep of a G2 or G3 arc, from its centre offsets or its radius.
+//! The centre and the sweep of a G2 or G3 arc, from its centre offsets or its radius.
 //!
-//! Tolerances are LinuxCNC's defaults, so that what runs there is read here. Points are in the plane of the arc, in
-//! the order that makes it right-handed: (X, Y), (Z, X), (Y, Z).
+//! Tolerances are LinuxCNC's defaults, so that a program that runs there is read here. Points are in the plane of the
+//! arc, in the order that makes it right-handed: (X, Y), (Z, X), (Y, Z).
 
 use std::f64::consts::TAU;
 
+use super::beside::{distance, minus, Point2};
 use super::fault::{fault, Outcome};
+use super::tolerance::{
+    HALF_CHORD, RADIUS_SLACK, SAME_ANGLE, SAME_POINT, SPIRAL_INCH, SPIRAL_MM, SPIRAL_MOST, SPIRAL_RELATIVE,
+};
 
-/// A point in the plane of the arc, in mm.
-pub type Point2 = [f64; 2];
-
-/// Start and end radius may differ by this share of the radius,
-const SPIRAL_RELATIVE: f64 = 1e-3;
-
-/// or by this many units of the program (mm, inch): what rounding to two decimals in mm, three in inches, can do.
-const SPIRAL_MM: f64 = 2.0 * 0.01 * std::f64::consts::SQRT_2;
-const SPIRAL_INCH: f64 = 2.0 * 0.001 * std::f64::consts::SQRT_2 * 25.4;
-
-/// Whatever the radius, never by more than so many times that.
-const SPIRAL_MOST: f64 = 100.0;
-
-/// Smaller radii are none, and an R word may be this much too small for its chord: 0.00005 inch.
-const RADIUS_SLACK: f64 = 0.00127;
-
-/// End and start this close in angle [rad] and distance [mm] are one point: a full turn.
-const SAME_ANGLE: f64 = 1e-6;
-const SAME_POINT: f64 = 1e-4;
-
-/// How the arc is programmed.
+/// The words that an arc is programmed by.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// The centre, and whether the program is in inches.
@@ -36,10 +20,10 @@ pub enum Form {
     Radius(f64),
 }
 
-/// The arc's centre and its signed sweep in radians, positive counter-clockwise.
+/// The centre of an arc and its signed sweep in radians, positive counter-clockwise.
 ///
-/// `clockwise` for G2; `turns` is the P word: full turns are added from 2 on. Where the radii at both ends differ
-/// within the tolerance, the arc is a spiral about the centre.
+/// `clockwise` is true for G2. `turns` is the P word: turns - 1 full turns are added. Where the radii at both ends
+/// differ within the tolerance, the arc is a spiral about the centre.
 pub fn arc(start: Point2, end: Point2, form: Form, clockwise: bool, turns: u32) -> Outcome<(Point2, f64)> {
     let centre = match form {
         Form::Centre { centre, inches } => {
@@ -81,10 +65,10 @@ fn check_radii(start: Point2, end: Point2, centre: Point2, inches: bool) -> Outc
     Ok(())
 }
 
-/// The centre on the side of the chord that direction and sign of the radius choose.
+/// The centre on that side of the chord which the direction and the sign of the radius choose.
 fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcome<Point2> {
     let chord = minus(end, start);
-    let length = chord[0].hypot(chord[1]);
+    let length = distance(start, end);
     let half = 0.5 * length;
     if half <= f64::EPSILON * start[0].abs().max(start[1].abs()).max(1.0) {
         return fault("an arc with R ends where it starts, so its centre is anywhere: program full circles with I, J, K");
@@ -95,9 +79,10 @@ fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcom
             radius.abs()
         ));
     }
-    // Within the rounding of coordinates the chord is a diameter; the root would make much of it.
+    // A radius that exceeds half the chord by no more than the rounding of coordinates is half the chord: the square root
+    // would turn that rounding into a visible height.
     let largest = [start[0], start[1], end[0], end[1]].iter().fold(half, |most, value| most.max(value.abs()));
-    let rounding = 8.0 * f64::EPSILON * largest;
+    let rounding = HALF_CHORD * largest;
     let excess = if radius.abs() - half > rounding { radius.abs() - half } else { 0.0 };
     let height = (excess * (radius.abs() + half)).sqrt();
     // The centre is left of the chord for a short counter-clockwise or a long clockwise arc.
@@ -108,18 +93,11 @@ fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcom
     ])
 }
 
-/// True length in mm of an arc that rises by `rise` along its axis; of a spiral, to second order in its spread.
+/// The length in mm of an arc that rises by `rise` along its axis; for a spiral, to second order in the difference of its
+/// radii.
 pub fn arc_length(start: Point2, end: Point2, centre: Point2, angle: f64, rise: f64) -> f64 {
     let (first, last) = (distance(start, centre), distance(end, centre));
     (0.5 * (first + last) * angle).hypot(last - first).hypot(rise)
-}
-
-fn minus(a: Point2, b: Point2) -> Point2 {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-fn distance(a: Point2, b: Point2) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! One block of a program: which words it has, and the modal groups that G and M codes belong to.
+//! The words of one block of a program, and the modal groups that G and M codes belong to.
 //!
-//! A G code is kept in tenths (G5.1 is 51). Codes of one group exclude each other in a block. Groups are
-//! RS-274/NGC's; a code that is in none is not read.
+//! A G code is a number of tenths (G5.1 is 51). Two codes of one group exclude each other in a block. The groups are those
+//! of RS-274/NGC; a code in no group is not read.
 
 /// Bit of a letter in `Block::words`.
 #[inline(always)]
@@ -20,13 +20,13 @@ pub const fn bits(letters: &[u8]) -> u32 {
     sum
 }
 
-/// Axes in the order of a position.
+/// Letters of the axes in the order of a position.
 pub const AXES: [u8; 9] = *b"XYZABCUVW";
 
-/// Words that name axes.
+/// Bits of the words that name axes.
 pub const AXIS_WORDS: u32 = bits(&AXES);
 
-/// Place of a letter in a position; 255 for letters that name no axis.
+/// The axis of each letter, as an index into a position; 255 for letters that name no axis.
 pub const AXIS_OF_LETTER: [u8; 26] = {
     let mut table = [255; 26];
     let mut i = 0;
@@ -37,7 +37,7 @@ pub const AXIS_OF_LETTER: [u8; 26] = {
     table
 };
 
-/// Rotary axes: A, B, C.
+/// True for the rotary axes A, B, C.
 #[inline(always)]
 pub fn rotary(axis: usize) -> bool {
     (3..6).contains(&axis)
@@ -114,7 +114,7 @@ const GROUP_OF: [u8; 1541] = {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum MGroup {
-    /// Known to some machine alone; a block may have several.
+    /// Codes that only some machine knows; a block may have several.
     Other = 0,
     Call = 1,
     Saved = 2,
@@ -129,7 +129,7 @@ pub enum MGroup {
 
 const M_GROUPS: usize = 11;
 
-/// M codes of unknown meaning that a block may have.
+/// The greatest number of M codes of unknown meaning in a block.
 const MOST_OTHERS: usize = 4;
 
 /// The group of an M code.
@@ -151,7 +151,7 @@ pub fn m_group(code: u16) -> MGroup {
 
 /// The words of a block.
 pub struct Block {
-    /// Letters other than G, M, N and O that the block has, by `bit`.
+    /// Bits of the letters that the block has, other than G, M, N and O.
     pub words: u32,
     values: [f64; 26],
     groups: u32,
@@ -184,7 +184,7 @@ impl Block {
         }
     }
 
-    /// Forgets the words; what they held is written over before it is read.
+    /// Forgets all words; their values stay until they are written over.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.words = 0;
@@ -205,13 +205,13 @@ impl Block {
         self.radius.is_some() || self.angle.is_some()
     }
 
-    /// Takes a polar word.
+    /// Adds a polar word.
     pub fn set_polar(&mut self, sign: u8, value: f64) {
         *(if sign == b'@' { &mut self.radius } else { &mut self.angle }) = Some(value);
     }
 
-    /// Leaves the words of a block without G codes to the M code that begins it, which no controller of machine tools
-    /// has; those below M100 leave it F, S and T.
+    /// Drops the words of a block without G codes that begins with an M code of unknown meaning: they belong to that
+    /// code. Codes below M100 leave F, S and T.
     pub fn leave_to(&mut self, code: u16) {
         if self.groups == 0 {
             self.words &= if code < 100 { bits(b"FST") } else { 0 };
@@ -223,7 +223,7 @@ impl Block {
         &self.others[..self.other_count]
     }
 
-    /// Takes a word with a letter A to Z; false where the block has that letter already.
+    /// Adds a word with a letter A to Z; false where the block has that letter already.
     #[inline(always)]
     pub fn set(&mut self, letter: u8, value: f64) -> bool {
         let fresh = !self.has(letter);
@@ -261,7 +261,8 @@ impl Block {
         radius.or(angle).unwrap_or_default()
     }
 
-    /// Takes a G code in tenths; Err with what stands in its group already, None where it is in no group.
+    /// Adds a G code in tenths; Err with the code of its group that the block has already, or with None where the code
+    /// is in no group.
     #[inline(always)]
     pub fn set_code(&mut self, code: u16) -> Result<(), Option<u16>> {
         let group = GROUP_OF.get(code as usize).copied().unwrap_or(NO_GROUP);
@@ -270,7 +271,7 @@ impl Block {
         }
         if self.groups & (1 << group) != 0 {
             let other = self.codes[group as usize];
-            // Posts write G80 beside the motion that replaces the cycle: that motion counts.
+            // Posts write G80 beside the motion that replaces the cycle: the motion is taken.
             match (other, code) {
                 (800, _) if group == Group::Motion as u8 => {}
                 (_, 800) => return Ok(()),
@@ -287,7 +288,7 @@ impl Block {
         (self.groups & (1 << group as u8) != 0).then(|| self.codes[group as usize])
     }
 
-    /// True where the block has no G code but one of motion, and no M code.
+    /// True where the block has no G code other than one of motion, and no M code.
     #[inline(always)]
     pub fn only_motion(&self) -> bool {
         self.groups & !(1 << Group::Motion as u8) == 0
@@ -296,23 +297,23 @@ impl Block {
             && self.corner.is_none()
     }
 
-    /// True where the block calls a subprogram or comes back from one: by G65, M97, M98 or M99.
+    /// True where the block calls a subprogram or returns from one: by G65, M97, M98 or M99.
     #[inline(always)]
     pub fn calls(&self) -> bool {
         self.groups & (1 << Group::Macro as u8) | self.m_groups & (1 << MGroup::Call as u8) != 0
     }
 
-    /// True where the block has no other code than that of a group.
+    /// True where the block has no code other than that of a group.
     pub fn is_alone(&self, group: Group) -> bool {
         self.groups == 1 << group as u8 && self.m_groups == 0
     }
 
-    /// Takes an M code of a group; Err with what stands in that group already.
+    /// Adds an M code of a group; Err with the code of that group that the block has already.
     pub fn set_m_code(&mut self, code: u16, group: MGroup) -> Result<(), u16> {
         if group == MGroup::Other {
             self.m_groups |= 1;
-            let Some(place) = self.others.get_mut(self.other_count) else { return Err(self.others[0]) };
-            *place = code;
+            let Some(next) = self.others.get_mut(self.other_count) else { return Err(self.others[0]) };
+            *next = code;
             self.other_count += 1;
             return Ok(());
         }
@@ -330,7 +331,7 @@ impl Block {
     }
 }
 
-/// A G code in tenths as people write it: G5.1.
+/// The name of a G code in tenths: G5.1.
 pub fn g_name(code: u16) -> String {
     match code % 10 {
         0 => format!("G{}", code / 10),
@@ -338,7 +339,7 @@ pub fn g_name(code: u16) -> String {
     }
 }
 
-/// What to do about a G code that is understood and not read; None where it is not understood.
+/// The remedy for a G code that is known but not read; None for a code that is not known.
 pub fn g_remedy(code: u16) -> Option<&'static str> {
     Some(match code {
         54..=69 => "these splines are not read: post lines and arcs, or G5 to G5.3 or G6.2",

@@ -1,44 +1,43 @@
-//! Cutter radius compensation, G41 and G42: the tool goes beside the programmed path, at its radius.
+//! Cutter compensation, G41 and G42: the tool moves beside the programmed path, at the distance of its radius.
 //!
-//! As LinuxCNC: the first move ends beside its end. At corners that turn away from the tool an arc about the
-//! programmed corner joins the offsets; at corners towards it each ends where it meets the other. Corners of less
-//! than `STRAIGHT_ON` join as they are. After G40 the tool stays beside the path, and the next straight move, which
-//! counts from the programmed place, brings it back.
+//! As in LinuxCNC, the first move ends beside its programmed end. At a corner that turns away from the tool, an arc about
+//! the corner joins the offsets. At a corner that turns towards the tool, each offset ends where it meets the other. A
+//! corner of less than `NO_CORNER` changes nothing. After G40 the tool stays beside the path until the next straight
+//! move, which ends on the programmed path.
 
 use std::f64::consts::{PI, TAU};
 
+use super::beside::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
 use super::block::{g_name, Block};
 use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
 use super::moves::{Arc, Kind, Point};
-use super::offset::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
+use super::tolerance::{ENTRY_BEND, NO_CORNER, WHOLE_TURNS};
 use super::words::count;
-
-/// Smaller corners [rad] are none.
-const STRAIGHT_ON: f64 = 0.05;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// G41 or G42 is on, and no move has followed.
+    /// After G41 or G42, before the first move.
     Entering,
     Following,
-    /// G40 has followed, and no move since.
+    /// After G40, before the next move.
     Leaving,
 }
 
-/// The last element of the tool's path in the plane: its first row, and where it begins.
+/// The last element of the tool's path in the plane.
 #[derive(Clone, Copy, Debug)]
 struct Last {
+    /// Row of its first move.
     row: usize,
     start: Point2,
     shape: Shape,
-    /// It brings the tool to the path, so that it has no direction to keep.
+    /// True for the element that brings the tool beside the path: its direction may change.
     entry: bool,
-    /// So many turns, begun ones among them, the program gives an arc.
+    /// The number of turns of the programmed arc, rounded up.
     turns: f64,
 }
 
-/// The tool beside the path.
+/// The compensation that is on.
 #[derive(Clone, Debug)]
 pub struct Compensation {
     code: u16,
@@ -46,23 +45,23 @@ pub struct Compensation {
     side: f64,
     radius: f64,
     phase: Phase,
-    /// The axes of the plane, and the one that arcs turn about.
+    /// The axes of the plane, and the axis that arcs turn about.
     plane: (usize, usize),
     normal: usize,
-    /// From the centre of a lathe tool's tip to the point that is programmed without compensation; 0 for mills.
+    /// The vector from the centre of a lathe tool's tip to the point that is programmed without compensation; 0 for mills.
     origin: Point2,
-    /// Where the programmed path is.
+    /// The point of the programmed path.
     pub programmed: Point,
     last: Last,
 }
 
 impl Compensation {
-    /// A place in the plane.
-    fn flat(&self, place: &Point) -> Point2 {
-        [place[self.plane.0], place[self.plane.1]]
+    /// A point projected onto the plane.
+    fn flat(&self, point: &Point) -> Point2 {
+        [point[self.plane.0], point[self.plane.1]]
     }
 
-    /// Where the tool's centre is, from where the machine is.
+    /// The tool's centre in the plane, where the machine is at a position.
     fn centre(&self, machine: &Point) -> Point2 {
         match self.phase {
             Phase::Following => minus(self.flat(machine), self.origin),
@@ -70,13 +69,13 @@ impl Compensation {
         }
     }
 
-    /// Puts the machine where the tool's centre is at a place of the plane.
+    /// Moves the machine in the plane so that the tool's centre is at a point.
     fn put(&self, machine: &mut Point, centre: Point2) {
         machine[self.plane.0] = centre[0] + self.origin[0];
         machine[self.plane.1] = centre[1] + self.origin[1];
     }
 
-    /// An arc of the machine whose centre is at a place of the plane, at the height of another place.
+    /// An arc of the machine for an arc of the tool's centre about a point of the plane, at the height of `at`.
     fn arc(&self, centre: Point2, angle: f64, at: &Point) -> Arc {
         let mut place = *at;
         self.put(&mut place, centre);
@@ -84,7 +83,8 @@ impl Compensation {
     }
 }
 
-/// From the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for the sides 0 to 9 that cut.
+/// The vector from the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for each of the
+/// sides 0 to 9 that may cut.
 const ORIGINS: [Point2; 10] = [
     [0.0, 0.0],
     [1.0, -1.0],
@@ -98,16 +98,16 @@ const ORIGINS: [Point2; 10] = [
     [0.0, 0.0],
 ];
 
-/// How the next element leaves a corner.
+/// How the tool's path goes on at a corner.
 struct Corner {
-    /// Where the tool's path begins beside it.
+    /// The start of the next element.
     start: Point2,
-    /// An arc about the corner comes before.
+    /// True where an arc about the corner leads there.
     rounded: bool,
 }
 
 impl Interpreter<'_> {
-    /// G40, G41 or G42 in tenths.
+    /// The code in force, G40, G41 or G42, in tenths.
     pub(super) fn compensation_code(&self) -> u16 {
         match &self.compensation {
             Some(compensation) if compensation.phase != Phase::Leaving => {
@@ -120,15 +120,13 @@ impl Interpreter<'_> {
     /// G40 to G42.1.
     pub(super) fn set_compensation(&mut self, block: &Block, code: u16) -> Outcome<()> {
         if code == 400 {
-            if let Some(on) = self.compensation.take_if(|on| on.phase == Phase::Following) {
-                self.settle(&on);
+            if let Some(mut on) = self.compensation.take().filter(|on| on.phase != Phase::Entering) {
+                if on.phase == Phase::Following {
+                    self.settle(&on);
+                }
+                on.phase = Phase::Leaving;
                 self.compensation = Some(on);
             }
-            self.compensation = self.compensation.take().and_then(|mut compensation| {
-                let followed = compensation.phase != Phase::Entering;
-                compensation.phase = Phase::Leaving;
-                followed.then_some(compensation)
-            });
             return Ok(());
         }
         let name = g_name(code);
@@ -154,7 +152,7 @@ impl Interpreter<'_> {
             ));
         }
         let left = if code < 420 { 1.0 } else { -1.0 };
-        // A negative diameter is that of a tool smaller than the one which the path is made for.
+        // A negative diameter stands for a tool smaller than the one which the path is made for.
         let (side, radius) = (left * diameter.signum(), 0.5 * diameter.abs());
         if radius == 0.0 {
             self.compensation = None;
@@ -178,14 +176,14 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A tool change takes the machine as it is: it is beside the path no more.
+    /// After a tool change the position of the machine is the programmed one.
     pub(super) fn forget_compensation(&mut self) {
         if self.compensation.as_ref().is_some_and(|on| on.phase == Phase::Leaving) {
             self.compensation = None;
         }
     }
 
-    /// The diameter in mm, and the side that cuts, of the tool that D or H names, or of the one in the spindle.
+    /// The diameter in mm and the cutting side of the tool that D or H names, or of the tool in the spindle.
     fn tip_of_tool(&mut self, block: &Block, name: &str) -> Outcome<(f64, u32)> {
         let letter = if block.has(b'D') { b'D' } else { b'H' };
         let number = count(block, letter, 0, "tool number")?;
@@ -201,7 +199,7 @@ impl Interpreter<'_> {
         Ok(tool.map_or((0.0, 0), |tool| (tool.diameter, tool.orientation)))
     }
 
-    /// Refuses what has no offset.
+    /// Refuses a code or word that cannot be offset while the compensation is on.
     pub(super) fn check_beside(&self, what: &str) -> Outcome<()> {
         match &self.compensation {
             Some(on) if on.phase != Phase::Leaving => {
@@ -292,7 +290,7 @@ impl Interpreter<'_> {
         let (start, middle, sweep) = if entering {
             let middle = self.entry_centre(&on, here, end, new_end, out)?;
             if on.origin != [0.0; 2] {
-                // A lathe tool first brings its centre to where its point was.
+                // A lathe tool first moves its centre to the place of its point.
                 let mut place = self.moves.position;
                 on.put(&mut place, here);
                 self.moves.straight(Kind::Line, &place, feed, &control, line)?;
@@ -305,7 +303,7 @@ impl Interpreter<'_> {
             let radius = nominal + outward;
             let corner = self.corner(&on, from, along, Shape::Arc { centre, radius, turn })?;
             self.turn_corner(&on, &corner, Kind::Line, target, feed)?;
-            // The nominal sweep, less what the corner takes.
+            // The programmed sweep without the part that the corner cuts off.
             let taken = wrapped(direction(centre, corner.start) - direction(centre, from));
             let sweep = angle - taken;
             if sweep * turn <= 0.0 {
@@ -317,7 +315,7 @@ impl Interpreter<'_> {
         on.put(&mut beside, new_end);
         self.check_reach(&beside)?;
         let shape = Shape::Arc { centre: middle, radius: distance(new_end, middle), turn };
-        let turns = (angle.abs() / TAU - 1e-9).ceil();
+        let turns = (angle.abs() / TAU - WHOLE_TURNS).ceil();
         on.last = Last { row: self.moves.len(), start, shape, entry: entering, turns };
         let arc = on.arc(middle, sweep, &self.moves.position);
         self.moves.arc(arc, &beside, feed, &control, line)?;
@@ -327,7 +325,8 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// The centre of an entry arc: on the programmed end's radius, as far from the new end as from the start.
+    /// The centre of an entry arc: on the line through the programmed end and its centre, and equally far from the new end
+    /// and from the start.
     fn entry_centre(
         &self,
         on: &Compensation,
@@ -345,7 +344,7 @@ impl Interpreter<'_> {
         }
         let chord = minus(here, new_end);
         let along = -(chord[0] * out[0] + chord[1] * out[1]);
-        if along.abs() < 1e-4 * chord[0].hypot(chord[1]) {
+        if along.abs() < ENTRY_BEND * chord[0].hypot(chord[1]) {
             return fault(format!(
                 "the arc after {} has no centre that brings the tool beside its end: begin with a line",
                 g_name(on.code)
@@ -355,36 +354,35 @@ impl Interpreter<'_> {
         Ok([new_end[0] - radius * out[0], new_end[1] - radius * out[1]])
     }
 
-    /// How the path goes on at the programmed place `from` along a unit vector, with an offset of that shape.
+    /// How the tool's path goes on at the programmed point `from`, along a unit vector, with the offset `next`.
     fn corner(&self, on: &Compensation, from: Point2, along: Point2, next: Shape) -> Outcome<Corner> {
         let here = on.centre(&self.moves.position);
         let after = [-on.side * along[1], on.side * along[0]];
         let mut bend = on.side * wrapped(direction(from, here) - after[1].atan2(after[0]));
-        if bend < STRAIGHT_ON - PI {
+        if bend < NO_CORNER - PI {
             bend += TAU;
         }
-        // A half turn may go round the corner or cut across it: it cuts across where an arc has the tool outside.
+        // At a half turn the tool goes round the corner, or cuts across it where an arc has the tool outside.
         let outside = |shape: &Shape| matches!(shape, Shape::Arc { turn, .. } if *turn != on.side);
-        let back = (bend - PI).abs() < STRAIGHT_ON
+        let across = (bend - PI).abs() < NO_CORNER
             && match next {
-                Shape::Line(_) => bend > PI - STRAIGHT_ON && outside(&on.last.shape),
+                Shape::Line(_) => outside(&on.last.shape),
                 Shape::Arc { .. } => outside(&next),
             };
-        if !(-STRAIGHT_ON..=PI + STRAIGHT_ON).contains(&bend) || back {
-            let beside = [from[0] + on.radius * after[0], from[1] + on.radius * after[1]];
-            return match crossing(on.side, here, &on.last.shape, beside, &next) {
+        let beside = [from[0] + on.radius * after[0], from[1] + on.radius * after[1]];
+        if !(-NO_CORNER..=PI + NO_CORNER).contains(&bend) || across {
+            match crossing(on.side, here, &on.last.shape, beside, &next) {
                 Some(start) => Ok(Corner { start, rounded: false }),
                 None => no_room(on),
-            };
+            }
+        } else if bend > NO_CORNER {
+            Ok(Corner { start: beside, rounded: true })
+        } else {
+            Ok(Corner { start: here, rounded: false })
         }
-        if bend > STRAIGHT_ON {
-            let start = [from[0] + on.radius * after[0], from[1] + on.radius * after[1]];
-            return Ok(Corner { start, rounded: true });
-        }
-        Ok(Corner { start: here, rounded: false })
     }
 
-    /// Ends the last element where the next begins, or goes round the corner; a rapid goes straight.
+    /// Ends the last element where the next begins, or adds the arc about the corner; a rapid goes straight.
     fn turn_corner(
         &mut self,
         on: &Compensation,
@@ -404,7 +402,7 @@ impl Interpreter<'_> {
         }
         self.settle(on);
         let mut place = self.moves.position;
-        // Axes outside of X, Y and Z move on the arc.
+        // Axes other than X, Y and Z make their move on the arc.
         place[3..].copy_from_slice(&target[3..]);
         on.put(&mut place, corner.start);
         if kind == Kind::Rapid {
@@ -416,7 +414,7 @@ impl Interpreter<'_> {
         self.moves.arc(arc, &place, feed, &control, line)
     }
 
-    /// Where full circles begin before their end, LinuxCNC makes the last turn no more.
+    /// Takes the last turn from a full circle that a corner has made longer than its turns, as LinuxCNC does.
     fn settle(&mut self, on: &Compensation) {
         if self.moves.drop_turn(on.last.row, on.last.turns) {
             self.warn(
@@ -425,7 +423,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Moves the end of the last element.
+    /// Moves the end of the last element from `here` to `end`.
     fn shorten(&mut self, on: &Compensation, here: Point2, end: Point2) -> Outcome<()> {
         let last = on.last;
         let turned = match last.shape {

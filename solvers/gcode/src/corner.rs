@@ -1,12 +1,13 @@
-//! `,C` and `,R` behind a straight move: a chamfer or a rounding between it and the straight move that follows, as Fanuc
-//! and Haas have them.
+//! `,C` and `,R` of a straight move: a chamfer or a rounding between it and the straight move that follows, as on the
+//! controls of Fanuc and Haas.
 
 use super::block::{Block, AXES};
 use super::execute::Interpreter;
 use super::fault::{fault, fault_in, Outcome};
 use super::moves::{Arc, Kind, Point};
+use super::tolerance::ON_ONE_LINE;
 
-/// A corner that the next move makes: its word, the row and the line of the move before, and where that begins.
+/// A corner that waits for the next move: its word, and the row, line, start and feed of the move before.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
     letter: u8,
@@ -17,11 +18,8 @@ pub struct Corner {
     feed: f64,
 }
 
-/// Directions whose sine is smaller are one line.
-const STRAIGHT: f64 = 1e-9;
-
 impl Interpreter<'_> {
-    /// Keeps the corner of a block whose move has been made.
+    /// Keeps the corner of a block whose move has been added.
     pub(super) fn set_corner(&mut self, block: &Block, start: &Point, feed: f64) -> Outcome<()> {
         let Some((letter, value)) = block.corner else { return Ok(()) };
         let size = value * self.state.unit();
@@ -41,7 +39,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Refuses what is no straight move where a corner waits for one.
+    /// Refuses other motion where a corner waits for a straight move.
     pub(super) fn check_corner(&self) -> Outcome<()> {
         match &self.corner {
             None => Ok(()),
@@ -55,7 +53,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Cuts the corner that waits for the straight move to `target`.
+    /// Cuts the corner that waits, before the straight move to `target`.
     #[cold]
     pub(super) fn cut_corner(&mut self, kind: Kind, target: &Point) -> Outcome<()> {
         let Some(corner) = self.corner else { return Ok(()) };
@@ -76,7 +74,7 @@ impl Interpreter<'_> {
         let (sine, cosine) =
             (before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1]);
         let turn = sine.atan2(cosine);
-        if sine.abs() < STRAIGHT && (cosine > 0.0 || corner.letter == b'R') {
+        if sine.abs() < ON_ONE_LINE && (cosine > 0.0 || corner.letter == b'R') {
             return fault_in(corner.line, "the moves at this corner lie on one line: remove ,C and ,R");
         }
         let cut = if corner.letter == b'C' { corner.size } else { corner.size * (0.5 * turn).tan().abs() };

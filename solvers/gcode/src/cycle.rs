@@ -1,26 +1,24 @@
-//! Canned drilling and boring cycles, G73 and G81 to G89, written out as moves.
+//! The moves of canned drilling and boring cycles, G73, G74 and G81 to G89.
 //!
-//! As LinuxCNC: rapid to R where the series begins below it, across to the hole, down to R, the cycle's own moves, and
-//! back to R (G99) or to where the series began, where that is higher (G98). Between holes the path is exact.
+//! As in LinuxCNC: a rapid up to R where the series begins below it, across to the hole, down to R, the moves of the cycle,
+//! and back to R (G99), or to the height where the series began if that is higher (G98). The path between holes is exact.
 
 use super::block::{g_name, Block, AXES};
-use super::execute::Interpreter;
+use super::execute::{Interpreter, Topic};
 use super::fault::{fault, Outcome};
 use super::modal::FeedMode;
 use super::moves::{Control, Kind, Mode, Point, Stop};
+use super::tolerance::MOST_REPEATS;
 use super::words::count;
 
-/// Where G73 and G83 stop above the last depth, unless D says, in mm: 0.010 inch.
+/// The height above the last depth at which G73 and G83 stop, unless D gives it, in mm: 0.010 inch.
 const PECK_CLEARANCE: f64 = 0.254;
-
-/// More repetitions of one block are a mistake.
-const MOST_REPEATS: u32 = 1_000_000;
 
 /// One hole: its cycle and heights along the tool axis, in machine coordinates.
 struct Hole {
     motion: u16,
     initial: f64,
-    /// Retract height and bottom in the numbers of the program, and so is `peck`.
+    /// Retract height and bottom in the numbers of the program; `peck` is in them too.
     own: [f64; 2],
     retract: f64,
     bottom: f64,
@@ -31,7 +29,7 @@ struct Hole {
 }
 
 impl Interpreter<'_> {
-    /// Drills where the block says, as often as L says.
+    /// Drills at the axis words of the block, L times.
     pub(super) fn cycle(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         if self.state.feed_mode == FeedMode::Inverse {
             return fault(format!(
@@ -56,22 +54,24 @@ impl Interpreter<'_> {
         }
         self.check_beside(&g_name(motion))?;
         let hole = self.hole(block, motion)?;
-        if block.has(b'P') && matches!(motion, 730 | 810 | 830 | 850) && !self.warned_cycle_dwell {
-            self.warned_cycle_dwell = true;
-            self.warn(format!(
-                "the dwell {} of {} is left out: this cycle has none",
-                block.word(b'P'),
-                g_name(motion)
-            ));
+        if block.has(b'P') && matches!(motion, 730 | 810 | 830 | 850) {
+            self.warn_once(Topic::CycleDwell, || {
+                format!(
+                    "the dwell {} of {} is left out: this cycle has none",
+                    block.word(b'P'),
+                    g_name(motion)
+                )
+            });
         }
 
         let (u, v) = self.state.plane();
         let normal = self.state.normal;
-        if !self.state.retract_given && hole.clear < self.position()[normal] && !self.warned_retract {
-            self.warned_retract = true;
-            self.warn("neither G98 nor G99 is given: cycles go back to R (G99), as LinuxCNC does".into());
+        if !self.state.retract_given && hole.clear < self.position()[normal] {
+            self.warn_once(Topic::Retract, || {
+                "neither G98 nor G99 is given: cycles go back to R (G99), as LinuxCNC does".into()
+            });
         }
-        // In absolute mode the axis words are the place, in incremental mode a step before each repetition.
+        // In absolute mode the axis words are the hole, in incremental mode a step before each repetition.
         let here = self.position();
         let mut place = here;
         let goal = self.target(block, false)?;
@@ -85,7 +85,7 @@ impl Interpreter<'_> {
             self.state.control = Control::new(Mode::ExactPath);
         }
         let mut up = here;
-        // A series that begins below R rises to it before it crosses.
+        // A series that begins below R rises to R before it crosses.
         if hole.initial < hole.retract {
             up[normal] = hole.retract;
         }
@@ -112,7 +112,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// Heights and words of the cycle; those not written stay as in the block before, if it was the same cycle.
+    /// Heights and words of the cycle; missing ones are as in the block before, if that had the same cycle.
     fn hole(&mut self, block: &Block, motion: u16) -> Outcome<Hole> {
         let normal = self.state.normal;
         let unit = self.state.unit();
@@ -142,13 +142,12 @@ impl Interpreter<'_> {
             sticky.dwell = block.get(b'P').or(sticky.dwell.filter(|_| again || taps));
         }
         let initial = *sticky.initial.get_or_insert(current);
-        // As the program counts heights, and as the machine does.
-        let own = match absolute {
-            true => [sticky.retract, sticky.bottom],
-            false => {
-                let retract = sticky.retract + (initial - zero) / unit;
-                [retract, retract + sticky.bottom]
-            }
+        // The heights in the numbers of the program, then in machine coordinates.
+        let own = if absolute {
+            [sticky.retract, sticky.bottom]
+        } else {
+            let retract = sticky.retract + (initial - zero) / unit;
+            [retract, retract + sticky.bottom]
         };
         let [retract, bottom] = own.map(|height| height * unit + zero);
         if bottom > retract {
@@ -183,7 +182,7 @@ impl Interpreter<'_> {
         Ok(Hole { motion, initial, own, retract, bottom, clear, dwell, peck, clearance })
     }
 
-    /// From above the hole, down to R, through the cycle and up.
+    /// From above the hole down to R, through the cycle and up again.
     fn drill(
         &mut self,
         block: &Block,
@@ -198,7 +197,7 @@ impl Interpreter<'_> {
         if pecks > f64::from(MOST_REPEATS) {
             return fault(format!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion)));
         }
-        // Depths are counted in the program's own numbers, so that they end as on the control.
+        // Depths are added in the numbers of the program, so that rounding makes as many pecks as on a control.
         let (unit, zero) = (self.state.unit(), self.state.offsets.sum()[normal]);
         let [retract, bottom] = hole.own;
         let mut reached = retract - hole.peck;
@@ -213,14 +212,13 @@ impl Interpreter<'_> {
         }
         self.feed_to(&mut place, normal, hole.bottom, feed)?;
         match hole.motion {
-            820 => self.dwell(block, b'P', hole.dwell)?,
+            820 | 860 => self.dwell(block, b'P', hole.dwell)?,
             850 => self.feed_to(&mut place, normal, hole.retract, feed)?,
-            860 => self.dwell(block, b'P', hole.dwell)?,
             890 => {
                 self.dwell(block, b'P', hole.dwell)?;
                 self.feed_to(&mut place, normal, hole.clear, feed)?;
             }
-            // Tapping: the spindle turns back at the bottom and again at the top.
+            // A tap reverses the spindle at the bottom and again at the top.
             740 | 840 => {
                 self.dwell(block, b'P', hole.dwell)?;
                 self.feed_to(&mut place, normal, hole.clear, feed)?;

@@ -1,9 +1,9 @@
-//! Which other language a file that is not understood may be in, from words that only that language has.
+//! Guesses the language of a file that is not understood, from words that only one language has.
 
-/// So much of a file is looked at.
-const LOOK: usize = 1 << 16;
+/// Number of bytes at the start of a file that are searched.
+const SEARCHED: usize = 1 << 16;
 
-/// Words in capitals, and the language they belong to; the first that is found decides.
+/// Words in capitals and the language that they belong to; the first language of which a word is found is the guess.
 const SIGNS: [(&[&str], &str); 4] = [
     (&["BEGIN PGM", "TOOL CALL", "TOOL DEF", " FMAX", "CYCL DEF", "BLK FORM"], "Heidenhain conversational"),
     (
@@ -29,10 +29,10 @@ const SIGNS: [(&[&str], &str); 4] = [
     (&["<?XML", "<HTML", "<SVG", "SOLID ", "%!PS", "0\nSECTION", "0\r\nSECTION"], "no machine"),
 ];
 
-/// The language that the file looks like; None where nothing tells.
+/// The language that the file looks like; None where no word of any is found.
 #[cold]
 pub fn guess(source: &[u8]) -> Option<&'static str> {
-    let head = source[..source.len().min(LOOK)].to_ascii_uppercase();
+    let head = source[..source.len().min(SEARCHED)].to_ascii_uppercase();
     let has = |sign: &&str| head.windows(sign.len()).any(|window| window == sign.as_bytes());
     SIGNS.iter().find(|(signs, _)| signs.iter().any(&has)).map(|&(_, language)| language)
 }

@@ -1,10 +1,10 @@
-//! One block after another, in LinuxCNC's order of execution:
+//! Runs one block after another, in LinuxCNC's order of execution:
 //!
 //! feed mode, F, S, M6, spindle, coolant, overrides, user codes, G4, plane, units, tool length, work offset, path
 //! control, distance modes, retract mode, G10 G28 G30 G52 G92, motion, M0 M1 M2 M30 M60.
 //!
-//! One difference: F counts in the units of its own block (`G20 F10` is 10 inch/min), as most controls and all posts
-//! have it; LinuxCNC reads it before the units change.
+//! There is one difference: F has the units of its own block (`G20 F10` is 10 inch/min), as on most controls and in all
+//! posts. LinuxCNC reads F before the units change.
 
 use super::block::{bit, bits, g_name, rotary, Block, Group, MGroup, AXES, AXIS_OF_LETTER, AXIS_WORDS};
 use super::compensate::Compensation;
@@ -16,22 +16,11 @@ use super::moves::{Control, Kind, Mode, Moves, Point, Stop};
 use super::parameters::{first_of_system, Parameters, HOME, SECOND_HOME, SYSTEM};
 use super::spline::Nurbs;
 use super::tip::{takes_direction, CoordinateMode};
+use super::tolerance::{FARTHEST, FARTHEST_TURN, LONG_DWELL, MM_PER_INCH, MOST_DWELL, RATES};
 use super::tools::Tool;
 use super::Options;
 
-/// Farther than this from the machine's zero is a mistake, in mm;
-pub(super) const FARTHEST: f64 = 1e6;
-
-/// rotary axes may wind up, in degrees.
-const FARTHEST_TURN: f64 = 1e8;
-
-/// Feeds and spindle speeds of the program beyond these are mistakes.
-pub(super) const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
-
-/// Longer dwells are probably milliseconds taken for seconds.
-const LONG_DWELL: f64 = 100.0;
-
-/// Runs blocks.
+/// The state of the program between two blocks.
 pub struct Interpreter<'a> {
     pub(super) state: State,
     pub(super) moves: Moves,
@@ -40,30 +29,36 @@ pub struct Interpreter<'a> {
     /// Letters of the axes that the program has named.
     pub(super) known: u32,
     warnings: Vec<String>,
-    warned_codes: Vec<u16>,
-    pub(super) warned_tool: bool,
-    pub(super) warned_length: bool,
-    warned_dwell: bool,
-    warned_extruder: bool,
-    pub(super) warned_cycle_dwell: bool,
-    pub(super) warned_retract: bool,
-    pub(super) warned_look_ahead: bool,
+    warned: Vec<Topic>,
     /// The NURBS that is being read.
     pub(super) open: Option<Box<Nurbs>>,
-    /// Where a G5 may go on without I and J: the row after the G5 before, and the offset in mm.
+    /// The row in which a G5 may follow without I and J, and the I and J that it has then, in mm.
     pub(super) mirror: Option<(usize, [f64; 2])>,
     pub parameters: Parameters,
     pub(super) tools: Option<Vec<Tool>>,
-    /// The tool in the spindle as the table has it, its number, and the one that T has called.
+    /// The table's row of the tool in the spindle, the number of that tool, and the number that T has called.
     pub(super) tool: Option<Tool>,
     pub(super) loaded: Option<u32>,
     pub(super) selected: Option<u32>,
-    /// The corner that the next straight move makes.
+    /// The corner that waits for the next straight move.
     pub(super) corner: Option<Corner>,
-    /// The offset from the programmed path, while G41 or G42 is on.
+    /// The compensation, while G41 or G42 is on.
     pub(super) compensation: Option<Box<Compensation>>,
-    /// Modes that M70 and M73 have saved: at which depth of calls, and whether the end of the call restores them.
+    /// Modes that M70 and M73 have saved, with the depth of calls, and true where the end of the call restores them.
     pub(super) saved: Vec<(usize, bool, State)>,
+}
+
+/// What a program is warned of once.
+#[derive(PartialEq)]
+pub(super) enum Topic {
+    UnknownCode(u16),
+    NoToolTable,
+    NoToolLength,
+    LongDwell,
+    Extruder,
+    CycleDwell,
+    Retract,
+    LookAhead,
 }
 
 impl<'a> Interpreter<'a> {
@@ -84,14 +79,7 @@ impl<'a> Interpreter<'a> {
             options,
             known: 0,
             warnings: Vec::new(),
-            warned_codes: Vec::new(),
-            warned_tool: false,
-            warned_length: false,
-            warned_dwell: false,
-            warned_extruder: false,
-            warned_cycle_dwell: false,
-            warned_retract: false,
-            warned_look_ahead: false,
+            warned: Vec::new(),
             open: None,
             mirror: None,
             parameters,
@@ -113,7 +101,7 @@ impl<'a> Interpreter<'a> {
         (self.moves, self.warnings)
     }
 
-    /// Where the programmed path is; the tool is beside it while G41 or G42 is on.
+    /// The point of the programmed path; the tool is beside it while G41 or G42 is on.
     #[inline(always)]
     pub(super) fn position(&self) -> Point {
         match &self.compensation {
@@ -122,7 +110,7 @@ impl<'a> Interpreter<'a> {
         }
     }
 
-    /// The feed in force as an F word would give it.
+    /// The feed in force, as a value of F.
     pub(super) fn feed_word(&self) -> f64 {
         let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
         self.state.feed.map_or(0.0, |feed| feed.angular * per)
@@ -133,7 +121,7 @@ impl<'a> Interpreter<'a> {
         self.moves.remark(line, letter, text);
     }
 
-    /// Runs a block of the given line; true where it ends the program.
+    /// Runs a block of a line; true where it ends the program.
     #[inline]
     pub fn run(&mut self, block: &Block, line: u32) -> Outcome<bool> {
         self.line = line;
@@ -141,7 +129,7 @@ impl<'a> Interpreter<'a> {
         {
             return self.run_all(block);
         }
-        // Nearly all blocks are a straight move or an arc and nothing else.
+        // Nearly all blocks contain a straight move or an arc and nothing else.
         let axes = block.words & AXIS_WORDS;
         let rest = block.words & !(AXIS_WORDS | FREE_WORDS) | block.words & bit(b'T');
         match motion_of(block, axes, self.state.motion, false)? {
@@ -168,7 +156,7 @@ impl<'a> Interpreter<'a> {
         if let Some(nurbs) = self.open.take() {
             return self.continue_spline(block, nurbs).map(|()| false);
         }
-        // Its words are the macro's.
+        // The words of a G65 block are arguments of the macro.
         if block.code(Group::Macro).is_some() {
             return Ok(false);
         }
@@ -269,7 +257,7 @@ impl<'a> Interpreter<'a> {
             self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
         }
         if block.words & bits(b"SHTD") != 0 {
-            // A diameter may be negative: that of a tool that is smaller than the path was made for.
+            // A negative diameter stands for a tool smaller than the one which the path is made for.
             let diameter = matches!(block.code(Group::Compensation), Some(411 | 421));
             for letter in *b"SHTD" {
                 if !(diameter && letter == b'D') && block.get(letter).is_some_and(|value| value < 0.0) {
@@ -292,21 +280,22 @@ impl<'a> Interpreter<'a> {
             ));
         }
         let inches = block.code(Group::Units).map_or(self.state.inches, |code| code == 200);
-        let unit = if inches { super::modal::MM_PER_INCH } else { 1.0 };
+        let unit = if inches { MM_PER_INCH } else { 1.0 };
         let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
         self.state.feed = Some(Feed { linear: feed * unit / per, angular: feed / per });
         Ok(())
     }
 
-    /// T, and M codes that switch something: the tool stands still for them.
+    /// T, and M codes that switch something, with a stop of the tool where they need one.
     fn switch(&mut self, block: &Block) -> Outcome<()> {
         let change = block.m_code(MGroup::ToolChange);
         if change.is_some() || block.has(b'T') {
             self.set_tool(block, change)?;
         }
-        if block.has(b'E') && block.m_code(MGroup::Output).is_none() && !self.warned_extruder {
-            self.warned_extruder = true;
-            self.warn("the words E are left out: they move an extruder, which is not planned".into());
+        if block.has(b'E') && block.m_code(MGroup::Output).is_none() {
+            self.warn_once(Topic::Extruder, || {
+                "the words E are left out: they move an extruder, which is not planned".into()
+            });
         }
         let known = [MGroup::ToolChange, MGroup::Spindle, MGroup::Coolant, MGroup::Output, MGroup::User];
         let codes = known.into_iter().filter_map(|group| block.m_code(group));
@@ -331,13 +320,9 @@ impl<'a> Interpreter<'a> {
                 8 => self.state.flood = true,
                 9 => (self.state.mist, self.state.flood) = (false, false),
                 6 | 61..=68 => {}
-                _ if !self.warned_codes.contains(&code) => {
-                    self.warned_codes.push(code);
-                    self.warn(format!(
-                        "what M{code} does is not known: a stop is planned for it, of no duration"
-                    ));
-                }
-                _ => {}
+                _ => self.warn_once(Topic::UnknownCode(code), || {
+                    format!("what M{code} does is not known: a stop is planned for it, of no duration")
+                }),
             }
         }
         Ok(())
@@ -352,36 +337,38 @@ impl<'a> Interpreter<'a> {
         self.dwell(block, letter, seconds)
     }
 
-    /// A pause of a word's seconds.
+    /// A pause of the seconds that a word gives.
     pub(super) fn dwell(&mut self, block: &Block, letter: u8, seconds: f64) -> Outcome<()> {
-        if !(0.0..=1e6).contains(&seconds) {
+        if !(0.0..=MOST_DWELL).contains(&seconds) {
             let word =
                 if block.has(letter) { block.word(letter) } else { format!("{}{seconds}", letter as char) };
-            return fault(format!("word {word} is no dwell time: give seconds from 0 to 1000000"));
+            return fault(format!("word {word} is no dwell time: give seconds from 0 to {MOST_DWELL}"));
         }
-        if seconds > LONG_DWELL && !self.warned_dwell {
-            self.warned_dwell = true;
-            self.warn(format!("a dwell takes {seconds} s: dwells are read in seconds, not in milliseconds"));
+        if seconds > LONG_DWELL {
+            self.warn_once(Topic::LongDwell, || {
+                format!("a dwell takes {seconds} s: dwells are read in seconds, not in milliseconds")
+            });
         }
         self.moves.event(self.line, b'G', 4.0, Some(seconds), None);
         self.moves.dwell(seconds);
         Ok(())
     }
 
-    /// The axes that the block names, with their values in mm and degrees; axes named the first time get a column.
+    /// Calls `each` for each axis that the block names, with its value in mm or degrees. An axis that is named for the
+    /// first time gets a column.
     #[inline(always)]
-    pub(super) fn places(&mut self, block: &Block, mut each: impl FnMut(usize, f64)) -> Outcome<()> {
+    pub(super) fn axis_values(&mut self, block: &Block, mut each: impl FnMut(usize, f64)) -> Outcome<()> {
         let mut words = block.words & AXIS_WORDS;
         if words & !self.known != 0 {
-            self.meet(words)?;
+            self.add_axes(words)?;
         }
         let unit = self.state.unit();
         let diameters = self.state.diameters;
         while words != 0 {
-            let place = words.trailing_zeros() as usize;
+            let letter = words.trailing_zeros() as usize;
             words &= words - 1;
-            let axis = AXIS_OF_LETTER[place] as usize;
-            let mut value = block.value(b'A' + place as u8);
+            let axis = AXIS_OF_LETTER[letter] as usize;
+            let mut value = block.value(b'A' + letter as u8);
             if !rotary(axis) {
                 value *= unit;
             }
@@ -393,9 +380,9 @@ impl<'a> Interpreter<'a> {
         Ok(())
     }
 
-    /// Axes named for the first time: the machine must have them.
+    /// Gives columns to axes that are named for the first time; the machine must have them.
     #[cold]
-    pub(super) fn meet(&mut self, words: u32) -> Outcome<()> {
+    pub(super) fn add_axes(&mut self, words: u32) -> Outcome<()> {
         for (axis, &letter) in AXES.iter().enumerate().filter(|(_, &letter)| words & bit(letter) != 0) {
             if !self.options.machine_axes.is_empty() && !self.options.machine_axes.contains(&letter) {
                 let letter = letter as char;
@@ -412,7 +399,7 @@ impl<'a> Interpreter<'a> {
         Ok(())
     }
 
-    /// The end of a move to the block's axis words.
+    /// The end of a move to the axis words of a block.
     #[inline(always)]
     pub(super) fn target(&mut self, block: &Block, machine: bool) -> Outcome<Point> {
         if self.state.offsets.rotation != 0.0 || self.state.polar || block.is_polar() {
@@ -421,18 +408,18 @@ impl<'a> Interpreter<'a> {
         let mut target = self.position();
         let zero = if machine { [0.0; 9] } else { *self.state.offsets.sum() };
         let absolute = self.state.absolute;
-        self.places(block, |axis, value| {
+        self.axis_values(block, |axis, value| {
             target[axis] = value + if absolute { zero[axis] } else { target[axis] };
         })?;
         self.check_reach(&target)?;
         Ok(target)
     }
 
-    /// Refuses places that no machine reaches, and what is not a number.
+    /// Refuses positions that no machine reaches, or that are not numbers.
     #[inline(always)]
     pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
         let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
-        // All nine without a branch; which one it is matters afterwards.
+        // All nine are tested without a branch, and the faulty one is looked up afterwards.
         if (0..9).fold(true, |all, axis| all & reached(axis)) {
             return Ok(());
         }
@@ -444,7 +431,7 @@ impl<'a> Interpreter<'a> {
         self.go(Kind::Rapid, target, f64::INFINITY)
     }
 
-    /// A straight move to a place of the programmed path.
+    /// A straight move to a point of the programmed path.
     #[inline(always)]
     pub(super) fn go(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
         if self.compensation.is_some() {
@@ -467,6 +454,14 @@ impl<'a> Interpreter<'a> {
 
     pub(super) fn warn(&mut self, text: String) {
         self.warnings.push(format!("line {}: {text}", self.line));
+    }
+
+    /// Warns of a topic for the first time.
+    pub(super) fn warn_once(&mut self, topic: Topic, text: impl FnOnce() -> String) {
+        if !self.warned.contains(&topic) {
+            self.warned.push(topic);
+            self.warn(text());
+        }
     }
 }
 

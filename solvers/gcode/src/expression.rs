@@ -1,37 +1,33 @@
 //! The arithmetic of RS-274/NGC: `[1 + acos[0] - [#3 ** [4.0/2]]]`, parameters and their assignment.
 //!
-//! Operators in rising order of binding: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Those of one order go
-//! from left to right, powers too. Angles are degrees; EQ and its kin take numbers closer than 1e-6 as equal.
+//! Operators from the one that binds least: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Operators that bind alike
+//! are applied from left to right, powers too.
 
-use super::arithmetic::{apply, call, operator, Function};
+use super::arithmetic::{finite, function_at, operator_of, Function};
 use super::fault::{fault, foreign, Outcome};
 use super::number::{decimal, spaces};
 use super::parameters::{is_number, Name, READINGS};
+use super::tolerance::{MAX_DEPTH, NEAR_INTEGER};
 
-/// How far a decimal number may be from the integer it stands for.
-const NEAR_INTEGER: f64 = 1e-4;
-
-/// Brackets may be nested so deep.
-const MAX_DEPTH: usize = 64;
-
-/// What parameters are worth: those of the program, and those that the machine tells.
+/// The values of parameters, those that the program sets and those that the machine reports. A value that only one
+/// machine or control can know is a fault.
 pub trait Values {
-    /// 0 where it has none, as in LinuxCNC; a fault where it cannot be known here.
+    /// The value of a number; 0 where it has none, as in LinuxCNC.
     fn number(&self, number: usize) -> Outcome<f64>;
 
-    /// Whether a number has a value; a fault where it cannot be known here.
+    /// True where a number has a value.
     fn has_value(&self, number: usize) -> Outcome<bool>;
 
-    /// Whether words of parameters without value are left out, as in Fanuc's macros.
+    /// True where words with parameters without value are left out, as in Fanuc's macros.
     fn in_macro(&self) -> bool;
 
-    /// None where there is no such name; a fault where it cannot be known here.
+    /// The value of a name; None where there is no such name.
     fn named(&self, name: &[u8]) -> Outcome<Option<f64>>;
 }
 
-/// Reads `#1 = value` from its `#` on; what it assigns (NaN by `#1 = #0`), and the place after it.
+/// Reads `#1 = value` from its `#` on: the parameter, its value (NaN for `#1 = #0`), and the place after it.
 ///
-/// Fanuc writes sums without brackets.
+/// The value may be a sum without brackets, as Fanuc writes it.
 pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Name, f64, usize)> {
     let mut formula = Formula { source, at, values, depth: 0 };
     let name = formula.name()?;
@@ -41,13 +37,13 @@ pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Nam
     formula.at += 1;
     let value = if formula.nothing() { f64::NAN } else { formula.chain(1)? };
     if matches!(name, Name::Number(number) if READINGS.contains(&number)) {
-        return fault(format!("{name} is told by the machine and cannot be set: use another parameter"));
+        return fault(format!("{name} is reported by the machine and cannot be set: use another parameter"));
     }
     Ok((name, value, formula.at))
 }
 
-/// The value at `at` that is not a plain number: an expression, a parameter, a function, or one of these
-/// with a sign; with the place after it. None where none of these starts; NaN for a parameter without value in a macro.
+/// The value at `at` that is not a plain number (brackets, a parameter or a function, with or without a sign), and the
+/// place after it. None where none of these begins; NaN for a parameter without value in a macro.
 pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
     let mut formula = Formula { source, at, values, depth: 0 };
     let after_sign = match formula.peek() {
@@ -56,7 +52,7 @@ pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Opti
     };
     let starts = match source.get(after_sign) {
         Some(b'[' | b'#') => true,
-        Some(letter) if letter.is_ascii_alphabetic() => Function::at(source, after_sign).is_some(),
+        Some(letter) if letter.is_ascii_alphabetic() => function_at(source, after_sign).is_some(),
         _ => false,
     };
     if !starts {
@@ -64,13 +60,11 @@ pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Opti
     }
     if values.in_macro() && formula.peek() == b'#' {
         let start = formula.at;
-        let has_value = match formula.nothing() {
-            true => false,
-            false => match formula.name()? {
+        let has_value = !formula.nothing()
+            && match formula.name()? {
                 Name::Number(number) => values.has_value(number)?,
                 Name::Text(_) => true,
-            },
-        };
+            };
         if !has_value {
             return Ok(Some((f64::NAN, formula.at)));
         }
@@ -80,7 +74,7 @@ pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Opti
     Ok(Some((value, formula.at)))
 }
 
-/// The bracket at `at`, and the place after it; None where none starts there.
+/// The value of the bracket at `at`, and the place after it; None where no bracket begins there.
 pub fn bracket(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
     let mut formula = Formula { source, at, values, depth: 0 };
     if formula.peek() != b'[' {
@@ -90,7 +84,7 @@ pub fn bracket(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<
     Ok(Some((value, formula.at)))
 }
 
-/// The name between `<` at `at` and `>`, in lower case and without blanks, and the place after it.
+/// The name from `<` at `at` to `>`, in lower case and without blanks, and the place after it.
 pub fn name_in_brackets(source: &[u8], at: usize) -> Outcome<(Vec<u8>, usize)> {
     let first = at + 1;
     let end = (first..source.len()).find(|&at| matches!(source[at], b'>' | b'\n' | b'\r'));
@@ -109,7 +103,7 @@ struct Formula<'a> {
 }
 
 impl Formula<'_> {
-    /// The next byte that is not blank; a line end at the end.
+    /// The next byte that is not blank; a line end at the end of the text.
     fn peek(&mut self) -> u8 {
         self.at = spaces(self.source, self.at);
         self.source.get(self.at).copied().unwrap_or(b'\n')
@@ -179,43 +173,43 @@ impl Formula<'_> {
         Ok(value)
     }
 
-    /// Values joined by operators that bind at least as `least`.
+    /// Values joined by operators that bind at least as tightly as `least`.
     fn chain(&mut self, least: u8) -> Outcome<f64> {
         let mut left = self.value()?;
         loop {
             self.peek();
             let rest = &self.source[self.at.min(self.source.len())..];
-            match operator(rest) {
-                Some((name, operator, order)) if order >= least => {
-                    self.at += name.len();
-                    let right = self.chain(order + 1)?;
-                    left = apply(operator, name, left, right)?;
+            match operator_of(rest).filter(|operator| operator.binding >= least) {
+                Some(operator) => {
+                    self.at += operator.name.len();
+                    let right = self.chain(operator.binding + 1)?;
+                    left = operator.apply(left, right)?;
                 }
-                _ => return Ok(left),
+                None => return Ok(left),
             }
         }
     }
 
     fn function(&mut self) -> Outcome<f64> {
-        let Some((function, name, bracket)) = Function::at(self.source, self.at) else {
+        let Some((function, name, bracket)) = function_at(self.source, self.at) else {
             return foreign(format!("{} is neither a number nor a function", self.rest()));
         };
         self.at = bracket;
-        if let Function::Exists = function {
-            return self.exists();
-        }
-        let x = self.bracket()?;
-        let over = match function {
-            Function::Atan if self.peek() != b'/' => {
-                return foreign("ATAN takes two brackets: write ATAN[y]/[x]")
+        match function {
+            Function::Exists => self.exists(),
+            Function::Of(function) => {
+                let x = self.bracket()?;
+                finite(function(x), || format!("{name}[{x}]"))
             }
             Function::Atan => {
+                let y = self.bracket()?;
+                if self.peek() != b'/' {
+                    return foreign("ATAN takes two brackets: write ATAN[y]/[x]");
+                }
                 self.at += 1;
-                self.bracket()?
+                Ok(y.atan2(self.bracket()?).to_degrees())
             }
-            _ => 1.0,
-        };
-        call(function, name, x, over)
+        }
     }
 
     /// `EXISTS[#<name>]`.
@@ -235,17 +229,14 @@ impl Formula<'_> {
         })
     }
 
-    /// `EQ #0` or `NE #0` behind a parameter, in which #0 is what has no value.
+    /// The truth of `EQ #0` or `NE #0` behind a parameter: #0 stands for a parameter without value.
     fn beside_nothing(&mut self, name: &Name) -> Outcome<Option<f64>> {
         let Name::Number(number) = name else { return Ok(None) };
-        let equal = match self.peek() {
-            b'E' | b'e' => true,
-            b'N' | b'n' => false,
-            _ => return Ok(None),
-        };
+        self.peek();
         let start = self.at;
-        let word: &[u8] = if equal { b"EQ" } else { b"NE" };
-        if self.source.get(start..start + 2).is_some_and(|text| text.eq_ignore_ascii_case(word)) {
+        let word = self.source.get(start..start + 2).unwrap_or_default();
+        let equal = word.eq_ignore_ascii_case(b"EQ");
+        if equal || word.eq_ignore_ascii_case(b"NE") {
             self.at += 2;
             if self.nothing() {
                 return Ok(Some(f64::from(self.values.has_value(*number)? != equal)));
@@ -255,18 +246,15 @@ impl Formula<'_> {
         Ok(None)
     }
 
-    /// Takes `#0`, if it is next.
+    /// Takes `#0`, if it comes next.
     fn nothing(&mut self) -> bool {
-        if self.peek() != b'#' {
-            return false;
-        }
-        match decimal(self.source, self.at + 1) {
-            Some((0.0, end)) => {
+        if self.peek() == b'#' {
+            if let Some((0.0, end)) = decimal(self.source, self.at + 1) {
                 self.at = end;
-                true
+                return true;
             }
-            _ => false,
         }
+        false
     }
 
     /// `#5`, `##2`, `#[1 + 2]` or `#<name>`, from the `#` on.
@@ -293,13 +281,13 @@ impl Formula<'_> {
     }
 }
 
-/// The integer that a number stands for, within 1e-4.
+/// The integer that a number stands for, if it is as near as `NEAR_INTEGER`.
 pub fn integer(value: f64) -> Option<i64> {
     let nearest = value.round();
     ((value - nearest).abs() <= NEAR_INTEGER && nearest.abs() < 1e15).then_some(nearest as i64)
 }
 
-/// At most 24 characters from `at` to the end of the line, as quoted text that can be printed.
+/// The text from `at` to the end of the line, quoted, in at most 24 characters that can be printed.
 pub fn excerpt(source: &[u8], at: usize) -> String {
     let rest = source.get(at..).unwrap_or_default();
     let line = rest.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();
@@ -430,8 +418,8 @@ mod tests {
     fn what_has_no_value_says_why() {
         for (text, word) in [
             ("#<depth>", "#<depth>"),
-            ("[1 / 0]", "divided by 0"),
-            ("[1 mod 0]", "divided by 0"),
+            ("[1 / 0]", "1 / 0 has no finite value"),
+            ("[1 mod 0]", "1 MOD 0 has"),
             ("sqrt[-1]", "SQRT[-1]"),
             ("ln[0]", "LN[0]"),
             ("acos[1.5]", "ACOS[1.5]"),

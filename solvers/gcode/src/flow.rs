@@ -1,5 +1,6 @@
-//! The lines of a program that say which line is next: O words (sub, call, if, while, do, repeat), Fanuc's program
-//! numbers and its statements (IF, WHILE, GOTO). They are found in one pass over the text, the first time that one is met, and tied to their partners.
+//! The lines of a text that decide which line is next: O words (sub, call, if, while, do, repeat), Fanuc's program numbers
+//! and its statements (IF, WHILE, GOTO). One pass over the text finds them, when the first of them is run, and ties each to
+//! its partner.
 
 use std::cell::OnceCell;
 use std::collections::HashMap;
@@ -9,7 +10,7 @@ use super::fault::{fault, fault_in, Outcome};
 use super::macros::{loop_label, statement};
 use super::number::{decimal, spaces};
 
-/// What a line of program flow does.
+/// The kind of a line of program flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Sub,
@@ -36,7 +37,7 @@ pub enum Kind {
     Number,
 }
 
-/// Keywords, longest first where one begins another.
+/// The keywords; where one begins another, the longer one comes first.
 const KEYWORDS: [(&str, Kind); 15] = [
     ("ENDSUB", Kind::EndSub),
     ("ENDIF", Kind::EndIf),
@@ -55,13 +56,13 @@ const KEYWORDS: [(&str, Kind); 15] = [
     ("CONTINUE", Kind::Continue),
 ];
 
-/// The name of a line's block; None where it is computed when the line is run.
+/// The label of a line; None where it is computed when the line is run.
 pub type Label = Option<Vec<u8>>;
 
 /// A line of program flow.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// Where its first letter is, where its arguments begin, and where the next line does.
+    /// Places in the text: its first letter, its arguments, the next line.
     pub at: usize,
     pub arguments: usize,
     pub next: usize,
@@ -69,10 +70,10 @@ pub struct Step {
     pub line: u32,
     pub kind: Kind,
     pub label: Label,
-    /// The step that this one goes to: `if` to the next branch, `while`, `repeat`, `do` and `sub` to their ends and
-    /// these back, `break` and `continue` to the loop.
+    /// The next branch of an `if`, `elseif` or `else`; the end of a `while`, `repeat`, `do` or `sub`, and its start for
+    /// that end; the loop of a `break` or `continue`.
     pub partner: usize,
-    /// Of `if` and its branches, the `endif`.
+    /// The end of the block; for an `if` and its branches, the `endif`.
     pub end: usize,
 }
 
@@ -85,17 +86,17 @@ pub struct Flow {
     numbered: OnceCell<Numbered>,
 }
 
-/// What GOTO looks for.
+/// The targets of GOTO.
 #[derive(Debug)]
 struct Numbered {
-    /// Lines with block numbers, in order of these: the number, where the line begins, and the number of the line before.
+    /// Lines with block numbers, in their order: the number, the place of the line, and the 1-based line before.
     lines: Vec<(i64, usize, u32)>,
-    /// Where programs begin by their O number.
+    /// Places of the O numbers that begin programs.
     programs: Vec<usize>,
 }
 
 impl Flow {
-    /// The steps of a text; lines after `/` count unless `delete`.
+    /// The steps of a text; `delete` leaves out lines after `/`.
     pub fn new(source: &[u8], delete: bool) -> Outcome<Self> {
         let mut flow = Self { steps: Vec::new(), subs: HashMap::new(), numbered: OnceCell::new() };
         let (mut at, mut line) = (0, 0);
@@ -124,8 +125,8 @@ impl Flow {
         self.subs.get(label).copied()
     }
 
-    /// Where the line with a block number begins, and the number of the line before: the next one behind a place in the
-    /// program of that place, from its O number to the next, else the first one there.
+    /// The place of the line with a block number, and the 1-based line before it. Searched is the program around `from`,
+    /// from its O number to the next one: first behind `from`, then from its start.
     pub fn numbered(&self, source: &[u8], number: i64, from: usize) -> Option<(usize, u32)> {
         let Numbered { lines, programs } = self.numbered.get_or_init(|| Numbered {
             lines: numbered_lines(source),
@@ -149,7 +150,7 @@ impl Flow {
 
     /// Ties steps to their partners; each must have one.
     fn tie(&mut self) -> Outcome<()> {
-        // Steps that are open: of an `if`, its branches so far.
+        // Blocks that are open: the step that begins each, and the branches of an `if` so far.
         let mut open: Vec<Vec<usize>> = Vec::new();
         for i in 0..self.steps.len() {
             let kind = self.steps[i].kind;
@@ -254,7 +255,7 @@ impl Flow {
     }
 }
 
-/// The place of the letter that begins a line of program flow, after blanks, `/` and a block number.
+/// The place of the first letter of a line of program flow, after blanks, `/` and a block number.
 fn first_letter(source: &[u8], at: usize, delete: bool) -> Option<usize> {
     let mut at = spaces(source, at);
     if source.get(at) == Some(&b'/') {
@@ -269,7 +270,7 @@ fn first_letter(source: &[u8], at: usize, delete: bool) -> Option<usize> {
     (matches!(source.get(at), Some(b'O' | b'o' | b':')) || statement(source, at).is_some()).then_some(at)
 }
 
-/// The step whose first letter is at a place; None where it is an O and what follows it is no label.
+/// The step whose first letter is at a place; None for an O without a label.
 fn step_at(source: &[u8], at: usize, next: usize, line: u32) -> Outcome<Option<Step>> {
     let step =
         |kind, label, arguments| Some(Step { at, arguments, next, line, kind, label, partner: 0, end: 0 });
@@ -284,7 +285,7 @@ fn step_at(source: &[u8], at: usize, next: usize, line: u32) -> Outcome<Option<S
     })
 }
 
-/// The label at a place, and where it ends: a number or a `<name>`; one that is computed is skipped.
+/// The label at a place, a number or a `<name>`, and the place after it; a label that is computed is skipped.
 fn label(source: &[u8], at: usize) -> Outcome<Option<(Label, usize)>> {
     let at = spaces(source, at);
     if source.get(at) == Some(&b'<') {
@@ -297,16 +298,15 @@ fn label(source: &[u8], at: usize) -> Outcome<Option<(Label, usize)>> {
     if !matches!(source.get(at), Some(b'#' | b'[')) {
         return Ok(None);
     }
-    // Computed: its keyword is the first one outside of brackets.
-    let (mut depth, mut place) = (0usize, at);
-    while let Some(&byte) = source.get(place).filter(|byte| !matches!(byte, b'\n' | b'\r')) {
-        match byte {
+    // A computed label ends at the first keyword outside of brackets.
+    let mut depth = 0usize;
+    for place in at..end_of_line(source, at) {
+        match source[place] {
             b'[' | b'<' => depth += 1,
             b']' | b'>' => depth = depth.saturating_sub(1),
             _ if depth == 0 && keyword(source, place).is_some() => return Ok(Some((None, place))),
             _ => {}
         }
-        place += 1;
     }
     Ok(None)
 }
@@ -316,7 +316,7 @@ pub fn number_label(value: f64) -> Option<Vec<u8>> {
     integer(value).filter(|number| *number >= 0).map(|number| number.to_string().into_bytes())
 }
 
-/// The keyword at a place, and where it ends.
+/// The keyword at a place, and the place after it.
 pub fn keyword(source: &[u8], at: usize) -> Option<(Kind, usize)> {
     let at = spaces(source, at);
     let rest = source.get(at..)?;
@@ -338,7 +338,7 @@ pub fn after_line(source: &[u8], end: usize) -> usize {
     end + if source.get(end..).is_some_and(|rest| rest.starts_with(b"\r\n")) { 2 } else { 1 }
 }
 
-/// Lines with block numbers: the number, where the line begins, and the number of the line before; in that order.
+/// `Numbered::lines` of a text.
 fn numbered_lines(source: &[u8]) -> Vec<(i64, usize, u32)> {
     let mut lines = Vec::new();
     let (mut at, mut line) = (0, 0);
@@ -368,7 +368,7 @@ pub fn behind_comments(source: &[u8], at: usize) -> usize {
     at
 }
 
-/// Refuses what stands behind the arguments of a step, but for comments and the DO of Fanuc's WHILE.
+/// Refuses text behind the arguments of a step, except for comments and the DO of Fanuc's WHILE.
 pub fn check_rest(source: &[u8], at: usize) -> Outcome<()> {
     let at = loop_label(source, at).map_or(at, |(_, end)| end);
     let at = behind_comments(source, at);

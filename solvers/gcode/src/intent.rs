@@ -1,18 +1,18 @@
-//! What a block asks for: its motion, by its code or by its words, and that every word has a use.
+//! The motion that a block asks for, by its code or by its words, and the check that each of its words has a use.
 
 use super::block::{bit, bits, g_name, Block, Group, MGroup, AXES, AXIS_WORDS};
 use super::fault::{fault, Outcome};
 
-/// Words that need no G code in their block. D names a cutter radius, which only G41 and G42 would use.
+/// Words that need no code in their block. D names a tool, which G41 and G42 use.
 pub const FREE_WORDS: u32 = bits(b"FSTD");
 
 /// Words of G2 and G3 beside the axes.
 pub const ARC_WORDS: u32 = bits(b"IJKRP");
 
-/// Codes that name no motion but take the axis words of their block.
+/// Codes without motion that take the axis words of their block.
 const TAKES_AXES: [u16; 10] = [100, 280, 281, 282, 283, 284, 300, 301, 520, 920];
 
-/// The axis words of the block that are places; with G4 a lone X is a time.
+/// The axis words of a block that are coordinates. Beside G4, an X alone is a time.
 pub fn axis_words(block: &Block) -> u32 {
     let axes = block.words & AXIS_WORDS | if block.is_polar() { bits(b"XY") } else { 0 };
     let timed = axes == bit(b'X') && block.code(Group::Once) == Some(40) && !block.has(b'P');
@@ -23,7 +23,7 @@ pub fn axis_words(block: &Block) -> u32 {
     }
 }
 
-/// The motion that the block asks for, by its code or by its words; `vector` where I, J, K alone turn the tool.
+/// The motion that a block asks for, by its code or by its words. With `vector`, I, J, K alone turn the tool.
 #[inline(always)]
 pub fn motion_of(block: &Block, axes: u32, modal: u16, vector: bool) -> Outcome<Option<u16>> {
     match block.code(Group::Motion) {
@@ -44,7 +44,7 @@ fn motion_beside_others(
     let tool = block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
     let turn = block.code(Group::Turn).filter(|code| *code == 680);
     match (motion, once.or(tool).or(turn)) {
-        // `G0 G28 Z0` is common: G28 has the axis words, G0 stays in force.
+        // `G0 G28 Z0` is common: G28 takes the axis words, G0 stays in force.
         (Some(code @ (0 | 10 | 800)), Some(280..=284 | 300 | 301)) | (Some(code @ 800), Some(_)) => {
             Ok(Some(code))
         }
@@ -61,7 +61,7 @@ fn motion_beside_others(
         }
         (Some(code), None) => Ok(Some(code)),
         (None, Some(_)) if once.is_some() || axes != 0 => Ok(None),
-        // Fanuc's G60 goes to its place from one side.
+        // Fanuc's G60 is a rapid that comes from one side.
         (None, None) if axes != 0 && block.code(Group::Once) == Some(600) => Ok(Some(0)),
         (None, _) if axes != 0 && modal == 800 => {
             let word = AXES.into_iter().find(|&letter| block.has(letter)).map(|letter| block.word(letter));
@@ -75,8 +75,8 @@ fn motion_beside_others(
     }
 }
 
-/// Every word must mean something: one that nothing uses is a misunderstanding. `directed` where I, J, K are the
-/// tool's direction.
+/// Refuses a word that no code of the block uses: it would be a misunderstanding. With `directed`, I, J, K are the tool's
+/// direction.
 pub fn check_use(
     block: &Block,
     axes: u32,
@@ -149,7 +149,7 @@ pub fn check_use(
     fault(format!("word {} has no meaning here: {remedy}", block.word(letter)))
 }
 
-/// Combinations that controls refuse.
+/// Refuses combinations of words that controls refuse.
 fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome<()> {
     if let Some(code) = block.code(Group::System).filter(|code| matches!(code, 541 | 1540)) {
         let alone = matches!(motion, None | Some(0 | 10 | 800)) && !block.calls();
@@ -179,7 +179,7 @@ fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome
     }
 }
 
-/// Canned cycles are 730, 740 and 810 to 890.
+/// True for canned cycles.
 pub fn is_cycle(motion: u16) -> bool {
     matches!(motion, 730 | 740 | 810..=899)
 }

@@ -1,39 +1,17 @@
-//! Fanuc's macros: calls by G65 with arguments by letters, and the statements IF, WHILE, GOTO and END.
+//! Fanuc's macros: calls by G65, whose arguments are letters, and the statements IF, WHILE, GOTO and END.
 
 use super::block::{g_name, Block, Group, MGroup};
 use super::expression::{bracket, expression, integer};
 use super::fault::{fault, Outcome};
 use super::flow::{number_label, Flow, Kind, Label, Step};
 use super::number::{decimal, spaces};
-use super::parameters::LOCALS;
 use super::run::{Exit, Frame, Runner};
 use super::words::{count, Lexer};
 
-/// The number that each letter gives its value to.
-const ARGUMENTS: [(u8, usize); 20] = [
-    (b'A', 1),
-    (b'B', 2),
-    (b'C', 3),
-    (b'D', 7),
-    (b'E', 8),
-    (b'F', 9),
-    (b'H', 11),
-    (b'I', 4),
-    (b'J', 5),
-    (b'K', 6),
-    (b'Q', 17),
-    (b'R', 18),
-    (b'S', 19),
-    (b'T', 20),
-    (b'U', 21),
-    (b'V', 22),
-    (b'W', 23),
-    (b'X', 24),
-    (b'Y', 25),
-    (b'Z', 26),
-];
+/// The letters that set the parameters #1 to #26; a blank where no letter does.
+const ARGUMENTS: [u8; 26] = *b"ABCIJKDEF H     QRSTUVWXYZ";
 
-/// A statement whose first letter stands at a place: what it does, its label, and where its arguments begin.
+/// The statement whose first letter is at a place: its kind, its label, and the place of its arguments.
 pub fn statement(source: &[u8], at: usize) -> Option<(Kind, Label, usize)> {
     let rest = source.get(at..)?;
     let begins = |word: &str| {
@@ -57,7 +35,7 @@ pub fn statement(source: &[u8], at: usize) -> Option<(Kind, Label, usize)> {
     }
 }
 
-/// The label of `DO 1`, and where it ends.
+/// The label of `DO 1` at a place, and the place after it.
 pub fn loop_label(source: &[u8], at: usize) -> Option<(Label, usize)> {
     let at = spaces(source, at);
     let (number, end) = source
@@ -67,7 +45,7 @@ pub fn loop_label(source: &[u8], at: usize) -> Option<(Label, usize)> {
     Some((Some(number_label(number)?), end))
 }
 
-/// The place behind the bracket that opens at a place.
+/// The place after the bracket that opens at a place.
 fn behind_bracket(source: &[u8], at: usize) -> Option<usize> {
     let mut depth = 0usize;
     for (place, byte) in source.iter().enumerate().skip(at) {
@@ -112,7 +90,7 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// GOTO with its number, from a place on.
+    /// GOTO, whose number is at a place.
     pub(super) fn go_to(
         &mut self,
         lexer: &mut Lexer,
@@ -138,7 +116,7 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// M97, M98, M99 and G65 of the block.
+    /// M97, M98, M99 or G65 of the block.
     pub(super) fn fanuc(&self) -> Outcome<Exit> {
         let block = &self.block;
         let (name, arguments) = match block.code(Group::Macro) {
@@ -161,16 +139,11 @@ impl Runner<'_> {
     }
 }
 
-/// The arguments of G65 by their numbers; NaN where there is none.
+/// The arguments of G65 as values of #1 to #26; NaN for a missing one.
 fn arguments_of(block: &Block) -> Outcome<Vec<f64>> {
     if !block.is_alone(Group::Macro) {
         return fault("G65 stands beside other codes: put it in a block of its own");
     }
-    let mut numbers = vec![f64::NAN; LOCALS];
-    for (letter, number) in ARGUMENTS {
-        if let Some(value) = block.get(letter) {
-            numbers[number - 1] = value;
-        }
-    }
-    Ok(numbers)
+    let value = |letter: u8| if letter == b' ' { None } else { block.get(letter) };
+    Ok(ARGUMENTS.iter().map(|&letter| value(letter).unwrap_or(f64::NAN)).collect())
 }

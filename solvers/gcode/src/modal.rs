@@ -1,31 +1,30 @@
-//! What stays in force from block to block: modes, offsets, feed.
+//! The state that stays in force from block to block: modes, offsets, feed.
 
 use super::moves::{Control, Mode, Point};
 use super::tip::CoordinateMode;
+use super::tolerance::MM_PER_INCH;
 
-pub const MM_PER_INCH: f64 = 25.4;
-
-/// What an F word means.
+/// The unit of an F word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeedMode {
-    /// G94: units a minute.
+    /// G94: units of length per minute.
     PerMinute,
-    /// G93: moves a minute.
+    /// G93: moves per minute.
     Inverse,
-    /// G95: units a turn of the spindle.
+    /// G95: units of length per turn of the spindle.
     PerTurn,
 }
 
-/// The feed in force: what the last F said, for linear and for rotary moves.
+/// The feed in force, by the last F, for linear and for rotary moves.
 #[derive(Clone, Copy, Debug)]
 pub struct Feed {
-    /// mm/s, or mm a turn with G95.
+    /// mm/s, or mm per turn with G95.
     pub linear: f64,
-    /// Degrees/s, or degrees a turn with G95.
+    /// Degrees/s, or degrees per turn with G95.
     pub angular: f64,
 }
 
-/// The words that a canned cycle keeps while it is repeated, as they were written.
+/// The words that stay in force while a canned cycle is repeated, in the numbers of the program.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sticky {
     pub retract: f64,
@@ -36,20 +35,20 @@ pub struct Sticky {
     pub initial: Option<f64>,
 }
 
-/// Where the numbers of the program are, in machine coordinates.
+/// The transformation from coordinates of the program to those of the machine.
 #[derive(Clone, Debug)]
 pub struct Offsets {
-    /// Which of G54 to G59.3 and of the further ones is in force, from 0, its offset and its turn about Z in degrees.
+    /// The work offset in force, from 0 for G54, with its vector and its rotation about Z in degrees.
     pub system: usize,
     pub work: Point,
     pub rotation: f64,
-    /// G92 and G52.
+    /// The shift by G92 and G52.
     pub shift: Point,
-    /// The shift and the turn of before, while G68 turns about a place of its own.
+    /// The shift and the rotation before G68, while that is on.
     pub unturned: Option<(Point, f64)>,
-    /// Tool length, G43.
+    /// The tool length, G43.
     pub tool: Point,
-    /// Their sum.
+    /// The sum of the three vectors.
     sum: Point,
 }
 
@@ -62,51 +61,51 @@ impl Offsets {
         offsets
     }
 
-    /// Machine coordinates of the program's zero, where nothing is turned.
+    /// Machine coordinates of the program's zero, where the rotation is 0.
     #[inline(always)]
     pub fn sum(&self) -> &Point {
         &self.sum
     }
 
-    /// To be called after a change.
+    /// Must be called after a change.
     pub fn update(&mut self) {
         self.sum = std::array::from_fn(|k| self.work[k] + self.shift[k] + self.tool[k]);
     }
 
-    /// A place of the program in machine coordinates.
-    pub fn to_machine(&self, place: &Point) -> Point {
+    /// A point of the program in machine coordinates.
+    pub fn to_machine(&self, point: &Point) -> Point {
         if self.rotation == 0.0 {
-            return std::array::from_fn(|k| place[k] + self.sum[k]);
+            return std::array::from_fn(|k| point[k] + self.sum[k]);
         }
-        let mut shifted: Point = std::array::from_fn(|k| place[k] + self.shift[k]);
+        let mut shifted: Point = std::array::from_fn(|k| point[k] + self.shift[k]);
         turn(&mut shifted, self.rotation);
         std::array::from_fn(|k| shifted[k] + self.work[k] + self.tool[k])
     }
 
-    /// A place in machine coordinates as the program writes it, in mm and degrees.
-    pub fn to_program(&self, place: &Point) -> Point {
+    /// A point in machine coordinates in those of the program, in mm and degrees.
+    pub fn to_program(&self, point: &Point) -> Point {
         if self.rotation == 0.0 {
-            return std::array::from_fn(|k| place[k] - self.sum[k]);
+            return std::array::from_fn(|k| point[k] - self.sum[k]);
         }
-        let mut shifted: Point = std::array::from_fn(|k| place[k] - self.work[k] - self.tool[k]);
+        let mut shifted: Point = std::array::from_fn(|k| point[k] - self.work[k] - self.tool[k]);
         turn(&mut shifted, -self.rotation);
         std::array::from_fn(|k| shifted[k] - self.shift[k])
     }
 }
 
-/// Turns X and Y about 0 by an angle in degrees.
-pub fn turn(place: &mut Point, angle: f64) {
+/// Rotates a point about Z by an angle in degrees.
+pub fn turn(point: &mut Point, angle: f64) {
     let (sin, cos) = angle.to_radians().sin_cos();
-    (place[0], place[1]) = (place[0] * cos - place[1] * sin, place[0] * sin + place[1] * cos);
+    (point[0], point[1]) = (point[0] * cos - point[1] * sin, point[0] * sin + point[1] * cos);
 }
 
-/// Everything modal.
+/// All modes, with the offsets and the feed.
 #[derive(Clone, Debug)]
 pub struct State {
     pub offsets: Offsets,
-    /// The motion code in tenths; 800 (G80) where there is none.
+    /// The motion code in tenths; 800 (G80) for no motion.
     pub motion: u16,
-    /// The axis that arcs turn about and cycles go along: 2 for G17, 1 for G18, 0 for G19.
+    /// The axis that arcs turn about and cycles move along: 2 for G17, 1 for G18, 0 for G19.
     pub normal: usize,
     pub absolute: bool,
     pub absolute_centres: bool,
@@ -115,32 +114,33 @@ pub struct State {
     pub diameters: bool,
     /// G16: the words of the plane are a radius and an angle.
     pub polar: bool,
-    /// G20 or G21 was given.
+    /// True after G20 or G21.
     pub units_given: bool,
     pub feed_mode: FeedMode,
     pub feed: Option<Feed>,
     pub control: Control,
-    /// G98: cycles go back to where they came from, not only to R.
+    /// G98: cycles end at the height where the series began, if that is above R.
     pub retract_to_initial: bool,
-    /// G98 or G99 was given.
+    /// True after G98 or G99.
     pub retract_given: bool,
     pub spindle_on: bool,
     /// M4.
     pub spindle_back: bool,
     pub mist: bool,
     pub flood: bool,
-    /// Turns a minute; None where they are not known (G96, or no S yet).
+    /// Turns per minute; None where they are not known (with G96, and before the first S).
     pub spindle_speed: Option<f64>,
     pub constant_surface_speed: bool,
     pub sticky: Sticky,
-    /// What axis words are; the tool's length in mm then, NaN for the machine file's; the joints where this began.
     pub coordinate_mode: CoordinateMode,
+    /// With the mode `Tip` or `Direction`, the tool's length in mm (NaN for that of the machine file) and the joints
+    /// where the mode began.
     pub tool_length: f64,
     pub entry: Point,
 }
 
 impl State {
-    /// As LinuxCNC starts: no motion code, G17 G21 G90 G91.1 G94 G54 G64 G99.
+    /// The state in which LinuxCNC starts: no motion code, G17 G21 G90 G91.1 G94 G54 G64 G99.
     pub fn new(work: Point) -> Self {
         Self {
             offsets: Offsets::new(work),

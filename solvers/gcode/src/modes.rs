@@ -1,10 +1,11 @@
-//! Codes that set modes, and M70 to M73, which save and restore them.
+//! Sets modes by their codes, and saves and restores them by M70 to M73.
 
 use super::block::{Block, Group, AXIS_WORDS};
-use super::execute::{Interpreter, FARTHEST};
+use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
 use super::modal::State;
 use super::moves::{Control, Mode};
+use super::tolerance::FARTHEST;
 
 impl Interpreter<'_> {
     /// Plane, units, path control, distance modes and retract mode.
@@ -62,7 +63,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// Ends a call: its parameters are gone, and modes that M73 saved come back.
+    /// Ends a call: removes its parameters and restores the modes that M73 saved in it.
     pub fn leave_call(&mut self) {
         let depth = self.parameters.depth();
         if self.saved.last().is_some_and(|(at, restores, _)| *at == depth && *restores) {
@@ -85,7 +86,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Brings back the modes that were saved last, but neither offsets nor what moves depend on.
+    /// Restores the modes that were saved last in this call, except offsets, motion code and coordinate mode.
     fn restore_modes(&mut self) {
         let depth = self.parameters.depth();
         let Some((_, _, saved)) = self.saved.last().filter(|(at, ..)| *at == depth) else { return };

@@ -1,25 +1,20 @@
-//! Straight moves and arcs of one block, with their feed.
+//! The straight move or the arc of one block, with its feed.
 
 use super::arc::{arc, arc_length, Form};
 use super::block::{bits, Block, AXES, AXIS_WORDS};
-use super::execute::{Interpreter, RATES};
+use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
 use super::modal::{Feed, FeedMode};
 use super::moves::{only_turns, straight_length, Arc, Kind, Point};
-use super::tip::{turn, CoordinateMode};
+use super::tip::{angle_between, CoordinateMode};
+use super::tolerance::{FARTHEST_CENTRE, MOST_TURNS, RATES};
 use super::words::count;
 
 /// Words of the centre along X, Y, Z.
 const CENTRE: [u8; 3] = *b"IJK";
 
-/// More turns of one arc are a mistake.
-const MOST_TURNS: u32 = 10_000;
-
-/// Centres farther away than this [mm] leave an arc no digits.
-const FARTHEST_CENTRE: f64 = 1e9;
-
 impl Interpreter<'_> {
-    /// G0 and G1 to the block's axis words.
+    /// G0 and G1 to the axis words of a block.
     #[inline(always)]
     pub(super) fn straight(&mut self, block: &Block, rapid: bool, machine: bool) -> Outcome<()> {
         if self.state.coordinate_mode == CoordinateMode::Vector {
@@ -29,7 +24,7 @@ impl Interpreter<'_> {
         if rapid {
             return self.rapid(&target);
         }
-        // A G1 alone only selects the motion; its feed may follow.
+        // A G1 without axis words selects the motion only, and its feed may follow.
         if block.words & AXIS_WORDS == 0 && !block.is_polar() {
             return Ok(());
         }
@@ -55,7 +50,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// G0 and G1 to a tip and a tool direction (G43.5).
+    /// G0 and G1 to a position of the tip and a tool direction (G43.5).
     #[cold]
     fn pointed(&mut self, block: &Block, rapid: bool) -> Outcome<()> {
         let target = self.target(block, false)?;
@@ -68,7 +63,9 @@ impl Interpreter<'_> {
             let length = straight_length(&self.moves.position, &target);
             feed = match self.state.feed_mode {
                 FeedMode::Inverse if length > 0.0 => self.inverse_feed(block, length)?,
-                FeedMode::Inverse => self.inverse_feed(block, turn(&self.moves.direction, &direction))?,
+                FeedMode::Inverse => {
+                    self.inverse_feed(block, angle_between(&self.moves.direction, &direction))?
+                }
                 _ if length > 0.0 => self.feed()?.linear,
                 _ => self.feed()?.angular,
             };
@@ -76,7 +73,7 @@ impl Interpreter<'_> {
         self.moves.pointed(kind, &target, direction, feed, &self.state.control, self.line)
     }
 
-    /// The feed in force, a second.
+    /// The feed in force, per second.
     #[inline(always)]
     pub(super) fn feed(&self) -> Outcome<Feed> {
         let Some(feed) = self.state.feed else {
@@ -104,7 +101,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// G93: the block's F is one over its minutes.
+    /// The feed along a move of a length under G93, where F is one over the minutes of the move.
     fn inverse_feed(&self, block: &Block, length: f64) -> Outcome<f64> {
         match block.get(b'F') {
             Some(rate) if rate > 0.0 => Ok(length * rate / 60.0),
@@ -144,14 +141,13 @@ impl Interpreter<'_> {
         if self.compensation.is_some() {
             return self.arc_beside(&target, centre, angle, feed);
         }
-        let mut place = [position[0], position[1], position[2]];
-        place[u] = centre[0];
-        place[v] = centre[1];
-        let arc = Arc { centre: place, normal, angle };
+        let mut centre_point = [position[0], position[1], position[2]];
+        (centre_point[u], centre_point[v]) = (centre[0], centre[1]);
+        let arc = Arc { centre: centre_point, normal, angle };
         self.moves.arc(arc, &target, feed, &self.state.control, self.line)
     }
 
-    /// R, or the two centre words of the plane.
+    /// The form of an arc: by R, or by the two centre words of the plane.
     fn arc_form(&self, block: &Block, position: &Point, u: usize, v: usize) -> Outcome<Form> {
         let unit = self.state.unit();
         let plane = 19 - self.state.normal;
@@ -189,20 +185,18 @@ impl Interpreter<'_> {
             ));
         }
         let offsets = &self.state.offsets;
-        let mut place = if self.state.absolute_centres { [0.0; 9] } else { offsets.to_program(position) };
-        for (axis, word) in [u, v].into_iter().zip(words) {
-            place[axis] += word.unwrap_or(0.0);
-        }
-        // Where nothing is turned, the way there and back would round.
-        let plain = |axis: usize, word: Option<f64>| {
-            word.unwrap_or(0.0)
-                + if self.state.absolute_centres { offsets.sum()[axis] } else { position[axis] }
-        };
+        let words = words.map(|word| word.unwrap_or(0.0));
         let centre = if offsets.rotation == 0.0 {
-            [plain(u, words[0]), plain(v, words[1])]
+            // Without the coordinates of the program in between, which would round.
+            let from = if self.state.absolute_centres { offsets.sum() } else { position };
+            [words[0] + from[u], words[1] + from[v]]
         } else {
-            let place = offsets.to_machine(&place);
-            [place[u], place[v]]
+            let mut centre =
+                if self.state.absolute_centres { [0.0; 9] } else { offsets.to_program(position) };
+            centre[u] += words[0];
+            centre[v] += words[1];
+            let centre = offsets.to_machine(&centre);
+            [centre[u], centre[v]]
         };
         if !centre.iter().all(|value| value.abs() <= FARTHEST_CENTRE) {
             return fault(format!(

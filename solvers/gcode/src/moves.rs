@@ -1,6 +1,6 @@
-//! The moves of a program as columns, built directly while it is read.
+//! The moves of a program, collected as columns while it is read.
 //!
-//! What changes seldom (path control, stops, dwells) is kept as changes, for `columns` to spread over the rows.
+//! Path control, stops and dwells change seldom: their changes are kept, and `columns` makes columns of them.
 
 mod columns;
 mod events;
@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use super::block::rotary;
 use super::fault::{fault, Outcome};
 use super::tip::CoordinateMode;
+use super::tolerance::{NO_MOTION, WHOLE_TURNS};
 pub use columns::Columns;
 pub use events::{Events, COMMENT, MESSAGE};
 use feedplan_geometry::spline::CompositeCurve;
@@ -17,7 +18,7 @@ use feedplan_geometry::spline::CompositeCurve;
 /// A point of the machine: X Y Z A B C U V W in mm and degrees.
 pub type Point = [f64; 9];
 
-/// What a move is.
+/// The kind of a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -27,7 +28,7 @@ pub enum Kind {
     Spline = 3,
 }
 
-/// How closely the path is followed.
+/// The path control: how closely the path is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mode {
@@ -36,7 +37,7 @@ pub enum Mode {
     Tolerance = 2,
 }
 
-/// Path control of a move: G61.1, G61 or G64 with its P and Q in mm, NaN where they are not given.
+/// The path control of a move: G61.1, G61 or G64, with its P and Q in mm, NaN where they are missing.
 #[derive(Clone, Copy, Debug)]
 pub struct Control {
     pub mode: Mode,
@@ -49,7 +50,7 @@ impl Control {
         Self { mode, blend: f64::NAN, fit: f64::NAN }
     }
 
-    /// Equal, NaN to NaN.
+    /// True where both are equal; NaN equals NaN.
     fn same(&self, other: &Self) -> bool {
         self.mode == other.mode
             && self.blend.to_bits() == other.blend.to_bits()
@@ -57,8 +58,8 @@ impl Control {
     }
 }
 
-/// A circular or helical move: centre in X, Y, Z; the axis it turns about; signed sweep in radians,
-/// counter-clockwise seen from the tip of that axis.
+/// A circular or helical move: its centre in X, Y, Z; the axis that it turns about; its signed sweep in radians,
+/// counter-clockwise seen from the positive end of that axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arc {
     pub centre: [f64; 3],
@@ -66,14 +67,14 @@ pub struct Arc {
     pub angle: f64,
 }
 
-/// Why the program asks for a full stop after a move; of several causes the greatest counts.
+/// The cause of a full stop after a move; of several causes the greatest is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Stop {
     None = 0,
-    /// Of the coordinate mode or the tool length.
+    /// A change of the coordinate mode or of the tool length in it.
     Change = 1,
-    /// Of spindle, coolant and the like.
+    /// A switch of spindle, coolant and the like.
     Switch = 2,
     Dwell = 3,
     /// M0, M1, M60.
@@ -86,33 +87,30 @@ pub enum Stop {
 /// A tool direction I, J, K: a unit vector from the tip to the spindle.
 pub type Direction = [f64; 3];
 
-/// The tool is upright until the program says otherwise.
+/// The tool direction at the start of a program.
 const UPRIGHT: Direction = [0.0, 0.0, 1.0];
 
-/// Where the coordinate mode changes: the first move in the new one, the mode, the tool's length in mm (NaN for the
-/// machine file's), and where that move starts in the new words.
+/// A change of the coordinate mode: its first row, the mode, the tool's length in mm (NaN for that of the machine file),
+/// and the start of the row in coordinates of the mode.
 #[derive(Clone, Copy, Debug)]
 struct Change {
     row: usize,
-    coordinate_mode: CoordinateMode,
+    mode: CoordinateMode,
     tool_length: f64,
     start: Point,
     direction: Direction,
 }
 
-/// Steps up to this long, in mm or degrees, are rounding of offsets and no motion.
-const NO_MOTION: f64 = 1e-9;
-
 /// The moves so far.
 pub struct Moves {
-    /// Places in a `Point` of the columns of `target`.
+    /// The axes that have columns in `target`, as indices into a `Point`.
     axes: Vec<usize>,
     limit: usize,
-    /// Where the first move begins.
+    /// The start of the first move.
     start: Point,
-    /// Where the last move ends.
+    /// The end of the last move.
     pub position: Point,
-    /// The tool's direction there, where I, J, K are programmed.
+    /// The tool direction there, where I, J, K are programmed.
     pub direction: Direction,
     kind: Vec<u8>,
     target: Vec<f64>,
@@ -124,16 +122,16 @@ pub struct Moves {
     start_dwell: f64,
     arcs: Vec<(usize, Arc)>,
     splines: CompositeCurve<9>,
-    /// Rows of the splines, and the first piece of each.
+    /// The row and the first piece of each spline.
     spline_rows: Vec<(usize, usize)>,
     changes: Vec<Change>,
-    /// Rows from which on the tool has another direction.
+    /// Changes of the tool direction: the first row of each.
     directions: Vec<(usize, Direction)>,
     events: Events,
 }
 
 impl Moves {
-    /// Room for `expected` rows, and an error past `limit`.
+    /// Memory for `expected` rows; more rows than `limit` are an error.
     pub fn new(expected: usize, limit: usize, start: Point) -> Self {
         let expected = expected.min(limit);
         Self {
@@ -168,19 +166,19 @@ impl Moves {
         self.kind.is_empty()
     }
 
-    /// Gives an axis a column; so far it stood at the start.
+    /// Gives an axis a column, in which it has rested at the start.
     #[cold]
     pub fn add_axis(&mut self, axis: usize) {
-        let Err(place) = self.axes.binary_search(&axis) else { return };
+        let Err(column) = self.axes.binary_search(&axis) else { return };
         let width = self.axes.len();
         let mut wider = Vec::with_capacity((self.target.capacity() / width) * (width + 1));
         for row in self.target.chunks_exact(width) {
-            wider.extend_from_slice(&row[..place]);
+            wider.extend_from_slice(&row[..column]);
             wider.push(self.start[axis]);
-            wider.extend_from_slice(&row[place..]);
+            wider.extend_from_slice(&row[column..]);
         }
         self.target = wider;
-        self.axes.insert(place, axis);
+        self.axes.insert(column, axis);
     }
 
     /// The axes that have a column.
@@ -188,7 +186,7 @@ impl Moves {
         &self.axes
     }
 
-    /// Adds a straight move; none where nothing moves.
+    /// Adds a straight move, unless it moves nothing.
     #[inline(always)]
     pub fn straight(
         &mut self,
@@ -214,7 +212,7 @@ impl Moves {
         self.row(Kind::Arc, target, feed, control, line)
     }
 
-    /// Adds a spline by its pieces; the first one starts where the tool is.
+    /// Adds a spline by its pieces, from the end of the last move, unless it moves nothing.
     pub fn spline(
         &mut self,
         curve: &CompositeCurve<9>,
@@ -241,7 +239,7 @@ impl Moves {
         self.row(Kind::Spline, target, feed, control, line)
     }
 
-    /// Adds a straight move that ends with the tool in a direction; none where neither moves.
+    /// Adds a straight move that ends in a tool direction, unless it moves nothing.
     pub fn pointed(
         &mut self,
         kind: Kind,
@@ -261,20 +259,14 @@ impl Moves {
         self.row(kind, target, feed, control, line)
     }
 
-    /// From here on another coordinate mode holds: the same place is `start` and `direction` in the new words.
-    pub fn change(
-        &mut self,
-        coordinate_mode: CoordinateMode,
-        tool_length: f64,
-        start: Point,
-        direction: Direction,
-    ) {
+    /// Begins a coordinate mode, in whose coordinates the tool is at `start` in `direction`.
+    pub fn change(&mut self, mode: CoordinateMode, tool_length: f64, start: Point, direction: Direction) {
         self.stop(Stop::Change);
         let row = self.kind.len();
         if self.changes.last().is_some_and(|last| last.row == row) {
             self.changes.pop();
         }
-        self.changes.push(Change { row, coordinate_mode, tool_length, start, direction });
+        self.changes.push(Change { row, mode, tool_length, start, direction });
         self.position = start;
         if direction != self.direction {
             self.direction = direction;
@@ -282,24 +274,24 @@ impl Moves {
         }
     }
 
-    /// The places and directions from the start of the last change to here.
+    /// The positions and directions from the start of the last change to the end of the last move.
     pub fn since_change(&self) -> Vec<(Point, Direction)> {
         let Some(change) = self.changes.last() else { return vec![(self.position, self.direction)] };
         let width = self.axes.len();
         let mut direction = change.direction;
         let mut later = self.directions.iter().filter(|(row, _)| *row >= change.row).peekable();
-        let mut places = vec![(change.start, direction)];
+        let mut positions = vec![(change.start, direction)];
         for (row, target) in self.target.chunks_exact(width).enumerate().skip(change.row) {
             while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
                 direction = next;
             }
-            let mut place = change.start;
+            let mut position = change.start;
             for (&axis, &value) in self.axes.iter().zip(target) {
-                place[axis] = value;
+                position[axis] = value;
             }
-            places.push((place, direction));
+            positions.push((position, direction));
         }
-        places
+        positions
     }
 
     #[inline(always)]
@@ -325,8 +317,8 @@ impl Moves {
         Ok(())
     }
 
-    /// Moves the end along two of X, Y and Z of the row `first` and of those after it, which stand there; where it is
-    /// an arc, its sweep by `turned`. False where nothing of the arc would be left.
+    /// Moves the end of the row `first` within a plane, and the rows after it, which rest there. If the row is an arc, its
+    /// sweep grows by `turned`; false where nothing of the arc would be left.
     pub fn bend(&mut self, first: usize, plane: (usize, usize), end: &Point, turned: f64) -> bool {
         let width = self.axes.len();
         for row in self.target[first * width..].chunks_exact_mut(width) {
@@ -343,10 +335,10 @@ impl Moves {
         }
     }
 
-    /// Takes a turn from the arc of a row that has more than so many; true where it had.
+    /// Takes one turn from the arc of a row that has more than `turns`; true where it did.
     pub fn drop_turn(&mut self, row: usize, turns: f64) -> bool {
         let found = self.arcs.iter_mut().rev().take(2).find(|(arc, _)| *arc == row);
-        match found.filter(|(_, arc)| arc.angle.abs() > turns * TAU * (1.0 + 1e-12)) {
+        match found.filter(|(_, arc)| arc.angle.abs() / TAU > turns + WHOLE_TURNS) {
             Some((_, arc)) => {
                 arc.angle -= arc.angle.signum() * TAU;
                 true
@@ -355,9 +347,9 @@ impl Moves {
         }
     }
 
-    /// A full stop where the program is now; of several causes the last one of `Stop` is kept.
+    /// A full stop after the last move; of several causes the last one of `Stop` is kept.
     pub fn stop(&mut self, cause: Stop) {
-        // Before the first move everything stands still already.
+        // Before the first move the machine is at rest.
         let Some(last) = self.kind.len().checked_sub(1) else { return };
         match self.stops.last_mut() {
             Some((row, known)) if *row == last => *known = (*known).max(cause),
@@ -365,7 +357,7 @@ impl Moves {
         }
     }
 
-    /// A full stop and a pause in seconds.
+    /// A full stop and a pause of some seconds.
     pub fn dwell(&mut self, seconds: f64) {
         self.stop(Stop::Dwell);
         match self.kind.len().checked_sub(1) {
@@ -375,19 +367,19 @@ impl Moves {
     }
 }
 
-/// True where two places differ by more than rounding.
+/// True where two positions differ by more than rounding.
 fn apart(a: &Point, b: &Point) -> bool {
     a.iter().zip(b).any(|(a, b)| (a - b).abs() > NO_MOTION)
 }
 
-/// The length that a feed counts along a straight move, as LinuxCNC: in X, Y, Z where one of these moves, else in
-/// U, V, W, else the degrees of A, B, C.
+/// The length of a straight move that its feed refers to, as in LinuxCNC: along X, Y, Z if one of these moves, else along
+/// U, V, W, else in the degrees of A, B, C.
 pub fn straight_length(from: &Point, to: &Point) -> f64 {
     let length = |axes: std::ops::Range<usize>| axes.map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
     [0..3, 6..9, 3..6].into_iter().map(length).find(|&length| length > NO_MOTION).unwrap_or(0.0)
 }
 
-/// True where only rotary axes move, so that the feed is in degrees.
+/// True where only rotary axes move: the feed is in degrees.
 pub fn only_turns(from: &Point, to: &Point) -> bool {
     (0..9).all(|k| rotary(k) || (to[k] - from[k]).abs() <= NO_MOTION)
 }

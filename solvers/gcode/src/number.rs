@@ -1,19 +1,19 @@
-//! A decimal number as it stands in a part program, to the nearest f64.
+//! Reads a decimal number of a part program, to the nearest f64.
 //!
-//! The grammar is RS-274's: a sign, digits with at most one point, no exponent. Spaces may stand before the
-//! number and after its sign (posts pad columns so), but not inside: `X1 2` is two things, not twelve.
+//! The grammar is that of RS-274: a sign, digits with at most one point, no exponent. Blanks may stand before the number
+//! and after its sign, since posts pad columns with them, but not inside: `X1 2` is not X12.
 
-/// Powers of ten that an f64 holds exactly, as far as the fast way needs them.
+/// Powers of ten, which an f64 holds exactly.
 const POWERS: [f64; 16] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// So many digits always make an integer below 2^53.
+/// The greatest number of digits that always make an integer below 2^53.
 const EXACT_DIGITS: usize = 15;
 
-/// The number that starts at or after `at` and the place after it; None where no number starts.
+/// The number at `at`, after blanks, and the place after it; None where no number begins.
 ///
-/// Correctly rounded: up to 15 digits the mantissa and the power of ten are exact and one division rounds once;
-/// longer numbers go through the standard library.
+/// It is correctly rounded: with up to 15 digits the mantissa and the power of ten are exact, and one division rounds
+/// once. The standard library reads longer numbers.
 #[inline(always)]
 pub fn decimal(source: &[u8], at: usize) -> Option<(f64, usize)> {
     let mut at = spaces(source, at);
@@ -47,7 +47,7 @@ pub fn spaces(source: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// Reads digits into the mantissa and counts them; it may wrap, when it is not used.
+/// Reads digits into the mantissa and counts them; a mantissa that overflows is not used.
 #[inline(always)]
 fn digits(source: &[u8], at: &mut usize, mantissa: &mut u64) -> usize {
     let first = *at;
@@ -58,7 +58,7 @@ fn digits(source: &[u8], at: &mut usize, mantissa: &mut u64) -> usize {
     *at - first
 }
 
-/// Digits and at most one point; the standard library reads these without error.
+/// The value of digits with at most one point, which the standard library reads without error.
 #[cold]
 fn parse(text: &[u8]) -> f64 {
     std::str::from_utf8(text).ok().and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)

@@ -1,25 +1,26 @@
-//! The parameters of a program: #1 to #30 of each call, #31 to #5602 and #7001 to #8980 of all, and names.
+//! The parameters of a program: #1 to #30 of each call, #31 to #5602 and #7001 to #8980 of all calls, and names.
 //!
-//! Numbers from 5001 on are the machine's: what is stored here holds its offsets and positions, as in LinuxCNC; what
-//! the machine only tells (where it is, its modes) is in `readings`.
+//! Numbers from 5001 on belong to the machine, as in LinuxCNC. Those that hold offsets and home positions are stored here;
+//! those that report the machine's position and modes are in `readings`.
 
 use std::cell::Cell;
 use std::collections::HashMap;
 
 use super::fault::{fault, Outcome};
+use super::tolerance::MAX_CALLS;
 
-/// Numbers of one call alone.
+/// The number of parameters that each call has of its own.
 pub const LOCALS: usize = 30;
 
-/// Parameters have numbers below this; LinuxCNC's end at `LAST`, those of further work offsets begin at `FIRST_FURTHER`.
+/// The end of all numbers; LinuxCNC's last one; the first one of the further work offsets.
 const NUMBERS: usize = FIRST_FURTHER + SYSTEM_STEP * MOST_FURTHER as usize;
 const LAST: usize = 5602;
 const FIRST_FURTHER: usize = 7001;
 
-/// Work offsets G54.1 P1 to P99.
+/// The number of further work offsets, G54.1 P1 to P99.
 pub const MOST_FURTHER: u32 = 99;
 
-/// Where offsets and positions are stored: each has nine numbers, X to W, from its first on.
+/// The first numbers of stored offsets and positions; each has nine, X to W.
 pub const HOME: usize = 5161;
 pub const SECOND_HOME: usize = 5181;
 pub const SHIFT_IN_FORCE: usize = 5210;
@@ -31,7 +32,7 @@ const FIRST_SYSTEM: usize = 5221;
 const SYSTEM_STEP: usize = 20;
 pub const ROTATION: usize = 9;
 
-/// The first number of a work offset: from 0 G54 to G59.3, from 9 G54.1 P1 on, where Fanuc has it.
+/// The first number of a work offset: 0 to 8 for G54 to G59.3, from 9 on for G54.1 P1 on, with Fanuc's numbers.
 pub fn first_of_system(system: usize) -> usize {
     match system.checked_sub(9) {
         None => FIRST_SYSTEM + SYSTEM_STEP * system,
@@ -39,18 +40,15 @@ pub fn first_of_system(system: usize) -> usize {
     }
 }
 
-/// Whether there is a parameter of that number.
+/// True where a parameter has that number.
 pub fn is_number(number: i64) -> bool {
     (1..=LAST as i64).contains(&number) || (FIRST_FURTHER as i64..NUMBERS as i64).contains(&number)
 }
 
-/// What the machine tells and a program cannot set.
+/// The numbers that the machine reports and a program cannot set.
 pub const READINGS: std::ops::RangeInclusive<usize> = 5400..=5439;
 
-/// Calls may be nested so deep.
-pub const MAX_CALLS: usize = 100;
-
-/// What `#` names; text is in lower case, without blanks.
+/// The name of a parameter: a number, or a text in lower case without blanks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Name {
     Number(usize),
@@ -66,18 +64,18 @@ impl std::fmt::Display for Name {
     }
 }
 
-/// What a call has of its own.
+/// The parameters that a call has of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// Numbers and names, as in LinuxCNC; arguments that are not given are 0.
+    /// Numbers and names, as in LinuxCNC; missing arguments are 0.
     Own,
-    /// Fanuc's subprograms have the numbers of their caller.
+    /// Names alone, as in Fanuc's subprograms, which have the numbers of their caller.
     Shared,
-    /// Fanuc's macros have numbers; arguments that are not given have no value.
+    /// Numbers and names, as in Fanuc's macros; missing arguments have no value.
     Macro,
 }
 
-/// What the caller has while a call is open.
+/// The parameters of the caller while a call is open.
 #[derive(Clone)]
 struct Level {
     numbers: [f64; LOCALS],
@@ -92,9 +90,9 @@ pub struct Parameters {
     global: HashMap<Vec<u8>, f64>,
     names: HashMap<Vec<u8>, f64>,
     callers: Vec<Level>,
-    /// The lines that are run are those of a macro.
+    /// True while lines of a macro are run.
     in_macro: bool,
-    /// The first number that was read before it was set; 0 for none.
+    /// The first number that was read before it was set; 0 where there is none.
     unset: Cell<usize>,
 }
 
@@ -112,7 +110,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// The value of a number below `NUMBERS`; 0 where none is set, as in LinuxCNC.
+    /// The value of a number below `NUMBERS`; 0 where it is not set, as in LinuxCNC.
     pub fn number(&self, number: usize) -> f64 {
         let value = self.numbers[number];
         if !value.is_nan() {
@@ -124,7 +122,7 @@ impl Parameters {
         0.0
     }
 
-    /// Whether a number has a value.
+    /// True where a number has a value.
     pub fn is_set(&self, number: usize) -> bool {
         !self.numbers[number].is_nan()
     }
@@ -137,7 +135,7 @@ impl Parameters {
         self.numbers[number] = value;
     }
 
-    /// Nine numbers from one on: an offset or a position, as it stands there.
+    /// The nine values of an offset or a position from its first number on.
     pub fn row(&self, first: usize) -> [f64; 9] {
         std::array::from_fn(|k| self.number(first + k))
     }
@@ -146,7 +144,7 @@ impl Parameters {
         self.numbers[first..first + 9].copy_from_slice(row);
     }
 
-    /// The value of a name: `_` begins those of all calls.
+    /// The value of a name; names with `_` in front belong to all calls.
     pub fn named(&self, name: &[u8]) -> Option<f64> {
         let names = if name.starts_with(b"_") { &self.global } else { &self.names };
         names.get(name).copied()
@@ -154,12 +152,7 @@ impl Parameters {
 
     pub fn set_named(&mut self, name: &[u8], value: f64) {
         let names = if name.starts_with(b"_") { &mut self.global } else { &mut self.names };
-        match names.get_mut(name) {
-            Some(place) => *place = value,
-            None => {
-                names.insert(name.to_vec(), value);
-            }
-        }
+        names.insert(name.to_vec(), value);
     }
 
     pub fn set(&mut self, name: &Name, value: f64) {
@@ -169,7 +162,7 @@ impl Parameters {
         }
     }
 
-    /// How many calls are open.
+    /// The number of open calls.
     pub fn depth(&self) -> usize {
         self.callers.len()
     }
@@ -191,11 +184,11 @@ impl Parameters {
         Ok(())
     }
 
-    /// The arguments of a call as its numbers.
+    /// Sets #1 to #30 to the arguments of a call.
     pub fn take(&mut self, arguments: &[f64]) {
-        let none = if self.in_macro { f64::NAN } else { 0.0 };
+        let missing = if self.in_macro { f64::NAN } else { 0.0 };
         for k in 0..LOCALS {
-            self.numbers[1 + k] = arguments.get(k).copied().unwrap_or(none);
+            self.numbers[1 + k] = arguments.get(k).copied().unwrap_or(missing);
         }
     }
 
@@ -212,12 +205,8 @@ impl Parameters {
 
     /// A sentence about the first number that was read before it was set.
     pub fn warning(&self) -> Option<String> {
-        match self.unset.get() {
-            0 => None,
-            number => Some(format!(
-                "parameter #{number} is used before the program sets it: 0 is taken, as LinuxCNC does"
-            )),
-        }
+        let number = Some(self.unset.get()).filter(|&number| number > 0)?;
+        Some(format!("parameter #{number} is used before the program sets it: 0 is taken, as LinuxCNC does"))
     }
 }
 

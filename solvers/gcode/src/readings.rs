@@ -1,19 +1,19 @@
-//! What parameters tell of the machine: where it is, its tool and its modes; and what setting one does.
+//! The parameters that report the machine's position, tool and modes; and the assignment of parameters.
 
-use super::block::{rotary, AXES, AXIS_OF_LETTER};
+use super::block::{rotary, AXES};
 use super::execute::Interpreter;
 use super::expression::Values;
 use super::fault::{fault, Outcome};
 use super::modal::{FeedMode, State};
 use super::parameters::{Name, READINGS};
 
-/// The tool in the spindle, its offset, its diameter, and where the program is.
+/// The numbers of the tool in the spindle, its offset, its diameter, and the position.
 const TOOL: usize = 5400;
 const TOOL_OFFSET: std::ops::RangeInclusive<usize> = 5401..=5409;
 const TOOL_DIAMETER: usize = 5410;
 const POSITION: std::ops::RangeInclusive<usize> = 5420..=5428;
 
-/// Fanuc's number that raises an alarm, and those that tell of its control.
+/// Fanuc's number that raises an alarm, and the numbers that report the state of its control.
 const ALARM: usize = 3000;
 const CONTROL: std::ops::Range<usize> = 1000..5161;
 
@@ -59,7 +59,7 @@ impl Values for Interpreter<'_> {
 }
 
 impl Interpreter<'_> {
-    /// Macros read modes and places of their control under numbers that nothing has set here.
+    /// Refuses a number by which a macro reads the state of its control, unless the program has set it.
     #[inline(always)]
     fn check_known(&self, number: usize) -> Outcome<()> {
         if self.parameters.in_macro() && CONTROL.contains(&number) && !self.parameters.is_set(number) {
@@ -70,18 +70,23 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// Where the program is along an axis, in its own units and offsets.
+    /// The coordinate of the program along an axis, in its units.
     fn reading_of_axis(&self, axis: usize) -> f64 {
-        let place = self.state.offsets.to_program(&self.position())[axis];
+        self.in_program_units(axis, self.state.offsets.to_program(&self.position())[axis])
+    }
+
+    /// A length in mm, or an angle in degrees, in the units of the program.
+    fn in_program_units(&self, axis: usize, value: f64) -> f64 {
         if rotary(axis) {
-            place
+            value
         } else {
-            place / self.state.unit()
+            value / self.state.unit()
         }
     }
 
+    /// The value of a name that the machine reports, without its `_`.
     fn reading(&self, name: &[u8]) -> Option<f64> {
-        if let Some(value) = self.parameters_of_place(name) {
+        if let Some(value) = self.reading_of_position(name) {
             return Some(value);
         }
         let state = &self.state;
@@ -130,24 +135,18 @@ impl Interpreter<'_> {
         })
     }
 
-    /// `_x` to `_w`, and `_abs_x` to `_abs_w`.
-    fn parameters_of_place(&self, name: &[u8]) -> Option<f64> {
-        let axis = |letter: u8| {
-            let letter = letter.to_ascii_uppercase();
-            AXES.contains(&letter).then(|| AXIS_OF_LETTER[(letter - b'A') as usize] as usize)
+    /// The value of `_x` to `_w`, and of `_abs_x` to `_abs_w`.
+    fn reading_of_position(&self, name: &[u8]) -> Option<f64> {
+        let (absolute, letter) = match name {
+            [letter] => (false, letter),
+            [b'a', b'b', b's', b'_', letter] => (true, letter),
+            _ => return None,
         };
-        match name {
-            [letter] => axis(*letter).map(|axis| self.reading_of_axis(axis)),
-            [b'a', b'b', b's', b'_', letter] => axis(*letter).map(|axis| {
-                let place = self.position()[axis];
-                if rotary(axis) {
-                    place
-                } else {
-                    place / self.state.unit()
-                }
-            }),
-            _ => None,
-        }
+        let axis = AXES.iter().position(|known| known.eq_ignore_ascii_case(letter))?;
+        Some(match absolute {
+            true => self.in_program_units(axis, self.position()[axis]),
+            false => self.reading_of_axis(axis),
+        })
     }
 
     /// Sets the parameters that a block assigns.
@@ -162,7 +161,7 @@ impl Interpreter<'_> {
     }
 }
 
-/// G54 to G59.3 and G54.1 in tenths.
+/// The code of the work offset in force, in tenths.
 fn system_code(state: &State) -> f64 {
     match state.offsets.system {
         system @ 0..=5 => 540.0 + 10.0 * system as f64,

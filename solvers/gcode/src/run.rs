@@ -1,5 +1,5 @@
-//! Runs a program: its lines in the order that O words, M98 and M99 say, over the texts of the program and of the
-//! subprograms that it calls. Every line is read anew each time that it is run.
+//! Runs a program: its lines in the order of O words, M98 and M99, over the texts of the program and of the subprograms
+//! that it calls. A line is read again each time that it is run.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -10,24 +10,25 @@ use super::execute::Interpreter;
 use super::fault::{fault, Fault, Outcome};
 use super::flow::Flow;
 use super::parameters::Scope;
+use super::tolerance::{LINES_PER_MOVE, SPARE_LINES};
 use super::words::{Lexer, Line};
 use super::Options;
 
-/// Lines between two times that the reader tells how far it is.
-const TOLD: u32 = 1024;
+/// Number of lines that are run between two reports of progress.
+const REPORTED: u32 = 1024;
 
-/// Lines that a program may run beyond those of its text, and more of them for each move that it may have.
-const SPARE_LINES: u64 = 1_000_000;
-const LINES_OF_A_MOVE: u64 = 4;
-
-/// A file of the program.
+/// The text of the program or of a subprogram's file.
 struct Text<'a> {
     name: String,
     bytes: Cow<'a, [u8]>,
     flow: OnceCell<Flow>,
 }
 
-impl Text<'_> {
+impl<'a> Text<'a> {
+    fn new(name: String, bytes: Cow<'a, [u8]>) -> Rc<Self> {
+        Rc::new(Self { name, bytes, flow: OnceCell::new() })
+    }
+
     fn flow(&self, delete: bool) -> Outcome<&Flow> {
         match self.flow.get() {
             Some(flow) => Ok(flow),
@@ -39,22 +40,24 @@ impl Text<'_> {
     }
 }
 
-/// Where the program or a call of a subprogram stands.
+/// The progress of the program or of a call.
 pub(super) struct Frame {
-    /// Place in `texts`.
+    /// Index into `texts`.
     text: usize,
+    /// Place in the text of the next line.
     at: usize,
     /// 1-based, of the line that was run last.
     line: u32,
-    /// Of subprograms in other files, the line of the program that moves are told of.
-    shown: Option<u32>,
-    /// Open repetitions: the step, and how often it is run again.
+    /// The line of the program that is reported for moves of a subprogram in another file.
+    reported: Option<u32>,
+    /// Open `repeat` steps, each with the number of times that it is run again.
     pub(super) repeats: Vec<(usize, u64)>,
-    /// M98 and G65: how it is run again.
+    /// The repetitions of a call by M97, M98 or G65.
     again: Option<Again>,
 }
 
-/// Where a subprogram begins, the line before, how often it is run again, and the arguments of a macro.
+/// The place of the first line of a subprogram, the line before it, the number of times that it is run again, and the
+/// arguments of a macro.
 struct Again {
     at: usize,
     line: u32,
@@ -62,15 +65,15 @@ struct Again {
     arguments: Option<Vec<f64>>,
 }
 
-/// What ends a stretch of lines in one text.
+/// The reason why the next line is not the one after.
 pub(super) enum Exit {
-    /// The program ends, by that word; None where the text does.
+    /// The program ends by that word, or the text ends.
     End(Option<&'static str>),
     Call {
         label: Vec<u8>,
         arguments: Vec<f64>,
     },
-    /// M98, G65 with its arguments, or M97, which is local; and how often.
+    /// M98, G65 with its arguments, or M97 with the number of a line; `times` in succession.
     Fanuc {
         number: i64,
         local: bool,
@@ -78,7 +81,7 @@ pub(super) enum Exit {
         arguments: Option<Vec<f64>>,
     },
     Return(Option<f64>),
-    /// M99 that goes back to a line of that block number.
+    /// M99 with the number of a line.
     Back(i64),
 }
 
@@ -90,39 +93,42 @@ pub struct Runner<'a> {
     /// The program, and the calls that are open.
     pub(super) frames: Vec<Frame>,
     pub(super) block: Block,
+    /// Number of blocks left out after `/`.
     deleted: u32,
-    /// Lines that may still be run.
+    /// Number of lines that may still be run.
     left: u64,
-    told: u32,
-    since_told: u32,
+    /// The last line reported as progress, and the lines run since.
+    reported: u32,
+    since_report: u32,
+    /// True after the % that opens the program.
     opened: bool,
+    /// True after the first call.
     called: bool,
-    /// The program defines subroutines.
+    /// True where the program defines subroutines.
     pub defines: bool,
 }
 
 impl<'a> Runner<'a> {
     pub fn new(source: &'a [u8], options: &'a Options, lines: usize, seen: &'a dyn Fn(usize)) -> Self {
-        let main = Text { name: String::new(), bytes: Cow::Borrowed(source), flow: OnceCell::new() };
-        let start = Frame { text: 0, at: 0, line: 0, shown: None, repeats: Vec::new(), again: None };
+        let start = Frame { text: 0, at: 0, line: 0, reported: None, repeats: Vec::new(), again: None };
         Self {
             options,
             interpreter: Interpreter::new(options, lines),
             seen,
-            texts: vec![Rc::new(main)],
+            texts: vec![Text::new(String::new(), Cow::Borrowed(source))],
             frames: vec![start],
             block: Block::new(),
             deleted: 0,
-            left: lines as u64 + SPARE_LINES + LINES_OF_A_MOVE * options.max_moves as u64,
-            told: 0,
-            since_told: 0,
+            left: lines as u64 + SPARE_LINES + LINES_PER_MOVE * options.max_moves as u64,
+            reported: 0,
+            since_report: 0,
             opened: false,
             called: false,
             defines: false,
         }
     }
 
-    /// Runs the program to its end; sentences about how it ends, and what was left out.
+    /// Runs the program to its end: sentences about its end and about blocks that were left out.
     pub fn run(&mut self) -> Outcome<Vec<String>> {
         let end = loop {
             let Some(mut frame) = self.frames.pop() else { break None };
@@ -131,14 +137,12 @@ impl<'a> Runner<'a> {
             if frame.line > 0 || frame.at > 0 {
                 lexer.jump(frame.at, frame.line);
             }
-            let exit = self.stretch(&mut lexer, &text, &mut frame);
+            let exit = self.run_lines(&mut lexer, &text, &mut frame);
             (frame.at, frame.line) = (lexer.at, lexer.line);
             let main = self.frames.is_empty();
             self.frames.push(frame);
             match exit? {
-                Exit::End(word) if main || word.is_some() => {
-                    break Some(self.ending(&lexer, word));
-                }
+                Exit::End(word) if main || word.is_some() => break Some(self.ending(&lexer, word)),
                 Exit::End(_) => {
                     return fault("the subprogram does not end with M99 or endsub: it may be truncated")
                 }
@@ -179,8 +183,8 @@ impl<'a> Runner<'a> {
         warnings
     }
 
-    /// Runs lines of one text until it is left.
-    fn stretch(&mut self, lexer: &mut Lexer, text: &Text, frame: &mut Frame) -> Outcome<Exit> {
+    /// Runs lines of one text up to an exit.
+    fn run_lines(&mut self, lexer: &mut Lexer, text: &Text, frame: &mut Frame) -> Outcome<Exit> {
         loop {
             let line = lexer.next_line(&mut self.block, &self.interpreter)?;
             self.count(lexer.line, frame.text)?;
@@ -189,7 +193,7 @@ impl<'a> Runner<'a> {
                     if !lexer.assigned.is_empty() {
                         self.interpreter.assign(&mut lexer.assigned)?;
                     }
-                    let line = frame.shown.unwrap_or(lexer.line);
+                    let line = frame.reported.unwrap_or(lexer.line);
                     for (letter, text) in lexer.remarks.drain(..) {
                         self.interpreter.remark(line, letter, text);
                     }
@@ -201,7 +205,7 @@ impl<'a> Runner<'a> {
                     }
                 }
                 Some(Line::Deleted) => self.deleted += 1,
-                // The first % opens the program, unless blocks stand before it.
+                // The first % opens the program, if no block is before it.
                 Some(Line::Percent) if !self.opened && !lexer.begun => self.opened = true,
                 Some(Line::Percent) => return Ok(Exit::End(Some("%"))),
                 Some(Line::Flow(at)) => {
@@ -218,18 +222,18 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Counts the lines that are run, and tells how many lines of the program have been read.
+    /// Counts the lines that are run, and reports how many lines of the program have been read.
     #[inline(always)]
     fn count(&mut self, line: u32, text: usize) -> Outcome<()> {
-        self.since_told += 1;
-        if self.since_told < TOLD {
+        self.since_report += 1;
+        if self.since_report < REPORTED {
             return Ok(());
         }
-        self.since_told = 0;
-        let more = if text == 0 { line.saturating_sub(self.told) } else { 0 };
-        self.told += more;
+        self.since_report = 0;
+        let more = if text == 0 { line.saturating_sub(self.reported) } else { 0 };
+        self.reported += more;
         (self.seen)(more as usize);
-        match self.left.checked_sub(u64::from(TOLD)) {
+        match self.left.checked_sub(u64::from(REPORTED)) {
             Some(left) => self.left = left,
             None => return fault(format!(
                 "the loops and calls of the program run more lines than {} moves take: check their conditions, or raise \
@@ -257,9 +261,10 @@ impl<'a> Runner<'a> {
         if times == 0 {
             return Ok(());
         }
-        let (text, at, line) = match local {
-            true => self.find_line(number, "M97 calls")?,
-            false => self.find(number.to_string().as_bytes())?,
+        let (text, at, line) = if local {
+            self.find_line(number, "M97 calls")?
+        } else {
+            self.find(number.to_string().as_bytes())?
         };
         let scope = if arguments.is_some() { Scope::Macro } else { Scope::Shared };
         self.interpreter.parameters.enter(arguments.as_deref().unwrap_or_default(), scope)?;
@@ -267,7 +272,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Ends the last call, if there is one, and goes on in the line of that block number.
+    /// Ends the last call, if there is one, and goes to the line with a block number.
     fn go_back(&mut self, number: i64) -> Outcome<()> {
         if self.frames.len() > 1 {
             self.frames.pop();
@@ -283,9 +288,9 @@ impl<'a> Runner<'a> {
 
     fn push(&mut self, text: usize, at: usize, line: u32, again: Option<Again>) {
         let caller = &self.frames[self.frames.len() - 1];
-        let shown = (text != 0).then(|| caller.shown.unwrap_or(caller.line));
+        let reported = (text != 0).then(|| caller.reported.unwrap_or(caller.line));
         self.called = true;
-        self.frames.push(Frame { text, at, line, shown, repeats: Vec::new(), again });
+        self.frames.push(Frame { text, at, line, reported, repeats: Vec::new(), again });
     }
 
     /// Ends the last call, or runs its subprogram again.
@@ -310,7 +315,8 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// Where a subprogram begins: in the text that calls it, in one that is open, or in a file of its name.
+    /// The text, place and line before the first line of a subprogram: in the text that calls it, in one that has been
+    /// read, or in a file of its name.
     fn find(&mut self, label: &[u8]) -> Outcome<(usize, usize, u32)> {
         let here = self.frames.last().map_or(0, |frame| frame.text);
         for text in std::iter::once(here).chain(0..self.texts.len()) {
@@ -331,13 +337,8 @@ impl<'a> Runner<'a> {
                  (--subprograms), or put it into the program"
             ));
         };
-        self.texts.push(Rc::new(Text {
-            name: file.clone(),
-            bytes: Cow::Owned(bytes),
-            flow: OnceCell::new(),
-        }));
-        let text = self.texts.len() - 1;
-        match self.sub_in(text, label) {
+        self.texts.push(Text::new(file.clone(), Cow::Owned(bytes)));
+        match self.sub_in(self.texts.len() - 1, label) {
             Ok(Some(place)) => Ok(place),
             Ok(None) => {
                 fault(format!("the file {file} has no subprogram {name}: name it O<{name}> sub there"))
@@ -351,7 +352,7 @@ impl<'a> Runner<'a> {
         Ok(flow.sub(label).map(|i| (text, flow.steps[i].next, flow.steps[i].line)))
     }
 
-    /// Where the line of a block number begins, in the program that runs.
+    /// The text, place and line before the line with a block number, in the program that is run.
     fn find_line(&self, number: i64, what: &str) -> Outcome<(usize, usize, u32)> {
         let (here, from) = self.frames.last().map_or((0, 0), |frame| (frame.text, frame.at));
         let text = &self.texts[here];
@@ -361,16 +362,12 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// The line of the program that a fault is about, and its sentence with the place in other files.
+    /// The line of the program that a fault is about, and its sentence, with file and line where these are another's.
     #[cold]
     pub fn place(&self, fault: &Fault) -> (u32, String) {
         let Some(frame) = self.frames.last() else { return (fault.line.unwrap_or(1), fault.message.clone()) };
         let line = fault.line.unwrap_or(frame.line).max(1);
-        match frame.shown {
-            None => (line, fault.message.clone()),
-            Some(shown) => {
-                (shown, format!("in {} line {line}: {}", self.texts[frame.text].name, fault.message))
-            }
-        }
+        let within = || format!("in {} line {line}: {}", self.texts[frame.text].name, fault.message);
+        frame.reported.map_or_else(|| (line, fault.message.clone()), |reported| (reported, within()))
     }
 }

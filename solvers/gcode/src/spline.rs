@@ -1,22 +1,20 @@
-//! Splines: G5 and G5.1 (Bézier curves of one block), G5.2 to G5.3 (NURBS, uniform knots) as LinuxCNC has them, and
-//! Fanuc's G6.2 (NURBS with knots). A NURBS takes several blocks and is one move, in the line of its first block.
+//! Splines to Bézier pieces: LinuxCNC's G5 and G5.1 (Bézier curves of one block) and G5.2 to G5.3 (NURBS with uniform
+//! knots), and Fanuc's G6.2 (NURBS with knots). A NURBS of several blocks is one move, in the line of its first block.
 
 use super::block::{bit, bits, g_name, Block, Group, AXES, AXIS_WORDS};
-use super::execute::Interpreter;
+use super::execute::{Interpreter, Topic};
 use super::fault::{fault, Outcome};
 use super::modal::{Feed, FeedMode};
 use super::moves::{only_turns, Point};
+use super::tolerance::SAME_PLACE;
 use super::words::count;
 use feedplan_geometry::spline::extract::extract;
 use feedplan_geometry::spline::knots::Spline;
 use feedplan_geometry::spline::{CompositeCurve, MAX_DEGREE};
 
-/// The order of a NURBS unless the program says: L of G5.2 and P of G6.2.
+/// The order of a NURBS without L in G5.2, or P in G6.2.
 const ORDER: usize = 3;
 const FANUC_ORDER: usize = 4;
-
-/// So far from the tool, in mm or degrees, G6.2 may begin: the rounding of coordinates.
-const SAME_PLACE: f64 = 0.005;
 
 /// A NURBS that is being read.
 pub struct Nurbs {
@@ -27,7 +25,7 @@ pub struct Nurbs {
     order: usize,
     points: Vec<Point>,
     weights: Vec<f64>,
-    /// Those of G6.2; G5.2 has none.
+    /// Of G6.2; empty for G5.2.
     knots: Vec<f64>,
 }
 
@@ -56,7 +54,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// G5 to G5.2 work in X and Y.
+    /// Refuses G5 to G5.2 outside of X and Y.
     fn check_plane(&self, block: &Block, motion: u16) -> Outcome<()> {
         let name = g_name(motion);
         if self.state.normal != 2 {
@@ -71,7 +69,8 @@ impl Interpreter<'_> {
         }
     }
 
-    /// A cubic Bézier curve: I J from its start to the first, P Q from its end to the second control point.
+    /// A cubic Bézier curve: I J is the vector from its start to the first inner control point, P Q from its end to the
+    /// second.
     fn cubic(&mut self, block: &Block, feed: Feed) -> Outcome<()> {
         let start = self.moves.position;
         let first = match (self.offset(block, *b"IJ")?, self.mirror) {
@@ -88,7 +87,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A quadratic Bézier curve: I J from its start to the control point; one of them may be missing, for 0.
+    /// A quadratic Bézier curve: I J is the vector from its start to the inner control point; a missing one is 0.
     fn quadratic(&mut self, block: &Block, feed: Feed) -> Outcome<()> {
         if let Some(letter) = b"PQ".iter().find(|&&letter| block.has(letter)) {
             return fault(format!(
@@ -106,7 +105,7 @@ impl Interpreter<'_> {
         self.bezier(&[start, beside(&start, offset), end], feed)
     }
 
-    /// Two words that go together, in mm; None where both are missing.
+    /// A vector of two words, in mm; None where both are missing.
     fn offset(&self, block: &Block, letters: [u8; 2]) -> Outcome<Option<[f64; 2]>> {
         let unit = self.state.unit();
         match letters.map(|letter| block.get(letter)) {
@@ -196,7 +195,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A control point of G5.2: X and Y, counted from the start of the spline with G91, and its weight P.
+    /// A control point of G5.2: X and Y, with G91 from the start of the spline, and its weight P.
     fn add_point(&mut self, nurbs: &mut Nurbs, block: &Block) -> Outcome<()> {
         self.check_plane(block, 52)?;
         let has = b"XYP".map(|letter| block.has(letter));
@@ -212,12 +211,12 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A block of G6.2 after the first: a control point and its knot, or one of the last knots; true for the last.
+    /// A block of G6.2 after the first: a control point with a knot, or one of the last knots; true for the last block.
     fn add_knot(&mut self, nurbs: &mut Nurbs, block: &Block) -> Outcome<bool> {
         let Some(knot) = block.get(b'K') else {
             return fault(format!("a block of the spline G6.2 of line {} has no knot: give K", nurbs.line));
         };
-        // The first knot may be left out for the second.
+        // A first knot that is missing equals the second.
         if nurbs.knots.len() == 1 && nurbs.knots[0].is_nan() {
             nurbs.knots[0] = knot;
         }
@@ -248,19 +247,19 @@ impl Interpreter<'_> {
         Ok(nurbs.knots.len() == nurbs.points.len() + nurbs.order)
     }
 
-    /// A control point of G6.2, in G91 counted from the one before.
+    /// A control point of G6.2, with G91 from the one before.
     fn control_point(&mut self, block: &Block, before: Point) -> Outcome<Point> {
         let mut point = before;
         let zero = *self.state.offsets.sum();
         let absolute = self.state.absolute;
-        self.places(block, |axis, value| {
+        self.axis_values(block, |axis, value| {
             point[axis] = value + if absolute { zero[axis] } else { point[axis] };
         })?;
         self.check_reach(&point)?;
         Ok(point)
     }
 
-    /// Moves along the NURBS that is read.
+    /// Adds the move along a NURBS that is complete.
     fn close(&mut self, nurbs: &Nurbs) -> Outcome<()> {
         let (k, n, line) = (nurbs.order, nurbs.points.len(), nurbs.line);
         if n < k {
@@ -270,7 +269,7 @@ impl Interpreter<'_> {
             ));
         }
         let knots = if nurbs.code == 52 {
-            // Clamped and uniform: the first and the last value k times.
+            // Clamped and uniform: the first and the last knot k times.
             (0..n + k).map(|i| (i.clamp(k - 1, n) - (k - 1)) as f64).collect()
         } else {
             let knots = &nurbs.knots;
@@ -295,7 +294,7 @@ impl Interpreter<'_> {
         };
         let turns = nurbs.points.iter().all(|point| only_turns(&nurbs.points[0], point));
         let feed = if turns { nurbs.feed.angular } else { nurbs.feed.linear };
-        // Both ends are the control points there, without rounding.
+        // Both ends are the control points, without rounding.
         let last = curve.control.len() - 1;
         (curve.control[0], curve.control[last]) = (nurbs.points[0], nurbs.points[n - 1]);
         self.state.motion = 800;
@@ -314,28 +313,25 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Fanuc's G5 P and G5.1 Q alone in their block switch a mode of its look-ahead.
+    /// True for Fanuc's G5 P or G5.1 Q alone in a block, which switches its look-ahead.
     pub(super) fn switches_look_ahead(&mut self, block: &Block, motion: Option<u16>) -> bool {
         let switch = match motion {
             Some(50) => bit(b'P'),
             Some(51) => bit(b'Q'),
             _ => return false,
         };
-        if block.words != switch {
-            return false;
+        let switches = block.words == switch;
+        if switches {
+            self.warn_once(Topic::LookAhead, || {
+                "Fanuc's G5 P and G5.1 Q switch its look-ahead, which has no effect on the path".into()
+            });
         }
-        if !self.warned_look_ahead {
-            self.warned_look_ahead = true;
-            self.warn(
-                "Fanuc's G5 P and G5.1 Q switch its look-ahead, which has no effect on the path".into(),
-            );
-        }
-        true
+        switches
     }
 }
 
 impl Nurbs {
-    /// L of G5.2, which may stand in any of its blocks.
+    /// Sets the order to L, which may be in any block of G5.2.
     fn set_order(&mut self, block: &Block) -> Outcome<()> {
         if let Some(order) = count(block, b'L', 3, "order of G5.2")? {
             self.order = order as usize;
@@ -345,7 +341,7 @@ impl Nurbs {
     }
 }
 
-/// A block that is none of the spline's; `own` are the words that it takes.
+/// Refuses a block that is not one of the spline; `own` are the words of its blocks.
 #[cold]
 fn interrupted(block: &Block, nurbs: &Nurbs, motion: Option<u16>, own: u32) -> Outcome<()> {
     let (name, line) = (g_name(nurbs.code), nurbs.line);

@@ -1,4 +1,4 @@
-//! What lines of program flow do: conditions, loops, calls and returns.
+//! Runs a line of program flow: conditions, loops, calls and returns.
 
 use super::expression::{bracket, expression, integer};
 use super::fault::{fault, Outcome};
@@ -8,7 +8,7 @@ use super::run::{Exit, Frame, Runner};
 use super::words::Lexer;
 
 impl Runner<'_> {
-    /// A line of program flow; what leaves the text by it.
+    /// Runs the step `i`; the exit, where it leaves the text.
     pub(super) fn step(
         &mut self,
         lexer: &mut Lexer,
@@ -83,13 +83,14 @@ impl Runner<'_> {
         Ok(None)
     }
 
-    /// The value of a step's bracket, if it has one.
+    /// The value of the bracket of a step; None where it has no bracket.
     fn value(&self, source: &[u8], step: &Step) -> Outcome<Option<f64>> {
         let found = bracket(source, step.arguments, &self.interpreter)?;
         check_rest(source, found.map_or(step.arguments, |(_, end)| end))?;
         Ok(found.map(|(value, _)| value))
     }
 
+    /// The value of the bracket that a step must have.
     fn needed(&self, source: &[u8], step: &Step) -> Outcome<f64> {
         match self.value(source, step)? {
             Some(value) => Ok(value),
@@ -97,6 +98,7 @@ impl Runner<'_> {
         }
     }
 
+    /// True where the condition of a step holds.
     fn holds(&self, source: &[u8], step: &Step) -> Outcome<bool> {
         Ok(self.needed(source, step)? != 0.0)
     }

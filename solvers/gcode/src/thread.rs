@@ -1,19 +1,17 @@
-//! Moves that follow the spindle: G33 (one pass of a thread), G33.1 (tapping) and G76 (a whole thread).
+//! Moves that are synchronous with the spindle: G33 (one pass of a thread), G33.1 (a tap) and G76 (a whole thread).
 
 use super::block::Block;
-use super::execute::{Interpreter, RATES};
+use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
 use super::moves::{Kind, Point, Stop};
+use super::tolerance::{MOST_PASSES, RATES};
 use super::words::count;
 
-/// More passes of one thread are a mistake.
-const MOST_PASSES: u32 = 10_000;
-
-/// A thread's heights along X and ends along Z, in mm; depths count from the drive line towards the part.
+/// The heights of a thread along X and its ends along Z, in mm. Depths are from the drive line towards the workpiece.
 struct Thread {
-    /// Where passes begin and end.
+    /// The start of the passes.
     start: Point,
-    /// 1 for an inner thread, whose part lies at larger X; -1 for an outer one.
+    /// 1 for an inner thread, whose workpiece is at greater X; -1 for an outer thread.
     inward: f64,
     full: f64,
     end_depth: f64,
@@ -27,7 +25,7 @@ struct Thread {
 }
 
 impl Interpreter<'_> {
-    /// The feed [mm/s] that advances by a pitch [mm] with each turn of the spindle.
+    /// The feed in mm/s that advances by a pitch in mm in each turn of the spindle.
     fn feed_of_pitch(&self, pitch: f64, code: &str) -> Outcome<f64> {
         match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
             Some(speed) => Ok(pitch * speed / 60.0),
@@ -44,7 +42,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// G33, and G33.1, which comes back with the spindle turning backwards.
+    /// G33, and G33.1, which returns with the spindle reversed.
     pub(super) fn thread_once(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         let code = if motion == 330 { "G33" } else { "G33.1" };
         self.check_beside(code)?;
@@ -61,7 +59,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// G76: passes that go deeper until the thread has its depth, and spring passes at that depth.
+    /// G76: passes of growing depth up to that of the thread, and spring passes at that depth.
     pub(super) fn thread(&mut self, block: &Block) -> Outcome<()> {
         self.check_beside("G76")?;
         if let Some(letter) = b"XYABCUVW".iter().find(|&&letter| block.has(letter)) {

@@ -1,62 +1,52 @@
-//! What axis words mean: joint positions, the tool's tip (G43.4), or the tip and a direction (G43.5); and what a
-//! change of the coordinate mode does. It moves nothing: the same joint positions are written in the new words.
+//! Changes the coordinates that axis words are: joint positions, the tool's tip (G43.4), or the tip and a tool direction
+//! (G43.5). A change moves nothing: the machine's kinematics converts the position to the new coordinates.
 
 use super::block::{bits, g_name, Block, Group};
 use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
 use super::intent::is_cycle;
+use super::modal::State;
 use super::moves::{Direction, Point};
+use super::tolerance::{DIRECTION_LENGTH, OPPOSITE};
 
-/// Of axis words; as `CoordinateMode` in the Python package.
+/// The coordinates that axis words are, with the numbers of the Python package.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum CoordinateMode {
+    /// Joint positions.
     Joints = 0,
+    /// The tip and the angles of the rotary axes.
     Tip = 1,
+    /// The tip and I, J, K as the tool direction.
     Vector = 2,
 }
 
-/// A place in words of a mode: X to W, then the tool's direction.
+/// A position in the coordinates of a mode, X to W, and the tool direction.
 pub type Place = (Point, Direction);
 
-/// What a machine's kinematics says about words.
+/// The kinematics of a machine. A tool length is in mm, NaN for that of the machine file.
 pub trait TipControl {
-    /// Whether the machine has that mode; a sentence why not.
-    fn check(&self, coordinate_mode: CoordinateMode) -> Result<(), String>;
+    /// Refuses a mode in which the machine cannot be programmed, by a sentence why.
+    fn check(&self, mode: CoordinateMode) -> Result<(), String>;
 
-    /// The joint positions after places in words of one mode, which begin at the joints `entry`;
-    /// `tool_length` in mm, NaN for the machine file's.
+    /// The joint positions at the end of a path in the coordinates of a mode, which begins at the joints `entry`.
     fn joints(
         &self,
-        coordinate_mode: CoordinateMode,
+        mode: CoordinateMode,
         tool_length: f64,
         entry: &Point,
-        places: &[Place],
+        path: &[Place],
     ) -> Result<Point, String>;
 
-    /// The place in words of a mode where the joints are.
-    fn place(
-        &self,
-        coordinate_mode: CoordinateMode,
-        tool_length: f64,
-        joints: &Point,
-    ) -> Result<Place, String>;
+    /// The position of joints in the coordinates of a mode.
+    fn place(&self, mode: CoordinateMode, tool_length: f64, joints: &Point) -> Result<Place, String>;
 }
-
-/// Directions [unit vectors] whose sum is shorter than this are opposite.
-const OPPOSITE: f64 = 1e-6;
 
 impl Interpreter<'_> {
     /// G43.4 and G43.5, and the codes that cancel them; `length` is the tool's in mm, NaN where it is not known.
-    pub(super) fn set_coordinate_mode(
-        &mut self,
-        coordinate_mode: CoordinateMode,
-        length: f64,
-    ) -> Outcome<()> {
+    pub(super) fn set_coordinate_mode(&mut self, mode: CoordinateMode, length: f64) -> Outcome<()> {
         let same = length.to_bits() == self.state.tool_length.to_bits() || length == self.state.tool_length;
-        if coordinate_mode == self.state.coordinate_mode
-            && (same || coordinate_mode == CoordinateMode::Joints)
-        {
+        if mode == self.state.coordinate_mode && (same || mode == CoordinateMode::Joints) {
             return Ok(());
         }
         let Some(control) = self.options.tip_control.as_deref() else {
@@ -65,41 +55,30 @@ impl Interpreter<'_> {
                  machine, or post joint positions",
             );
         };
-        let entry = &self.state.entry;
-        let converted = control.check(coordinate_mode).and_then(|()| {
-            let joints = match self.state.coordinate_mode {
+        let State { coordinate_mode: before, tool_length, entry, .. } = &self.state;
+        let converted = control.check(mode).and_then(|()| {
+            let joints_after = |path: &[Place]| control.joints(*before, *tool_length, entry, path);
+            let joints = match before {
                 CoordinateMode::Joints => self.moves.position,
-                CoordinateMode::Tip => {
-                    let here = (self.moves.position, self.moves.direction);
-                    control.joints(CoordinateMode::Tip, self.state.tool_length, entry, &[here])?
-                }
-                CoordinateMode::Vector => {
-                    let stretch = self.moves.since_change();
-                    control.joints(CoordinateMode::Vector, self.state.tool_length, entry, &stretch)?
-                }
+                CoordinateMode::Tip => joints_after(&[(self.moves.position, self.moves.direction)])?,
+                CoordinateMode::Vector => joints_after(&self.moves.since_change())?,
             };
-            Ok((joints, control.place(coordinate_mode, length, &joints)?))
+            Ok((joints, control.place(mode, length, &joints)?))
         });
         let (joints, (start, direction)) = converted.or_else(fault)?;
         self.check_reach(&start)?;
-        self.moves.change(coordinate_mode, length, start, direction);
-        self.state.coordinate_mode = coordinate_mode;
-        self.state.tool_length = length;
-        self.state.entry = joints;
+        self.moves.change(mode, length, start, direction);
+        (self.state.coordinate_mode, self.state.tool_length, self.state.entry) = (mode, length, joints);
         Ok(())
     }
 
-    /// Refuses what goes to joint positions or along the spindle while words are the tip.
+    /// Refuses moves to joint positions or along the spindle while axis words are the tip.
     pub(super) fn check_coordinate_mode(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
-        let code = match block.code(Group::ToolLength) {
-            Some(434) => 434,
-            Some(435) => 435,
-            Some(_) => return Ok(()),
-            None => match self.state.coordinate_mode {
-                CoordinateMode::Joints => return Ok(()),
-                CoordinateMode::Tip => 434,
-                CoordinateMode::Vector => 435,
-            },
+        let code = match (block.code(Group::ToolLength), self.state.coordinate_mode) {
+            (Some(code @ (434 | 435)), _) => code,
+            (Some(_), _) | (None, CoordinateMode::Joints) => return Ok(()),
+            (None, CoordinateMode::Tip) => 434,
+            (None, CoordinateMode::Vector) => 435,
         };
         let name = g_name(code);
         if let Some(other) = block.code(Group::Once).filter(|code| matches!(code, 280 | 300 | 530)) {
@@ -138,14 +117,14 @@ impl Interpreter<'_> {
         }
     }
 
-    /// The tool's direction that the block asks for: I, J, K, of which missing ones are 0, or as before.
+    /// The tool direction of a block: I, J, K, where a missing one is 0, or the direction before.
     pub(super) fn direction(&self, block: &Block) -> Outcome<Direction> {
         if block.words & bits(b"IJK") == 0 {
             return Ok(self.moves.direction);
         }
         let words = [b'I', b'J', b'K'].map(|letter| block.get(letter).unwrap_or(0.0));
         let size = words.iter().fold(0.0, |size: f64, word| size.hypot(*word));
-        if !(1e-9..=1e9).contains(&size) {
+        if !DIRECTION_LENGTH.contains(&size) {
             return fault("I, J, K give the tool no direction: give a vector such as K1");
         }
         let direction = words.map(|word| word / size);
@@ -158,17 +137,17 @@ impl Interpreter<'_> {
 }
 
 /// The angle between two directions in degrees.
-pub fn turn(a: &Direction, b: &Direction) -> f64 {
+pub fn angle_between(a: &Direction, b: &Direction) -> f64 {
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let sine = cross.iter().fold(0.0, |size: f64, value| size.hypot(*value));
     sine.atan2(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).to_degrees()
 }
 
-/// True where G43.5 gives the I, J, K of a block the tool's direction.
-pub fn takes_direction(block: &Block, coordinate_mode: CoordinateMode, motion: Option<u16>) -> bool {
+/// True where I, J, K of a block are a tool direction.
+pub fn takes_direction(block: &Block, mode: CoordinateMode, motion: Option<u16>) -> bool {
     let vector = match block.code(Group::ToolLength) {
         Some(code) => code == 435,
-        None => coordinate_mode == CoordinateMode::Vector,
+        None => mode == CoordinateMode::Vector,
     };
     vector && matches!(motion, Some(0 | 10))
 }

@@ -1,4 +1,4 @@
-//! The tool table, and what T, M6, M61 and G43 take from it.
+//! The tool table, and the tool that T, M6 and M61 take from it.
 
 use super::block::Block;
 use super::execute::Interpreter;
@@ -6,8 +6,8 @@ use super::fault::{fault, Outcome};
 use super::moves::Point;
 use super::words::count;
 
-/// A tool of the table: its number, its pocket, its offset [mm, deg], its diameter [mm], and the side of a lathe tool's
-/// tip that cuts (1 to 9; 0 for mills).
+/// A tool of the table: its number, its pocket, its offset in mm and degrees, its diameter in mm, and the cutting side of
+/// a lathe tool (1 to 9; 0 for mills).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tool {
     pub number: u32,
@@ -18,7 +18,7 @@ pub struct Tool {
 }
 
 impl Interpreter<'_> {
-    /// The tool of a number; None where the table lacks it or there is no table.
+    /// The tool of a number; None where the table does not have it or there is no table.
     pub(super) fn tool_of(&self, number: u32) -> Option<Tool> {
         self.tools.as_ref()?.iter().find(|tool| tool.number == number).copied()
     }

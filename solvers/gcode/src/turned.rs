@@ -1,5 +1,4 @@
-//! Places that are not written along the machine's axes: polar words, and coordinates that are turned about Z, by their
-//! work offset or by G68.
+//! Positions in polar words, and in coordinates that are rotated about Z by a work offset or by G68.
 
 use super::block::{bits, g_name, Block, Group, AXIS_WORDS};
 use super::execute::Interpreter;
@@ -8,44 +7,44 @@ use super::modal::turn;
 use super::moves::Point;
 
 impl Interpreter<'_> {
-    /// The end of a move from a place to the block's axis words or polar words.
+    /// The end of a move to the axis words or polar words of a block.
     #[cold]
     pub(super) fn turned_target(&mut self, block: &Block, machine: bool, from: &Point) -> Outcome<Point> {
         let mut target = *from;
         if machine {
-            self.places(block, |axis, value| target[axis] = value)?;
+            self.axis_values(block, |axis, value| target[axis] = value)?;
             self.check_reach(&target)?;
             return Ok(target);
         }
         let offsets = self.state.offsets.clone();
-        let mut place = offsets.to_program(&target);
-        let before = place;
+        let before = offsets.to_program(&target);
+        let mut end = before;
         let absolute = block.code(Group::Distance).map_or(self.state.absolute, |code| code == 900);
         let mut named = [false; 9];
-        self.places(block, |axis, value| {
+        self.axis_values(block, |axis, value| {
             named[axis] = true;
-            place[axis] = value + if absolute { 0.0 } else { before[axis] };
+            end[axis] = value + if absolute { 0.0 } else { before[axis] };
         })?;
         if block.is_polar() {
-            self.polar_words(block, absolute, &before, &mut place)?;
+            self.polar_words(block, absolute, &before, &mut end)?;
         } else if self.state.polar {
             let (u, v) = self.state.plane();
             if !absolute && (named[u] || named[v]) {
                 return fault("G16 and G91 stand together: give polar coordinates in G90");
             }
             let (radius, angle) = (before[u].hypot(before[v]), before[v].atan2(before[u]));
-            let radius = if named[u] { place[u] } else { radius };
-            // A word of the second axis is an angle, whatever the units of length.
-            let angle = if named[v] { (place[v] / self.state.unit()).to_radians() } else { angle };
+            let radius = if named[u] { end[u] } else { radius };
+            // The word of the second axis is an angle, whatever the unit of length.
+            let angle = if named[v] { (end[v] / self.state.unit()).to_radians() } else { angle };
             if named[u] || named[v] {
-                (place[u], place[v]) = (radius * angle.cos(), radius * angle.sin());
+                (end[u], end[v]) = (radius * angle.cos(), radius * angle.sin());
             }
         }
-        let moved = offsets.to_machine(&place);
-        let turned = [0, 1].into_iter().any(|axis| place[axis] != before[axis]);
+        let moved = offsets.to_machine(&end);
+        let turned = end[..2] != before[..2];
         for axis in 0..9 {
-            // Axes that the block does not move stay, without rounding.
-            if place[axis] != before[axis] || (axis < 2 && turned) {
+            // Axes that the block does not move keep their position without rounding.
+            if end[axis] != before[axis] || (axis < 2 && turned) {
                 target[axis] = moved[axis];
             }
         }
@@ -53,8 +52,8 @@ impl Interpreter<'_> {
         Ok(target)
     }
 
-    /// `@` and `^`: radius and angle about the program's zero, added to those of the place before in G91.
-    fn polar_words(&self, block: &Block, absolute: bool, before: &Point, place: &mut Point) -> Outcome<()> {
+    /// `@` and `^`: radius and angle about the program's zero; with G91 they are added to those of `before`.
+    fn polar_words(&self, block: &Block, absolute: bool, before: &Point, end: &mut Point) -> Outcome<()> {
         if block.has(b'X') || block.has(b'Y') {
             return fault("polar words @ and ^ stand beside X or Y: give one of both");
         }
@@ -68,11 +67,11 @@ impl Interpreter<'_> {
         if let Some(word) = block.angle {
             angle = word.to_radians() + if absolute { 0.0 } else { angle };
         }
-        (place[0], place[1]) = (radius * angle.cos(), radius * angle.sin());
+        (end[0], end[1]) = (radius * angle.cos(), radius * angle.sin());
         Ok(())
     }
 
-    /// G68: the program's places turn by R about the place of X and Y, or about where the tool is.
+    /// G68: rotates the program's coordinates by R about X and Y, or about the position of the tool.
     pub(super) fn begin_turn(&mut self, block: &Block) -> Outcome<()> {
         if self.state.normal != 2 {
             return fault("G68 is read in the plane G17: give G17, or post the coordinates as they are cut");
@@ -88,7 +87,7 @@ impl Interpreter<'_> {
         }
         self.end_turn();
         let mut centre = self.state.offsets.to_program(&self.position());
-        self.places(block, |axis, value| centre[axis] = value)?;
+        self.axis_values(block, |axis, value| centre[axis] = value)?;
         let offsets = &mut self.state.offsets;
         offsets.unturned = Some((offsets.shift, offsets.rotation));
         // c + turn(p - c) is turn(p + s) for the shift s = turn(c - turn(c), back).
@@ -112,7 +111,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Refuses codes that change the offsets under G68, as controls do.
+    /// Refuses codes that change the offsets while G68 is on, as controls do.
     pub(super) fn check_turned(&self, block: &Block) -> Outcome<()> {
         if self.state.offsets.unturned.is_none() {
             return Ok(());

@@ -1,7 +1,7 @@
-//! The words of each block, from the bytes of the program.
+//! Reads the words of each block from the bytes of a text.
 //!
-//! One pass, byte by byte, without allocation: letters with their numbers go straight into a `Block`. Line ends
-//! are LF, CR LF or CR. Blanks may stand between words, before a number and after its sign.
+//! One pass over the bytes, without allocation, writes letters with their numbers into a `Block`. Line ends are LF, CR LF
+//! or CR. Blanks may stand between words, before a number and after its sign.
 
 use super::block::{g_name, g_remedy, m_group, Block, MGroup};
 use super::expression::{assignment, excerpt, expression, integer, Values};
@@ -12,45 +12,45 @@ use super::moves::{COMMENT, MESSAGE};
 use super::number::{decimal, spaces};
 use super::parameters::Name;
 
-/// What a line holds.
+/// The content of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Line {
-    /// A block, perhaps without words.
+    /// A block, with or without words.
     Block,
     /// `%`, which opens or ends the program.
     Percent,
-    /// A block after `/`, left out.
+    /// A block after `/` that is left out.
     Deleted,
-    /// A line of program flow, whose O is at that place.
+    /// A line of program flow whose first letter is at that place.
     Flow(usize),
 }
 
-/// Where the reader stands in a text.
+/// A text, and the place up to which it has been read.
 pub struct Lexer<'a> {
     source: &'a [u8],
     pub at: usize,
     /// 1-based line of the block that was read last.
     pub line: u32,
-    /// What the block that was read last assigns.
+    /// The assignments of that block.
     pub assigned: Vec<(Name, f64)>,
-    /// Messages and comments of that block, by letters.
+    /// The messages and comments of that block, with their letters.
     pub remarks: Vec<(u8, String)>,
+    /// Blocks after `/` are left out.
     delete: bool,
-    /// What lengths and angles without a decimal point count.
+    /// The unit of lengths and angles without a decimal point, in units of the program.
     whole_step: f64,
-    /// Set once a block with words was read: what opens a program may not stand after it.
+    /// True after the first block with words: nothing may open a program any more.
     pub begun: bool,
 }
 
-/// Some old editors end a file with this byte.
+/// The last byte of a file of some old editors.
 const END_OF_FILE: u8 = 0x1a;
 
-/// M codes whose rest of the line is a text for the operator, on 3-D printers.
+/// M codes of 3-D printers after which the rest of the line is a text for the operator.
 const TEXT_CODES: [f64; 2] = [117.0, 118.0];
 
 impl<'a> Lexer<'a> {
-    /// At the start of a text; `delete`: blocks after `/` are left out; `whole_step`: what lengths and angles without
-    /// a decimal point count.
+    /// At the start of a text.
     pub fn new(source: &'a [u8], delete: bool, whole_step: f64) -> Self {
         let at = if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         Self {
@@ -65,12 +65,12 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// Goes on at a place, which is in the line after `line`.
+    /// Goes to a place in the line after `line`.
     pub fn jump(&mut self, at: usize, line: u32) {
         (self.at, self.line, self.begun) = (at, line, true);
     }
 
-    /// True where nothing but blanks, comments and `%` is left.
+    /// True where only blanks, comments and `%` are left.
     pub fn is_spent(&self) -> bool {
         let mut at = self.at;
         while let Some(&byte) = self.source.get(at) {
@@ -102,7 +102,7 @@ impl<'a> Lexer<'a> {
         block.clear();
         let mut at = self.at;
         let mut first = true;
-        // Set by an M code that begins a block and is not known: the words after it are its own.
+        // The M code of unknown meaning that begins the block: the words after it belong to it.
         let mut owner = 0;
         loop {
             let byte = self.byte(at);
@@ -217,7 +217,7 @@ impl<'a> Lexer<'a> {
         Ok(Some(Line::Block))
     }
 
-    /// A comment; none where it is empty.
+    /// Keeps a comment that is not empty.
     #[cold]
     fn remark(&mut self, text: &[u8]) {
         let text = text_of(text);
@@ -226,7 +226,7 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// The value of a word from `at` to `end`, on a control where a number without a point counts its own steps.
+    /// The value of a word from `at` to `end`, on a control where a number without a point has the unit `whole_step`.
     #[cold]
     fn stepped(&self, value: f64, at: usize, end: usize) -> f64 {
         let whole = !self.source[at..end].contains(&b'.');
@@ -234,7 +234,7 @@ impl<'a> Lexer<'a> {
         value * if whole && length { self.whole_step } else { 1.0 }
     }
 
-    /// The byte at `at`; past the end, a line end.
+    /// The byte at `at`; a line end behind the text.
     #[inline(always)]
     fn byte(&self, at: usize) -> u8 {
         self.source.get(at).copied().unwrap_or(b'\n')
@@ -243,7 +243,7 @@ impl<'a> Lexer<'a> {
     #[inline(always)]
     fn g_word(&self, value: f64, at: usize, end: usize, block: &mut Block) -> Outcome<()> {
         let tenths = value * 10.0;
-        // Negative and huge values saturate and are in no group.
+        // The conversion saturates negative and huge values, which are in no group.
         let code = (tenths + 0.5) as u16;
         if (tenths - f64::from(code)).abs() > 1e-3 {
             return self.unknown_word(at, end, None);
@@ -300,7 +300,7 @@ impl<'a> Lexer<'a> {
         Ok(())
     }
 
-    /// A line of program flow begins at `at`.
+    /// The line of program flow that begins at `at`.
     #[cold]
     fn flow(&mut self, at: usize, first: bool) -> Outcome<Option<Line>> {
         if !first {
@@ -313,7 +313,7 @@ impl<'a> Lexer<'a> {
         Ok(Some(Line::Flow(at)))
     }
 
-    /// The value of a word that has no plain number.
+    /// The value of a word without a plain number.
     #[cold]
     fn value(&self, at: usize, values: &dyn Values) -> Outcome<(f64, usize)> {
         if let Some(value) = expression(self.source, at + 1, values)? {
@@ -352,7 +352,7 @@ impl<'a> Lexer<'a> {
         Ok(found.filter(|(value, _)| !value.is_nan()))
     }
 
-    /// True where the E at `at` stands right behind a digit; extruders' words stand behind a blank.
+    /// True where the E at `at` follows a digit; the word of an extruder follows a blank.
     fn is_exponent(&self, at: usize) -> bool {
         at > 0 && self.source[at - 1].is_ascii_digit()
     }
@@ -374,7 +374,7 @@ impl<'a> Lexer<'a> {
         ))
     }
 
-    /// A character that starts no word.
+    /// Refuses a character that begins no word.
     #[cold]
     fn stray<T>(&self, at: usize) -> Outcome<T> {
         let remedy = match self.byte(at) {
@@ -390,7 +390,7 @@ impl<'a> Lexer<'a> {
         foreign(format!("{} is not understood: {remedy}", excerpt(self.source, at)))
     }
 
-    /// Past the comment that starts at `at`.
+    /// The place after the comment that begins at `at`.
     fn comment(&self, at: usize) -> Outcome<usize> {
         let rest = &self.source[at + 1..];
         let end = rest.iter().position(|byte| matches!(byte, b'(' | b')' | b'\n' | b'\r'));
@@ -407,7 +407,7 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// A line of its own with `%`; controls take what stands behind it as a comment.
+    /// Reads a line with `%`; text behind it is a comment, as on controls.
     #[cold]
     fn percent(&mut self, start: usize) -> Outcome<()> {
         if self.source[start..].starts_with(b"%_N_") {
@@ -424,14 +424,10 @@ impl<'a> Lexer<'a> {
 
 /// True where the block does not have that polar word yet.
 fn polar_word(byte: u8, block: &Block) -> bool {
-    if byte == b'@' {
-        block.radius.is_none()
-    } else {
-        block.angle.is_none()
-    }
+    (if byte == b'@' { block.radius } else { block.angle }).is_none()
 }
 
-/// What begins a comment that is a message, in LinuxCNC.
+/// The words that begin a comment which is a message, in LinuxCNC.
 const MESSAGES: [&[u8]; 4] = [b"MSG", b"DEBUG", b"PRINT", b"LOG"];
 
 /// The text of a comment that is a message.
@@ -448,7 +444,7 @@ fn text_of(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).trim().to_string()
 }
 
-/// The integer of a word that counts something, from `least` on.
+/// The integer that a word gives, at least `least`; None where the block has no such word.
 pub fn count(block: &Block, letter: u8, least: i64, what: &str) -> Outcome<Option<u32>> {
     let Some(value) = block.get(letter) else { return Ok(None) };
     match integer(value) {

@@ -1,51 +1,40 @@
-//! How far stand-ins for q'' may be off on parts of pieces.
+//! The error that the stand-ins of q'' may have on a part of a piece, from the limits of the machine and the feed.
 //!
-//! An axis's acceleration is to be met within a share of its limit at every speed that the other limits allow, positions
-//! far below what any scale reads, and the squares of the tool's speeds that are no polynomials by interpolation.
+//! Three things must be met within their tolerances: the acceleration of each joint, at every speed that the other limits
+//! allow; the positions; and the squares of the tool's speeds that are interpolated.
 
 use super::expression::Table;
 use super::path_derivatives::PointWork;
 use super::tip::{Polygons, Tips};
+use super::tolerance::{ACCELERATION, MARGIN, POSITION, ROUNDING, SAMPLES, SPEED_NOISE};
 
-/// Part of an acceleration limit by which the stand-ins may be off.
-const SHARE: f64 = 1e-9;
-/// How far positions may be off, in mm or degrees.
-const POSITION: f64 = 1e-9;
-/// What rounding leaves of q'', as a part of itself.
-const ROUNDING: f64 = 1e-13;
-/// Of the greatest square of a speed of a piece: what rounding leaves of it elsewhere.
-const SPEED_NOISE: f64 = 1e-12;
-/// Places of a part at which the greatest possible u̇² is estimated, and how many times more it may be.
-const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
-const MARGIN: f64 = 4.0;
-
-/// How far q'' may be off.
+/// The error that q'' may have.
 #[derive(Clone)]
 pub enum Tolerance<'a> {
-    /// By so much for each joint.
+    /// This for each joint.
     Given(&'a [f64]),
-    /// By what the limits of a machine allow.
+    /// What the limits of a machine allow.
     Limited(Box<Accuracy<'a>>),
 }
 
 /// Limits of the joints, the feed, and the squares of speeds that must be met.
 #[derive(Clone)]
 pub struct Accuracy<'a> {
-    /// Of each joint: the lesser limit of both directions.
+    /// For each joint the lesser limit of both directions.
     pub acceleration: &'a [f64],
-    /// Of each joint: least and greatest.
+    /// For each joint the least and the greatest velocity.
     pub velocity: [&'a [f64]; 2],
-    /// Of each piece, in mm/s.
+    /// For each piece, in mm/s.
     pub feed: &'a [f64],
-    /// The tool in X, Y, Z, and which pieces move it there.
+    /// The tool in X, Y, Z, and true for the pieces that move it there.
     pub linear: Motion<'a>,
     pub moves: &'a [bool],
     pub squares: Vec<Square<'a>>,
     pub speed_nodes: SpeedNodes<'a>,
 }
 
-/// Where squares of speeds are interpolated, in [0, 1]; the places between, where they are compared; the matrix from values
-/// at the first to those at the second, row by row; and the share of them that they may be off by.
+/// Interpolation of squares of speeds: the nodes in [0, 1]; the points between them where the interpolant is compared; the
+/// matrix from the values at the nodes to those at the points, row by row; and the relative error that is allowed.
 #[derive(Clone, Copy)]
 pub struct SpeedNodes<'a> {
     pub at: &'a [f64],
@@ -54,18 +43,18 @@ pub struct SpeedNodes<'a> {
     pub share: f64,
 }
 
-/// The square of a speed by u that is interpolated on some pieces: |C'|², or that of the rate in degrees at which a
-/// direction of any length turns.
+/// The square of a speed by u that is interpolated on some pieces: |C'|², or the square of the rate, in degrees, at which
+/// the direction of a vector turns.
 #[derive(Clone)]
 pub struct Square<'a> {
     pub motion: Motion<'a>,
     pub turning: bool,
     pub pieces: &'a [bool],
-    /// About the greatest on the last piece that was asked for.
+    /// A piece, and about the greatest value on it; kept for the parts of that piece.
     pub greatest: Option<(usize, f64)>,
 }
 
-/// Place and slope of curves of any axes.
+/// Position and slope of curves with any number of axes.
 pub struct Motion<'a> {
     tips: Tips<'a>,
     polygons: Polygons<f64>,
@@ -87,7 +76,7 @@ impl<'a> Motion<'a> {
         (0..self.tips.axes).map(|axis| self.table.input(axis)[1].powi(2)).sum()
     }
 
-    /// The square of the rate at which a direction turns, in degrees by u.
+    /// The square of the rate at which the direction of a vector turns, in degrees by u.
     fn turning_sq(&mut self, piece: usize, fraction: f64) -> f64 {
         self.at(piece, fraction);
         let [d, s] = [0, 1].map(|order| [0, 1, 2].map(|axis| self.table.input(axis)[order]));
@@ -104,7 +93,7 @@ impl Clone for Motion<'_> {
 }
 
 impl Tolerance<'_> {
-    /// How far q'' of each joint may be off on a part; 0 where the square of a speed would not be met.
+    /// The error that q'' of each joint may have on a part; 0 where the square of a speed is not met.
     pub fn allowed(&mut self, points: &mut PointWork, piece: usize, part: [f64; 2], allowed: &mut [f64]) {
         match self {
             Tolerance::Given(tolerance) => allowed.copy_from_slice(tolerance),
@@ -123,7 +112,7 @@ impl Accuracy<'_> {
         // About the greatest u̇² that feed and joint velocities allow, and |q''| as `allowed`.
         let mut greatest = 0.0f64;
         allowed.fill(0.0);
-        for t in PLACES {
+        for t in SAMPLES {
             let fraction = part[0] + t * (part[1] - part[0]);
             points.at(piece, fraction);
             let mut rate = f64::INFINITY;
@@ -144,8 +133,9 @@ impl Accuracy<'_> {
         let rate_sq = MARGIN * if greatest > 0.0 { greatest } else { 1.0 };
         let length = points.width(piece) * (part[1] - part[0]);
         for (joint, allowed) in allowed.iter_mut().enumerate() {
-            let wanted = (SHARE * self.acceleration[joint] / rate_sq).min(POSITION / (length * length));
-            // Near a cusp u̇² has no bound that would help; no stand-in is nearer than rounding.
+            let wanted =
+                (ACCELERATION * self.acceleration[joint] / rate_sq).min(POSITION / (length * length));
+            // Near a cusp u̇² is not bounded, and no stand-in is better than rounding.
             *allowed = wanted.max(ROUNDING * *allowed);
         }
     }
@@ -160,7 +150,7 @@ impl Square<'_> {
         }
     }
 
-    /// Whether it is met halfway between the nodes of a part, where interpolation is off the most.
+    /// True where the interpolant on a part is met between its nodes, where its error is greatest.
     fn is_met(&mut self, piece: usize, part: [f64; 2], nodes: SpeedNodes) -> bool {
         if !self.pieces[piece] {
             return true;
@@ -168,7 +158,7 @@ impl Square<'_> {
         let mut along = |t: f64| self.at(piece, part[0] + t * (part[1] - part[0]));
         let found: Vec<f64> = nodes.at.iter().map(|&t| along(t)).collect();
         let truth: Vec<f64> = nodes.between.iter().map(|&t| along(t)).collect();
-        // In a near cusp the speed is rounding, and no limit of the feed.
+        // Near a cusp the speed is nothing but rounding, and the feed does not limit it.
         let floor = SPEED_NOISE * self.greatest(piece, nodes.at);
         let rows = nodes.interpolation.chunks_exact(found.len());
         rows.zip(truth).all(|(row, truth)| {
@@ -177,7 +167,7 @@ impl Square<'_> {
         })
     }
 
-    /// About the greatest on a piece.
+    /// About the greatest value on a piece.
     fn greatest(&mut self, piece: usize, nodes: &[f64]) -> f64 {
         match self.greatest {
             Some((known, value)) if known == piece => value,

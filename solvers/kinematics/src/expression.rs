@@ -1,9 +1,9 @@
-//! A formula as a list of operations, each on the results of earlier ones, and its evaluation.
+//! A formula as a list of operations on earlier results, and its evaluation on series of numbers or of intervals.
 
 use super::number::Number;
 use super::series::{self, MOST_ORDER};
 
-/// One operation: operands are places of earlier results, where the inputs come first.
+/// One operation. An operand is the index of an earlier result; the inputs are the first results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Operation {
     Constant(f64),
@@ -18,11 +18,11 @@ pub enum Operation {
     Scale(usize, f64),
     Square(usize),
     Root(usize),
-    /// The sine of an angle in radians; the cosine of the same angle comes next.
+    /// The sine of an angle in radians; the next operation is the cosine of the same angle.
     Sine(usize),
-    /// Comes after the sine, which computes both.
+    /// Follows a sine, which computes both.
     Cosine,
-    /// The angle of the vector (second, first).
+    /// The angle in radians of a vector, from its y and its x.
     Angle(usize, usize),
     Radians(usize),
     Degrees(usize),
@@ -37,12 +37,12 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// From its flat form: a row (code, first operand, second operand) and a constant for each operation. None where
-    /// an operand is not an earlier result, or a code is none.
+    /// From a row (code, first operand, second operand) and a constant for each operation. None where an operand is not an
+    /// earlier result, or a code is not known.
     pub fn new(inputs: usize, rows: &[[i32; 3]], constants: &[f64], outputs: &[i32]) -> Option<Self> {
         let mut operations = Vec::with_capacity(rows.len());
         for (i, (row, &constant)) in rows.iter().zip(constants).enumerate() {
-            let earlier = |operand: i32| usize::try_from(operand).ok().filter(|&place| place < inputs + i);
+            let earlier = |operand: i32| usize::try_from(operand).ok().filter(|&index| index < inputs + i);
             let (a, b) = (row[1], row[2]);
             operations.push(match row[0] {
                 0 => Operation::Constant(constant),
@@ -68,7 +68,7 @@ impl Expression {
         let paired =
             (0..operations.len()).all(|i| !matches!(operations[i], Operation::Sine(_)) || followed(i));
         let outputs: Option<Vec<usize>> =
-            outputs.iter().map(|&place| usize::try_from(place).ok().filter(|&place| place < count)).collect();
+            outputs.iter().map(|&index| usize::try_from(index).ok().filter(|&index| index < count)).collect();
         let good = paired && rows.len() == constants.len();
         outputs.filter(|_| good).map(|outputs| Self { inputs, operations, outputs })
     }
@@ -94,7 +94,7 @@ impl Expression {
         for (i, &operation) in self.operations.iter().enumerate() {
             let (earlier, later) = table.values.split_at_mut((self.inputs + i) * n);
             let out = &mut later[..n];
-            let of = |place: usize| &earlier[place * n..][..n];
+            let of = |index: usize| &earlier[index * n..][..n];
             match operation {
                 Operation::Constant(value) => {
                     out.fill(T::exactly(0.0));
@@ -138,9 +138,9 @@ pub struct Table<T> {
 }
 
 impl<T: Number> Table<T> {
-    pub fn new(places: usize, order: usize) -> Self {
+    pub fn new(results: usize, order: usize) -> Self {
         assert!(order <= MOST_ORDER, "order {order} of a series");
-        Self { terms: order + 1, values: vec![T::exactly(0.0); places * (order + 1)] }
+        Self { terms: order + 1, values: vec![T::exactly(0.0); results * (order + 1)] }
     }
 
     /// The series of an input.

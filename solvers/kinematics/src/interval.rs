@@ -1,28 +1,23 @@
 //! Intervals [lo, hi], rounded outward: every result contains the exact one.
 //!
-//! Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009); Tucker, Validated Numerics (2011). Rounding
-//! outward is done by subtracting |lo| ε and adding |hi| ε, ε = 2⁻⁵², which is at least one unit in the last place where
-//! an operation is wrong by half a unit at most; it is cheaper than switching the rounding mode. A result that is not
-//! defined (0 in a divisor, the angle of a box that holds the origin) is the whole line: the caller sees an unbounded
-//! interval and cuts it smaller.
+//! Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009); Tucker, Validated Numerics (2011). An operation
+//! has an error of at most half a unit in the last place. Outward rounding subtracts |lo| ε and adds |hi| ε, ε = 2⁻⁵²,
+//! which is at least one unit; it costs less than a change of the rounding mode. A result that is not defined (a divisor
+//! with 0 in it, the angle of a box with the origin in it) is the whole line: the caller sees an unbounded interval and
+//! cuts the part smaller.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::number::Number;
+use super::tolerance::{ELEMENTARY_ULPS, STRAIGHT, UNDERFLOW};
 
 const EPSILON: f64 = f64::EPSILON;
-/// More than the absolute error of any product that underflows: 2⁻¹⁰⁷².
-const TINY: f64 = f64::from_bits(4);
-/// Units in the last place that sine, cosine and arc tangent may be wrong by; libraries promise less than 4.
-const ELEMENTARY_ULPS: f64 = 8.0;
-/// An angle this near π: which way round a box lies is not certain. Far above the rounding of a difference of angles.
-const STRAIGHT: f64 = PI - 1e-9;
-/// π/180 and 180/π between neighbouring numbers.
+/// π/180 and 180/π between neighbouring floating-point numbers.
 const RADIAN: Interval = Interval { lo: 0.017453292519943295, hi: 0.0174532925199433 };
 const DEGREE: Interval = Interval { lo: 57.295779513082316, hi: 57.29577951308232 };
 
-/// lo ≤ hi.
+/// All numbers from lo to hi, lo ≤ hi.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     pub lo: f64,
@@ -32,12 +27,12 @@ pub struct Interval {
 impl Interval {
     pub const WHOLE: Interval = Interval { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
-    /// Whether both ends are finite.
+    /// True where both ends are finite.
     pub fn is_bounded(self) -> bool {
         self.lo.is_finite() && self.hi.is_finite()
     }
 
-    /// hi − lo; infinite where an end is.
+    /// hi − lo; infinite where an end is infinite.
     pub fn width(self) -> f64 {
         let width = self.hi - self.lo;
         if width.is_nan() {
@@ -52,7 +47,7 @@ impl Interval {
         self.lo.abs().max(self.hi.abs())
     }
 
-    /// A number inside, about half way; not a number where unbounded on both sides.
+    /// About the middle, inside; NaN where the interval is unbounded on both sides.
     pub fn middle(self) -> f64 {
         0.5 * self.lo + 0.5 * self.hi
     }
@@ -62,12 +57,12 @@ impl Interval {
         Interval { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// What is in both; both are known to hold the same number.
+    /// The numbers in both intervals, which are known to hold the same number.
     pub fn meet(self, other: Interval) -> Interval {
         Interval { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
     }
 
-    /// Rounded outward by `ulps` units in the last place; what is not a number becomes the whole line.
+    /// Rounded outward by `ulps` units in the last place; the whole line where an end is NaN.
     #[inline]
     fn rounded(lo: f64, hi: f64, ulps: f64, tiny: f64) -> Interval {
         let lo = lo - (lo.abs() * (ulps * EPSILON) + tiny);
@@ -79,8 +74,8 @@ impl Interval {
         }
     }
 
-    /// The least and the greatest product of both ends, not yet rounded outward; and their sum, which is not a number where
-    /// one of them is none (0 times infinity) or the result is the whole line.
+    /// The least and the greatest product of both ends, not yet rounded outward, and the sum of all four, which is NaN
+    /// where one is NaN (0 times infinity) or where the result is the whole line.
     #[inline(always)]
     fn products(self, other: Interval) -> (f64, f64, f64) {
         let (a, b) = (self.lo * other.lo, self.lo * other.hi);
@@ -93,17 +88,17 @@ impl Interval {
         if self.lo <= 0.0 && self.hi >= 0.0 {
             Interval::WHOLE
         } else {
-            Interval::rounded(1.0 / self.hi, 1.0 / self.lo, 1.0, TINY)
+            Interval::rounded(1.0 / self.hi, 1.0 / self.lo, 1.0, UNDERFLOW)
         }
     }
 
-    /// A sine wave whose crests are at `crest` + whole turns, with these values at both ends.
+    /// The range of a sine wave with its crests at `crest` + whole turns, and with these values at both ends.
     fn wave(self, crest: f64, at_lo: f64, at_hi: f64) -> Interval {
         if !self.is_bounded() {
             return Interval { lo: -1.0, hi: 1.0 };
         }
-        let found = Interval::rounded(at_lo.min(at_hi), at_lo.max(at_hi), ELEMENTARY_ULPS, TINY);
-        // Turns, widened by more than their rounding: a crest taken in by mistake only costs width.
+        let found = Interval::rounded(at_lo.min(at_hi), at_lo.max(at_hi), ELEMENTARY_ULPS, UNDERFLOW);
+        // The angles in turns, widened by more than their rounding: a crest that is counted by mistake costs only width.
         let [first, last] = [self.lo, self.hi].map(|angle| angle / TAU - crest);
         let slack = 4.0 * EPSILON * (1.0 + first.abs().max(last.abs()));
         let (first, last) = (first - slack, last + slack);
@@ -152,7 +147,7 @@ impl Mul for Interval {
         if sum.is_nan() {
             return Interval::WHOLE;
         }
-        Interval::rounded(lo, hi, 1.0, TINY)
+        Interval::rounded(lo, hi, 1.0, UNDERFLOW)
     }
 }
 
@@ -178,7 +173,7 @@ impl Number for Interval {
         let (low, high) = (self.lo.abs(), self.hi.abs());
         let least = if self.lo <= 0.0 && self.hi >= 0.0 { 0.0 } else { low.min(high) };
         let most = low.max(high);
-        let found = Interval::rounded(least * least, most * most, 1.0, TINY);
+        let found = Interval::rounded(least * least, most * most, 1.0, UNDERFLOW);
         Interval { lo: found.lo.max(0.0), hi: found.hi }
     }
 
@@ -192,10 +187,10 @@ impl Number for Interval {
         (self.wave(0.25, sine_lo, sine_hi), self.wave(0.0, cosine_lo, cosine_hi))
     }
 
-    /// The angle of the box x × y as seen from the origin, continuous over the whole box.
+    /// The angle at the origin of all points of the box x × y, continuous over the box.
     ///
-    /// The middle of the box has its angle in (−π, π]; the ends may lie beyond. A box without the origin is seen under
-    /// less than π, between two of its corners.
+    /// The angle of the middle of the box is in (−π, π]; the ends may be outside. The angles of a box without the origin
+    /// span less than π, from one of its corners to another.
     fn atan2(y: Self, x: Self) -> Self {
         if x.lo <= 0.0 && x.hi >= 0.0 && y.lo <= 0.0 && y.hi >= 0.0 {
             return Interval::WHOLE;
@@ -222,9 +217,9 @@ impl Number for Interval {
         self * DEGREE
     }
 
-    /// With one rounding bound for the whole sum: products and a sum of n terms in any order are wrong by n u Σ|products|
-    /// at most to first order, u = ε/2 (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.1); twice
-    /// that covers the rest.
+    /// With one rounding bound for the whole sum: n products and their sum in any order have an error of at most
+    /// n u Σ|products| to first order, u = ε/2 (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section
+    /// 3.1); twice that covers the higher orders.
     fn dot(pairs: impl Iterator<Item = (Self, Self)>) -> Self {
         let (mut lo, mut hi, mut size, mut sum, mut terms) = (0.0, 0.0, 0.0, 0.0, 2.0);
         for (a, b) in pairs {
@@ -238,12 +233,12 @@ impl Number for Interval {
         if sum.is_nan() {
             return Interval::WHOLE;
         }
-        let pad = terms * EPSILON * size + terms * TINY;
+        let pad = terms * EPSILON * size + terms * UNDERFLOW;
         Interval::rounded(lo - pad, hi + pad, 1.0, 0.0)
     }
 }
 
-/// The lesser of two numbers, in one instruction: neither is none, or it does not matter.
+/// The lesser of two numbers, in one instruction; any of both where one is NaN.
 #[inline(always)]
 fn less(a: f64, b: f64) -> f64 {
     if a < b {
@@ -253,7 +248,7 @@ fn less(a: f64, b: f64) -> f64 {
     }
 }
 
-/// The greater one, likewise.
+/// The greater of two numbers, likewise.
 #[inline(always)]
 fn greater(a: f64, b: f64) -> f64 {
     if a > b {

@@ -1,20 +1,21 @@
-//! Polynomials that stand in for a joint's motion q'(u), with a proven distance from it.
+//! The stand-ins of joint motion: polynomials for q'(u), with a proven bound of their error.
 //!
 //! q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
 //! c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u, by the interpolation error formula
 //! ```text
 //! |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
 //! ```
-//! so a joint's acceleration q' s + q'' p is met within ε₁ |s| + ε₂ p. q'' is fitted rather than q', because differentiating a
-//! fit loses n² of its accuracy. Parts are halved until ε₂ is small enough. What rounding adds is not in ε: some 1e-14 of the
-//! largest |q''| of the part.
+//! so a joint's acceleration q' s + q'' p is met within ε₁ |s| + ε₂ p. q'' is interpolated rather than q', because the
+//! derivative of an interpolant has an error n² times as large. Parts are halved until ε₂ is small enough. Rounding, which
+//! is not in ε, adds some 1e-14 of the largest |q''| of the part.
 
 use rayon::prelude::*;
 
 use super::accuracy::Tolerance;
 use super::path_derivatives::{Machine, PartWork, PointWork, BLOCK};
-use super::singularities::{halves, DEEPEST, STRETCH_DEPTH, STRETCH_PARTS};
+use super::singularities::halves;
 use super::tip::Tips;
+use super::tolerance::{DEEPEST, INTERVAL_DEPTH, INTERVAL_PARTS};
 
 /// Interpolants on parts, in order of the path.
 #[derive(Debug, Default)]
@@ -22,13 +23,13 @@ pub struct Interpolants {
     pub piece: Vec<usize>,
     /// Fractions of the pieces.
     pub part: Vec<[f64; 2]>,
-    /// Bernstein coefficients of q', degree n: part by part, coefficient by coefficient, joint by joint.
+    /// Bernstein coefficients of q', of degree n: part by part, coefficient by coefficient, joint by joint.
     pub slope: Vec<f64>,
-    /// ε₂, part by part, joint by joint; infinite on parts that could not be made small enough.
+    /// ε₂, part by part, joint by joint; infinite on parts near a singular place.
     pub curvature_error: Vec<f64>,
 }
 
-/// Where q'' is interpolated, in [0, 1], and the matrix from values there to Bernstein coefficients, row by row.
+/// The nodes in [0, 1] where q'' is interpolated, and the matrix from values there to Bernstein coefficients, row by row.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
     pub at: &'a [f64],
@@ -55,13 +56,14 @@ pub fn interpolants(machine: Machine, tips: Tips, nodes: Nodes, tolerance: &Tole
             found
         })
         .collect();
-    blocks.into_iter().fold(Interpolants::default(), |mut all, some| {
-        all.piece.extend(some.piece);
-        all.part.extend(some.part);
-        all.slope.extend(some.slope);
-        all.curvature_error.extend(some.curvature_error);
-        all
-    })
+    let mut all = Interpolants::default();
+    for block in blocks {
+        all.piece.extend(block.piece);
+        all.part.extend(block.part);
+        all.slope.extend(block.slope);
+        all.curvature_error.extend(block.curvature_error);
+    }
+    all
 }
 
 struct Work<'a> {
@@ -98,10 +100,10 @@ impl Work<'_> {
                     left.push((part, is_unbounded));
                 }
             }
-            let is_stretch = unbounded > STRETCH_PARTS && depth >= STRETCH_DEPTH;
+            let singular = unbounded > INTERVAL_PARTS && depth >= INTERVAL_DEPTH;
             open = Vec::new();
             for (part, is_unbounded) in left {
-                if (is_unbounded && is_stretch) || depth == DEEPEST {
+                if (is_unbounded && singular) || depth == DEEPEST {
                     done.push((part, vec![f64::INFINITY; joints]));
                 } else {
                     open.extend(halves(part));
@@ -120,7 +122,7 @@ impl Work<'_> {
         }
     }
 
-    /// Adds the Bernstein coefficients of q': q'' through its values at the nodes, integrated.
+    /// Adds the Bernstein coefficients of q', the integral of the polynomial through the values of q'' at the nodes.
     fn slopes(&mut self, piece: usize, part: [f64; 2], slope: &mut Vec<f64>) {
         let (joints, nodes) = (self.machine.joints.outputs(), self.nodes.at.len());
         let length = part[1] - part[0];

@@ -1,8 +1,16 @@
-//! Machines whose joints follow the tool's tip: q = K(P), with K as a recorded list of operations.
+//! The motion of joints that follow the tool's tip, q = K(P), from the recorded operations of K and the path of the tip.
 //!
-//! The list is evaluated on numbers and on intervals, each as Taylor series in a path's parameter: positions, exact
-//! derivatives at points, proven bounds over pieces. From these: the joints along a whole path with the places that
-//! they cannot pass, and polynomials that stand in for their motion with a proven distance from it.
+//! Sources: Griewank and Walther, Evaluating Derivatives (2008); Moore, Kearfott and Cloud, Introduction to Interval
+//! Analysis (2009).
+//!
+//! | file | what it computes |
+//! |---|---|
+//! | `expression` | K on series of numbers or of intervals (`number`, `interval`, `series`) |
+//! | `tip` | Taylor series of the tip's path, at a point or over a part of a piece |
+//! | `path_derivatives` | joint positions and derivatives at points, and proven bounds of them over parts |
+//! | `singularities` | the joints along a whole path, the places that they cannot pass, the ends of their travel |
+//! | `joint_interpolants` | polynomials that stand in for joint motion, with a proven error (`accuracy`) |
+//! | `tolerance` | every tolerance, with its reason |
 
 pub mod accuracy;
 pub mod expression;
@@ -13,3 +21,4 @@ pub mod path_derivatives;
 pub mod series;
 pub mod singularities;
 pub mod tip;
+mod tolerance;

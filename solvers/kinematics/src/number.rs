@@ -1,4 +1,4 @@
-//! What the coefficients of a series may be: numbers, or intervals that hold them.
+//! The coefficients of a series: numbers, or intervals that hold them.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,9 +1,9 @@
-//! Joint motion along polynomial pieces of a tip path: exact derivatives at points, proven bounds over parts.
+//! Joint motion along the pieces of a tip path: exact derivatives at points, proven bounds over parts.
 //!
-//! An enclosure is drawn together by Taylor's theorem about the middle of the part, which makes all orders below the
-//! highest nearly as narrow as the range:
+//! The series t_k over a part bounds each coefficient alone. Taylor's theorem about the middle u_m of the part makes the
+//! bounds of all orders below the highest, m, nearly as narrow as the range:
 //! ```text
-//! t_k(u) ∈ Σ_{j<m−k} C(k+j, j) t_{k+j}(u_m) [−r, r]^j + C(m, k) T_m [−r, r]^{m−k},   r half the width
+//! t_k(u) ∈ Σ_{j<m−k} C(k+j, j) t_{k+j}(u_m) [−r, r]^j + C(m, k) T_m [−r, r]^{m−k},   T_m ∋ t_m, r half the width
 //! ```
 
 use rayon::prelude::*;
@@ -16,10 +16,10 @@ use super::tip::{binomial, Polygons, Tips};
 
 pub const TURN: f64 = 360.0;
 const HALF_TURN: f64 = 180.0;
-/// Places or pieces that one thread does at a time.
+/// The number of points or pieces that one thread takes at a time.
 pub const BLOCK: usize = 64;
 
-/// A machine: joints by tip coordinates, and which of them are known up to whole turns only.
+/// A machine: its joints by tip coordinates, and true for joints that are angles, known up to whole turns.
 #[derive(Clone, Copy)]
 pub struct Machine<'a> {
     pub joints: &'a Expression,
@@ -58,9 +58,9 @@ impl<'a> PointWork<'a> {
     }
 }
 
-/// q, q', …, q^(order) at a fraction of each piece: place by place, order by order, joint by joint.
+/// q, q', …, q^(order) at a fraction of each piece: piece by piece, order by order, joint by joint.
 ///
-/// Exact but for rounding; not finite where K is singular.
+/// Exact to rounding; not finite where K is singular.
 pub fn derivatives(machine: Machine, tips: Tips, fraction: &[f64], order: usize) -> Vec<f64> {
     let joints = machine.joints.outputs();
     let row = joints * (order + 1);
@@ -118,8 +118,8 @@ impl<'a> PartWork<'a> {
 
     /// Bounds of q^(k)/k! of all joints over a part: order by order, joint by joint.
     ///
-    /// A coefficient is unbounded where K is singular on the part, or too near to singular to tell: cut the part smaller.
-    /// Angles known up to whole turns are continuous over the part, whichever turn they are on.
+    /// A coefficient is unbounded where K is singular on the part, or where the part is too long to exclude it. Angles are
+    /// continuous over the part, on any turn.
     pub fn enclose(&mut self, piece: usize, part: [f64; 2], result: &mut [Interval]) {
         let expression = self.machine.joints;
         for (middle, table) in [(false, &mut self.whole), (true, &mut self.middle)] {
@@ -134,16 +134,16 @@ impl<'a> PartWork<'a> {
             let (whole, middle) =
                 (expression.output(&self.whole, joint), expression.output(&self.middle, joint));
             for k in 0..=self.order {
-                let drawn = drawn_together(whole, middle, &powers, k, self.machine.turning[joint]);
-                result[k * joints + joint] = drawn;
+                result[k * joints + joint] = narrowed(whole, middle, &powers, k, self.machine.turning[joint]);
             }
         }
     }
 
-    /// c ≥ |q^(n+2)|/(n + 1)! of all joints over a part, n + 2 the order; infinite where the part must be cut smaller.
+    /// c ≥ |q^(n+2)|/(n + 1)! of all joints over a part, where n + 2 is the order; infinite where K may be singular on the
+    /// part.
     ///
-    /// The direct enclosure is used: drawing the highest order together would take orders above it, at twice the cost for
-    /// a third fewer parts.
+    /// From the series over the part alone: Taylor's theorem would need higher orders, at twice the cost for a third fewer
+    /// parts.
     pub fn constants(&mut self, piece: usize, part: [f64; 2], result: &mut [f64]) {
         let expression = self.machine.joints;
         self.tips.over_part(piece, part, false, &mut self.polygons, &mut self.whole);
@@ -201,8 +201,8 @@ fn powers(radius: f64, order: usize) -> [Interval; MOST_ORDER + 1] {
     powers
 }
 
-/// What both the direct enclosure and Taylor's theorem about the middle allow.
-fn drawn_together(
+/// The bound of coefficient k by both the series over the part and Taylor's theorem about its middle.
+fn narrowed(
     whole: &[Interval],
     middle: &[Interval],
     powers: &[Interval],
@@ -220,7 +220,7 @@ fn drawn_together(
     whole[k].meet(value)
 }
 
-/// An angle moved by whole turns onto the turn of `like`; unbounded where both are too wide to tell.
+/// An angle moved by whole turns to the turn of `like`; unbounded where the widths leave the turn open.
 fn on_turn_of(value: Interval, like: Interval) -> Interval {
     if value.width() + like.width() >= 2.0 * HALF_TURN {
         return Interval::WHOLE;
@@ -228,7 +228,7 @@ fn on_turn_of(value: Interval, like: Interval) -> Interval {
     value + Interval::exactly(turns_between(like.middle() - value.middle()) * TURN)
 }
 
-/// Whole turns in a difference of angles; none where it is not a number.
+/// The number of whole turns in a difference of angles; 0 where it is not finite.
 pub fn turns_between(difference: f64) -> f64 {
     let turns = (difference / TURN).round();
     if turns.is_finite() {

@@ -1,4 +1,4 @@
-//! Truncated Taylor series: coefficients f_k = f^(k)(u)/k! of a function of u, carried through a formula.
+//! Arithmetic on truncated Taylor series, the coefficients f_k = f^(k)(u)/k! of functions of u.
 //!
 //! Griewank and Walther, Evaluating Derivatives (2nd ed. 2008), section 13.2: each elementary function satisfies a linear
 //! differential equation, so its coefficient k is a sum over the ones before. With h = f g, q = f/g, r = √f,
@@ -14,7 +14,7 @@
 
 use super::number::Number;
 
-/// The highest order there is room for.
+/// The highest order of a series.
 pub const MOST_ORDER: usize = 15;
 
 /// Coefficients of the derivative: (k + 1) f_{k+1}.
@@ -39,7 +39,7 @@ pub fn product<T: Number>(f: &[T], g: &[T], out: &mut [T]) {
     }
 }
 
-/// Coefficient k of f²: half the products, and none of them dependent on itself.
+/// Coefficient k of f², with half the products; an interval that is squared never becomes negative.
 #[inline]
 fn square_term<T: Number>(f: &[T], k: usize) -> T {
     let half = k.div_ceil(2);
@@ -86,7 +86,7 @@ pub fn sin_cos<T: Number>(f: &[T], sine: &mut [T], cosine: &mut [T]) {
     }
 }
 
-/// The angle of the vector (x, y); over intervals continuous on the whole piece.
+/// The angle of the vector (x, y); over intervals it is continuous on the whole part.
 pub fn atan2<T: Number>(y: &[T], x: &[T], out: &mut [T]) {
     let (x_slope, y_slope) = (slopes(x), slopes(y));
     let mut distance = [T::exactly(0.0); MOST_ORDER + 1];

@@ -1,9 +1,9 @@
-//! Joint positions along a whole tip path: continuous angles, singular places, travel ends.
+//! Joint positions along a whole tip path, with continuous angles, singular places and ends of travel.
 //!
-//! Pieces are cut until interval arithmetic proves on each part that K is differentiable there and that no angle turns by
-//! half a turn or more. Then the value of an angle at any point of the part is certain up to the part's turn, and parts are
-//! joined at their ends. What cannot be proven down to 2⁻³⁰ of a piece is a singular place: K is singular within that
-//! distance. A travel end is overrun where an enclosure lies beyond it as a whole.
+//! Pieces are halved until interval arithmetic proves on each part that K is differentiable and that no angle changes by
+//! half a turn or more. Then the angle at any point of the part is known up to one number of turns, and parts are joined at
+//! their ends. A part of 2⁻³⁰ of a piece on which this is not proven is a singular place: K is singular within that
+//! distance. A joint leaves its travel where its whole range on a part is outside.
 
 use rayon::prelude::*;
 
@@ -11,18 +11,12 @@ use super::interval::Interval;
 use super::number::Number;
 use super::path_derivatives::{turns_between, Machine, PartWork, PointWork, BLOCK, TURN};
 use super::tip::Tips;
+use super::tolerance::{DEEPEST, INTERVAL_DEPTH, INTERVAL_PARTS, TRAVEL};
 
-/// How often a piece is halved at most.
-pub const DEEPEST: usize = 30;
-/// Past this depth, more open parts of one piece than that mean a singular stretch, not singular points.
-pub const STRETCH_DEPTH: usize = 10;
-pub const STRETCH_PARTS: usize = 64;
-/// Rounding of a program to four or more decimals makes no overrun, in mm or degrees.
-const TRAVEL_TOLERANCE: f64 = 1e-6;
-/// The order to which parts are enclosed: positions and slopes, drawn together by the order above.
+/// The order of the series over parts: the second makes the bounds of positions and slopes narrow.
 const ORDER: usize = 2;
 
-/// Where a joint passes the end of its travel first in a piece, and how far it goes.
+/// The first place in a piece where a joint leaves its travel, and its farthest position in the piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Overrun {
     pub piece: usize,
@@ -32,15 +26,15 @@ pub struct Overrun {
     pub limit: f64,
 }
 
-/// Parts of a path on which the joints are smooth, in order, and the places where they are not or leave their travel.
+/// The parts of a path on which the joints are smooth, in order; the singular places; the overruns.
 #[derive(Debug, Default)]
 pub struct JointPath {
     pub piece: Vec<usize>,
     /// Fractions of the pieces.
     pub part: Vec<[f64; 2]>,
-    /// What the joints' positions lie within on each part, angles on their turn: part by part, joint by joint.
+    /// The range of each joint on each part, angles with their turns: part by part, joint by joint.
     pub range: Vec<Interval>,
-    /// Piece and fraction of the first singular place of each row of them.
+    /// Piece and fraction of singular places, one for each row of neighbours.
     pub singular: Vec<(usize, f64)>,
     pub overruns: Vec<Overrun>,
 }
@@ -59,8 +53,8 @@ pub fn halves([a, b]: [f64; 2]) -> [[f64; 2]; 2] {
 
 /// The joints along pieces joined end to end.
 ///
-/// `start` is where the joints are before: angles begin on the nearest turn. Without it they begin on the turn that keeps the
-/// whole path within `travel`, least and greatest of each joint, if there is one; else as K gives them.
+/// Angles begin on the turn nearest to `start`, the joints before the path. Without it they begin on a turn that keeps the
+/// whole path within `travel`, the least and the greatest position of each joint; if there is no such turn, as K has them.
 pub fn joint_path(
     machine: Machine,
     tips: Tips,
@@ -109,8 +103,8 @@ pub fn joint_path(
     path
 }
 
-/// Parts of a piece with bounded K and K' and no half turn of an angle, and middles of parts that are none, one of each row
-/// of neighbours.
+/// The parts of a piece on which K and K' are bounded and angles change by less than half a turn, and the middles of parts
+/// for which this is not proven, one for each row of neighbours.
 fn smooth_parts(machine: Machine, work: &mut PartWork, piece: usize) -> (Vec<Part>, Vec<f64>) {
     let joints = machine.joints.outputs();
     let mut bounds = vec![Interval::WHOLE; (ORDER + 1) * joints];
@@ -132,8 +126,8 @@ fn smooth_parts(machine: Machine, work: &mut PartWork, piece: usize) -> (Vec<Par
                 left.push(own);
             }
         }
-        let is_stretch = depth >= STRETCH_DEPTH && left.len() > STRETCH_PARTS;
-        if is_stretch || depth == DEEPEST {
+        let is_interval = depth >= INTERVAL_DEPTH && left.len() > INTERVAL_PARTS;
+        if is_interval || depth == DEEPEST {
             singular.extend(left.iter().map(|own| 0.5 * (own.part[0] + own.part[1])));
             parts.extend(left);
             break;
@@ -147,7 +141,7 @@ fn smooth_parts(machine: Machine, work: &mut PartWork, piece: usize) -> (Vec<Par
     singular.sort_by(f64::total_cmp);
     let mut last = f64::NEG_INFINITY;
     singular.retain(|&fraction| {
-        let is_first = fraction - last > 0.5f64.powi(STRETCH_DEPTH as i32);
+        let is_first = fraction - last > 0.5f64.powi(INTERVAL_DEPTH as i32);
         last = fraction;
         is_first
     });
@@ -155,11 +149,11 @@ fn smooth_parts(machine: Machine, work: &mut PartWork, piece: usize) -> (Vec<Par
 }
 
 impl JointPath {
-    /// Moves angles by whole turns so that each part begins where the one before ends.
+    /// Moves angles by whole turns so that each part begins where the part before ends.
     fn join(&mut self, machine: Machine, tips: Tips) {
         let joints = machine.joints.outputs();
         let mut points = PointWork::new(machine, tips, 0);
-        // Where the part before ends, before it was moved, and the turns so far.
+        // The end of the part before, not yet moved, and the turns so far.
         let mut ended = vec![f64::NAN; joints];
         let mut turns = vec![0.0; joints];
         for (row, (&piece, part)) in self.piece.iter().zip(&self.part).enumerate() {
@@ -169,7 +163,7 @@ impl JointPath {
                 points.at(piece, fraction);
                 for joint in 0..joints {
                     let principal = points.derivative(joint, 0);
-                    // A singular part has no middle: its ends are where K says.
+                    // The range of a singular part may have no middle: its ends are those of K.
                     let is_moved = machine.turning[joint] && range[joint].is_bounded();
                     let away = if is_moved { range[joint].middle() - principal } else { 0.0 };
                     end[joint] = principal + turns_between(away) * TURN;
@@ -209,13 +203,13 @@ fn moved(range: Interval, turns: f64) -> Interval {
     range + Interval::exactly(turns * TURN)
 }
 
-/// The fewest turns that bring all bounded ranges into the travel; none where no number of turns does.
+/// The least number of turns that brings all bounded ranges into the travel; 0 where none does.
 fn turns_into<'a>([lo, hi]: [f64; 2], ranges: impl Iterator<Item = &'a Interval>) -> f64 {
     let known = ranges.filter(|range| range.is_bounded()).copied().reduce(Interval::hull);
     let Some(Interval { lo: least, hi: most }) = known else { return 0.0 };
-    let slack = TRAVEL_TOLERANCE / TURN;
+    let slack = TRAVEL / TURN;
     let (first, last) = ((lo - least) / TURN - slack, (hi - most) / TURN + slack);
-    // Of no turn at all, clipped to what fits.
+    // 0, or the nearest number of turns that fits.
     let nearest = 0.0f64.max(first.ceil()).min(last.floor());
     if nearest.is_finite() && first <= nearest && nearest <= last {
         nearest
@@ -234,9 +228,9 @@ fn overruns(
     travel: &[[f64; 2]],
 ) -> Vec<Overrun> {
     let joints = machine.joints.outputs();
-    let limits = |joint: usize| [travel[joint][0] - TRAVEL_TOLERANCE, travel[joint][1] + TRAVEL_TOLERANCE];
+    let limits = |joint: usize| [travel[joint][0] - TRAVEL, travel[joint][1] + TRAVEL];
     let mut bounds = vec![Interval::WHOLE; (ORDER + 1) * joints];
-    // The first place, the farthest value and how far it is over, of each joint.
+    // For each joint: the first place, the farthest position, and its distance from the travel.
     let mut found: Vec<Option<(f64, f64, f64)>> = vec![None; joints];
     for _ in 0..DEEPEST {
         let mut halved = Vec::new();

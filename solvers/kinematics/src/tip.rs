@@ -1,4 +1,4 @@
-//! Pieces of a tip path in Bernstein form, and their Taylor series: at a point, or bounds over a part.
+//! Taylor series of a tip path, at a point or as bounds over a part, from its pieces in Bernstein form.
 
 use super::expression::Table;
 use super::interval::Interval;
@@ -8,7 +8,7 @@ use super::series::quotient;
 /// The most control points of a piece.
 pub const MOST_POINTS: usize = 16;
 
-/// Pieces with the same number of control points each.
+/// The pieces of a path, all with the same number of control points.
 #[derive(Clone, Copy)]
 pub struct Tips<'a> {
     /// Coordinates of a point.
@@ -23,7 +23,7 @@ pub struct Tips<'a> {
     pub width: &'a [f64],
 }
 
-/// Polygons of one piece, an axis after another, and a row more for the weights.
+/// The control polygons of one piece, axis by axis, and a row more for the weights.
 pub struct Polygons<T> {
     values: Vec<T>,
     origin: Vec<T>,
@@ -31,7 +31,7 @@ pub struct Polygons<T> {
 }
 
 impl<T: Number> Polygons<T> {
-    /// Room for pieces like these, to an order.
+    /// Memory for pieces like these, to an order.
     pub fn new(tips: &Tips, order: usize) -> Self {
         let zero = T::exactly(0.0);
         Self {
@@ -41,7 +41,7 @@ impl<T: Number> Polygons<T> {
         }
     }
 
-    /// Series of all axes by `value`, which takes the polygon of a derivative to its value.
+    /// Writes the series of all axes; `value` takes the polygon of a derivative to the value of that.
     fn write(&mut self, tips: &Tips, width: T, value: impl Fn(&[T]) -> T, out: &mut Table<T>) {
         let (own, weights) = self.values.split_at_mut(tips.axes * tips.points);
         if tips.weights.is_empty() {
@@ -101,7 +101,7 @@ impl Tips<'_> {
         self.width.len()
     }
 
-    /// Whether there are none.
+    /// True where there are no pieces.
     pub fn is_empty(&self) -> bool {
         self.width.is_empty()
     }
@@ -112,8 +112,8 @@ impl Tips<'_> {
 
     /// Series at a fraction of a piece, into the inputs of a table.
     ///
-    /// With weights points are counted from the nearer end, lest the derivatives beside a cusp there be lost in the
-    /// digits of its place.
+    /// With weights, points are relative to the nearer end: derivatives near a cusp there are so small that the position
+    /// of the end would cancel their digits.
     pub fn at_point(&self, piece: usize, fraction: f64, work: &mut Polygons<f64>, out: &mut Table<f64>) {
         let rational = !self.weights.is_empty();
         let near = if fraction < 0.5 { 0 } else { self.points - 1 };
@@ -133,7 +133,7 @@ impl Tips<'_> {
         work.write(self, self.width[piece], |polygon| at(polygon, fraction), out);
     }
 
-    /// Bounds of the series over a part of a piece, by the hull of its Bézier points, or at its `middle`.
+    /// Bounds of the series over a part of a piece, by the hull of its Bézier points; or at its middle.
     pub fn over_part(
         &self,
         piece: usize,

@@ -1,9 +1,9 @@
-//! Whatever the bytes, the G-code reader returns columns that fit together, or one sentence with a line that exists.
+//! For any bytes, the G-code reader returns columns that fit together, or one sentence with a line of the program.
 
 use feedplan_gcode::{read, Columns, CoordinateMode, Options, Place, Point, ReadError, TipControl};
 use proptest::prelude::*;
 
-/// An upright tool that hangs below the joints.
+/// A machine whose tool always points down, below the joints.
 struct Upright;
 
 impl TipControl for Upright {
@@ -11,18 +11,18 @@ impl TipControl for Upright {
         Ok(())
     }
 
-    fn joints(&self, _: CoordinateMode, length: f64, _: &Point, places: &[Place]) -> Result<Point, String> {
-        let mut joints = places.last().ok_or("a stretch has no place")?.0;
+    fn joints(&self, _: CoordinateMode, length: f64, _: &Point, path: &[Place]) -> Result<Point, String> {
+        let mut joints = path.last().ok_or("a path has no position")?.0;
         joints[2] += if length.is_nan() { 100.0 } else { length };
         Ok(joints)
     }
 
-    fn place(&self, coordinate_mode: CoordinateMode, length: f64, joints: &Point) -> Result<Place, String> {
-        let mut place = *joints;
-        if coordinate_mode != CoordinateMode::Joints {
-            place[2] -= if length.is_nan() { 100.0 } else { length };
+    fn place(&self, mode: CoordinateMode, length: f64, joints: &Point) -> Result<Place, String> {
+        let mut tip = *joints;
+        if mode != CoordinateMode::Joints {
+            tip[2] -= if length.is_nan() { 100.0 } else { length };
         }
-        Ok((place, [0.0, 0.0, 1.0]))
+        Ok((tip, [0.0, 0.0, 1.0]))
     }
 }
 
@@ -68,7 +68,7 @@ fn check_columns(source: &[u8], columns: &Columns) -> Result<(), TestCaseError> 
     Ok(())
 }
 
-/// Every spline has its pieces, from where it starts to its target.
+/// Every spline has pieces, from its start to its target.
 fn check_splines(columns: &Columns) -> Result<(), TestCaseError> {
     let width = columns.axes.len();
     let rows: Vec<i64> =
@@ -85,14 +85,14 @@ fn check_splines(columns: &Columns) -> Result<(), TestCaseError> {
         let end = columns.spline_offsets[columns.spline_pieces[i + 1] as usize];
         let last = &columns.spline_control[(end - 1) * width..end * width];
         let target = &columns.target[row as usize * width..(row as usize + 1) * width];
-        // No direction is programmed on a spline.
+        // A spline is never programmed by tool directions.
         let linear = columns.axes.iter().filter(|letter| !b"IJK".contains(letter)).count();
         prop_assert_eq!(&last[..linear], &target[..linear]);
     }
     Ok(())
 }
 
-/// Coordinate modes go with their changes, and directions are unit vectors.
+/// The coordinate mode changes in the rows of its changes, and directions are unit vectors.
 fn check_changes(columns: &Columns) -> Result<(), TestCaseError> {
     let (count, width) = (columns.kind.len(), columns.axes.len());
     prop_assert_eq!((columns.coordinate_mode.len(), columns.tool_length.len()), (count, count));
@@ -124,7 +124,7 @@ fn lines(source: &[u8]) -> usize {
     1 + source.iter().filter(|byte| matches!(byte, b'\n' | b'\r')).count()
 }
 
-/// Words that go together often enough to get past the first line.
+/// Words that fit together often enough for the reader to pass the first line.
 fn word() -> impl Strategy<Value = String> {
     let codes = "G0|G1|G2|G3|G4|G5|G5\\.1|G5\\.2|G5\\.3|G6\\.2|G43\\.4|G43\\.5|G10|G17|G18|G19|G20|G21|G28|G30|G40|G43|G43\\.1|G49|G52|G53|G54|G59\\.3|G61|G64|G73|G80|\
                  G81|G82|G83|G85|G89|G90|G91|G90\\.1|G91\\.1|G92|G92\\.1|G92\\.2|G92\\.3|G93|G94|G95|G98|G99|M0|M3|M5|M6|M30|L2|L20";
@@ -160,7 +160,7 @@ const SPLINES: [&str; 20] = [
     "G1 X5 A5",
 ];
 
-/// Flow, compensation, cycles, corners, tools.
+/// Lines of program flow, compensation, cycles, corners and tools.
 const FLOW: [&str; 40] = [
     "o1 sub",
     "o1 endsub [#1]",
@@ -207,7 +207,7 @@ const FLOW: [&str; 40] = [
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// Lines of flow and of compensated paths in any order, of which few make a program.
+    /// Lines of program flow and of compensated paths in any order; few of them make a program.
     #[test]
     fn any_blocks_of_flow(blocks in proptest::collection::vec(0..FLOW.len(), 1..40)) {
         let mut source = String::from("G21 G90 F100 S100 M3 G0 X1 Y2 Z5\n");
@@ -238,14 +238,14 @@ proptest! {
         check(source.as_bytes())?;
     }
 
-    /// One block after the other by itself, so that errors do not hide what follows.
+    /// Reads each block by itself, so that an error does not hide the blocks after it.
     #[test]
     fn any_block_after_a_good_start(words in proptest::collection::vec(word(), 1..7)) {
         let source = format!("G21 G90 F100 S100 M3 G1 X10 Y0 Z5\n{}\nX1 Y1\n", words.join(" "));
         check(source.as_bytes())?;
     }
 
-    /// Splines, tips and directions of which blocks are lost, repeated and garnished.
+    /// Splines, tips and directions with blocks that are lost, repeated or extended.
     #[test]
     fn any_blocks_of_splines(
         blocks in proptest::collection::vec((0..SPLINES.len(), proptest::option::of(word())), 1..30),

@@ -1,12 +1,12 @@
-//! The columns that the moves of a whole program become.
+//! The columns of the moves of a whole program.
 
 use super::{CoordinateMode, Direction, Events, Moves, Point, Stop, UPRIGHT};
 use crate::block::AXES;
 
-/// The letters of a tool direction's columns, after those of the axes.
+/// The letters of the columns of a tool direction, after those of the axes.
 const DIRECTION: [u8; 3] = *b"IJK";
 
-/// A program's moves, one row each; see `Program` in the Python package.
+/// The moves of a program, one row each; see `Program` in the Python package.
 #[derive(Debug)]
 pub struct Columns {
     pub axes: Vec<u8>,
@@ -27,9 +27,9 @@ pub struct Columns {
     pub arc_normal: Vec<u8>,
     pub arc_angle: Vec<f64>,
     pub spline_move: Vec<i64>,
-    /// First piece of each spline, and the end of the last.
+    /// The first piece of each spline, and the number of pieces.
     pub spline_pieces: Vec<i64>,
-    /// The pieces: control points in the columns of `axes`, weights (empty where none is rational), offsets, widths.
+    /// Control points of the pieces in the columns of `axes`, weights (empty where all are polynomials), offsets, widths.
     pub spline_control: Vec<f64>,
     pub spline_weights: Vec<f64>,
     pub spline_offsets: Vec<usize>,
@@ -37,7 +37,7 @@ pub struct Columns {
     /// `CoordinateMode` and tool length of each move.
     pub coordinate_mode: Vec<u8>,
     pub tool_length: Vec<f64>,
-    /// Moves that start where their own words say, not where the move before ends, and these places.
+    /// The first move in each coordinate mode, and its start in the coordinates of that mode.
     pub change_move: Vec<i64>,
     pub change_start: Vec<f64>,
     pub start_dwell: f64,
@@ -67,7 +67,7 @@ impl Moves {
             blend_tolerance.resize(end, now.blend);
             fit_tolerance.resize(end, now.fit);
         }
-        // A change after the last move changes nothing; one before the first says where that begins.
+        // A change after the last move has no effect; one before the first move gives its start.
         self.changes.retain(|change| change.row < count);
         let (start, direction) = match self.changes.first() {
             Some(change) if change.row == 0 => (change.start, change.direction),
@@ -78,7 +78,7 @@ impl Moves {
         let mut tool_length = vec![f64::NAN; first];
         for (i, change) in self.changes.iter().enumerate() {
             let end = self.changes.get(i + 1).map_or(count, |next| next.row);
-            coordinate_mode.resize(end, change.coordinate_mode as u8);
+            coordinate_mode.resize(end, change.mode as u8);
             tool_length.resize(end, change.tool_length);
         }
         self.kind.shrink_to_fit();
@@ -87,24 +87,24 @@ impl Moves {
         self.line.shrink_to_fit();
         Columns {
             axes: self.letters(),
-            start: self.place(&start, &direction),
+            start: self.row_of(&start, &direction),
             change_move: self.changes.iter().map(|change| change.row as i64).collect(),
             change_start: self
                 .changes
                 .iter()
-                .flat_map(|change| self.place(&change.start, &change.direction))
+                .flat_map(|change| self.row_of(&change.start, &change.direction))
                 .collect(),
             spline_move: self.spline_rows.iter().map(|&(row, _)| row as i64).collect(),
             spline_pieces: (self.spline_rows.iter().map(|&(_, piece)| piece))
                 .chain([self.splines.len()])
                 .map(|piece| piece as i64)
                 .collect(),
-            // No spline is programmed while I, J, K are words.
+            // No spline is programmed by tool directions.
             spline_control: self
                 .splines
                 .control
                 .iter()
-                .flat_map(|point| self.place(point, &UPRIGHT))
+                .flat_map(|point| self.row_of(point, &UPRIGHT))
                 .collect(),
             target: self.directed_target(),
             spline_weights: self.splines.weights,
@@ -131,9 +131,9 @@ impl Moves {
         }
     }
 
-    /// True where the tool's direction has columns.
+    /// True where the tool direction has columns.
     fn points_tool(&self) -> bool {
-        self.changes.iter().any(|change| change.coordinate_mode == CoordinateMode::Vector)
+        self.changes.iter().any(|change| change.mode == CoordinateMode::Vector)
     }
 
     /// The letters of the columns.
@@ -145,16 +145,16 @@ impl Moves {
         letters
     }
 
-    /// A place in these columns.
-    fn place(&self, point: &Point, direction: &Direction) -> Vec<f64> {
-        let mut place: Vec<f64> = self.axes.iter().map(|&axis| point[axis]).collect();
+    /// A position and a tool direction in these columns.
+    fn row_of(&self, point: &Point, direction: &Direction) -> Vec<f64> {
+        let mut row: Vec<f64> = self.axes.iter().map(|&axis| point[axis]).collect();
         if self.points_tool() {
-            place.extend(direction);
+            row.extend(direction);
         }
-        place
+        row
     }
 
-    /// Targets, with the tool's directions where these have columns.
+    /// Targets, with the tool directions where these have columns.
     fn directed_target(&mut self) -> Vec<f64> {
         let target = std::mem::take(&mut self.target);
         if !self.points_tool() {
@@ -163,11 +163,11 @@ impl Moves {
         let mut direction = UPRIGHT;
         let mut later = self.directions.iter().peekable();
         let mut wider = Vec::with_capacity(target.len() / self.axes.len() * (self.axes.len() + 3));
-        for (row, place) in target.chunks_exact(self.axes.len()).enumerate() {
+        for (row, position) in target.chunks_exact(self.axes.len()).enumerate() {
             while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
                 direction = next;
             }
-            wider.extend_from_slice(place);
+            wider.extend_from_slice(position);
             wider.extend(direction);
         }
         wider

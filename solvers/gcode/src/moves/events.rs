@@ -1,4 +1,4 @@
-//! What happens between moves: spindle, coolant, tools, outputs, dwells, stops, messages and comments, in order.
+//! The events between moves: spindle, coolant, tools, outputs, dwells, stops, messages and comments, in order.
 
 use std::collections::HashMap;
 
@@ -8,9 +8,9 @@ use super::Moves;
 pub const MESSAGE: u8 = b'(';
 pub const COMMENT: u8 = b';';
 
-/// Words that switch something, in order, as columns: how many moves come before each, its line, its letter and number,
-/// and the words P and Q that go with it, NaN where there is none. M6 has its tool's number as P, G4 its seconds. A message
-/// is `(` and a comment `;`, with the place of its text in `texts`, which do not grow with repeats.
+/// The events in order, as columns: the number of moves before each, its line, its letter and number, and its words P and
+/// Q, NaN where they are missing. M6 has the number of its tool as P, G4 its seconds. A message has the letter `(`, a
+/// comment `;`, and the index of its text in `texts` as number; a text that comes again is kept once.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
     pub moves: Vec<i64>,
@@ -20,14 +20,14 @@ pub struct Events {
     pub p: Vec<f64>,
     pub q: Vec<f64>,
     pub texts: Vec<String>,
-    /// Places of texts that come again, as those of loops and subprograms do.
+    /// Indices of texts that may come again, in loops and subprograms.
     repeated: HashMap<String, usize>,
-    /// The last line that had a text: those of later lines are new.
+    /// The last line with a text; texts of later lines are new.
     furthest: i32,
 }
 
 impl Moves {
-    /// Something happens after the moves so far.
+    /// Adds an event after the moves so far.
     pub fn event(&mut self, line: u32, letter: u8, number: f64, p: Option<f64>, q: Option<f64>) {
         let events = &mut self.events;
         events.moves.push(self.kind.len() as i64);
@@ -38,19 +38,19 @@ impl Moves {
         events.q.push(q.unwrap_or(f64::NAN));
     }
 
-    /// A message to the operator, or a comment.
+    /// Adds a message to the operator, or a comment.
     pub fn remark(&mut self, line: u32, letter: u8, text: String) {
         let Events { texts, repeated, furthest, .. } = &mut self.events;
         let next = texts.len();
-        let place = if line as i32 > *furthest {
+        let index = if line as i32 > *furthest {
             *furthest = line as i32;
             next
         } else {
             *repeated.entry(text.clone()).or_insert(next)
         };
-        if place == next {
+        if index == next {
             texts.push(text);
         }
-        self.event(line, letter, place as f64, None, None);
+        self.event(line, letter, index as f64, None, None);
     }
 }

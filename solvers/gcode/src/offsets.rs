@@ -1,7 +1,7 @@
-//! What moves the program's zero: work offsets, G52 and G92, tool lengths; and the way home.
+//! Sets the program's zero, by work offsets, G52, G92 and tool lengths; and moves home.
 
-use super::block::{bit, g_name, Block, Group, AXES, AXIS_WORDS};
-use super::execute::Interpreter;
+use super::block::{bits, g_name, Block, Group, AXES, AXIS_WORDS};
+use super::execute::{Interpreter, Topic};
 use super::fault::{fault, Outcome};
 use super::modal::turn;
 use super::moves::Point;
@@ -37,15 +37,13 @@ impl Interpreter<'_> {
         let first = first_of_system(system);
         let mut work = self.parameters.row(first);
         let rotation = block.get(b'R').unwrap_or_else(|| self.parameters.number(first + ROTATION));
-        // What the program would read here if that offset's own place were 0.
-        let mut reading = self.position();
-        for axis in 0..9 {
-            reading[axis] -= self.state.offsets.tool[axis];
-        }
+        // The coordinates of this position if the work offset were 0.
+        let (position, tool) = (self.position(), self.state.offsets.tool);
+        let reading: Point = std::array::from_fn(|axis| position[axis] - tool[axis]);
         let shift = self.state.offsets.shift;
         let mut wanted = shift;
         let mut named = [false; 9];
-        self.places(block, |axis, value| {
+        self.axis_values(block, |axis, value| {
             named[axis] = true;
             wanted[axis] += value;
             if !from_here {
@@ -54,7 +52,7 @@ impl Interpreter<'_> {
         })?;
         if from_here {
             if rotation != 0.0 && named[0] != named[1] {
-                // The axis that is not named keeps its reading.
+                // The axis that is not named keeps its coordinate.
                 let mut offsets = self.state.offsets.clone();
                 (offsets.work, offsets.rotation) = (work, rotation);
                 let now = offsets.to_program(&self.position());
@@ -90,14 +88,14 @@ impl Interpreter<'_> {
             orientation: 0,
         });
         let position = self.position();
-        // L10: in the offsets in force, this place reads as the words say. L11: in G59.3 without a shift.
+        // L10: this position has the coordinates of the words, with the offsets in force. L11: with G59.3 and no shift.
         let zero = if level == 10.0 {
             let offsets = &self.state.offsets;
             std::array::from_fn(|k| offsets.sum()[k] - offsets.tool[k])
         } else {
             self.parameters.row(first_of_system(8))
         };
-        self.places(block, |axis, value| {
+        self.axis_values(block, |axis, value| {
             tool.offset[axis] = if level == 1.0 { value } else { position[axis] - zero[axis] - value };
         })?;
         if let Some(radius) = block.get(b'R') {
@@ -117,11 +115,11 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// G52 sets the shift, G92 lets the axes named stand at the values given; both share one offset.
+    /// G52 sets the shift; G92 sets it so that the axes named have the values given. Both use the same offset.
     pub(super) fn shift(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let reading = self.state.offsets.to_program(&self.position());
         let mut shift = self.state.offsets.shift;
-        self.places(block, |axis, value| {
+        self.axis_values(block, |axis, value| {
             shift[axis] = if code == 520 { value } else { shift[axis] + reading[axis] - value };
         })?;
         self.state.offsets.shift = shift;
@@ -131,7 +129,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// G92.1 forgets the shift, G92.2 suspends it, G92.3 brings it back.
+    /// G92.1 deletes the shift, G92.2 suspends it, G92.3 restores it.
     pub(super) fn reset_shift(&mut self, code: u16) {
         self.state.offsets.shift = if code == 923 { self.parameters.row(SHIFT) } else { [0.0; 9] };
         self.parameters.set_number(SHIFT_IN_FORCE, f64::from(code == 923));
@@ -141,7 +139,7 @@ impl Interpreter<'_> {
         self.state.offsets.update();
     }
 
-    /// Takes a work offset, from 0, as its parameters say.
+    /// Puts a work offset, 0 for G54, into force as its parameters have it.
     pub(super) fn select_system(&mut self, system: usize) {
         let first = first_of_system(system);
         self.end_turn();
@@ -153,7 +151,7 @@ impl Interpreter<'_> {
         offsets.update();
     }
 
-    /// Tool length and work offset.
+    /// Sets tool length and work offset.
     pub(super) fn set_offsets(&mut self, block: &Block) -> Outcome<()> {
         match block.code(Group::ToolLength) {
             Some(code @ (434 | 435)) => return self.program_tip(block, code),
@@ -178,7 +176,7 @@ impl Interpreter<'_> {
                     return fault("G43.1 sets nothing: give it axis words");
                 }
                 let mut tool = self.state.offsets.tool;
-                self.places(block, |axis, value| {
+                self.axis_values(block, |axis, value| {
                     tool[axis] = value + if code == 432 { tool[axis] } else { 0.0 }
                 })?;
                 self.state.offsets.tool = tool;
@@ -192,15 +190,14 @@ impl Interpreter<'_> {
         self.set_system(block)
     }
 
-    /// G43.4 and G43.5: words are the tip, so the tool's length is in none of them. It is the one in force, unless H
-    /// calls for another.
+    /// G43.4 and G43.5: axis words are the tip, without the tool length. The length is the one in force, unless H names
+    /// another tool.
     fn program_tip(&mut self, block: &Block, code: u16) -> Outcome<()> {
-        let coordinate_mode = if code == 434 { CoordinateMode::Tip } else { CoordinateMode::Vector };
+        let mode = if code == 434 { CoordinateMode::Tip } else { CoordinateMode::Vector };
         let tool = &mut self.state.offsets.tool;
         let length = match (block.has(b'H'), self.state.coordinate_mode) {
-            (true, _) => f64::NAN,
             (false, CoordinateMode::Joints) if tool[2] != 0.0 => tool[2],
-            (false, CoordinateMode::Joints) => f64::NAN,
+            (true, _) | (_, CoordinateMode::Joints) => f64::NAN,
             (false, _) => self.state.tool_length,
         };
         if let Some(axis) = [0, 1].into_iter().chain(3..9).find(|&axis| tool[axis] != 0.0) {
@@ -211,18 +208,18 @@ impl Interpreter<'_> {
             ));
         }
         *tool = [0.0; 9];
-        if length.is_nan() && !self.warned_length {
-            self.warned_length = true;
-            self.warn(format!(
-                "the tool length that {} calls for is not known: the machine file's tool_length is taken (G43.1 Z \
-                 before it gives one)",
-                g_name(code)
-            ));
+        if length.is_nan() {
+            self.warn_once(Topic::NoToolLength, || {
+                format!(
+                    "the tool length that {} calls for is not known: the machine file's tool_length is taken (G43.1 Z \
+                     before it gives one)",
+                    g_name(code)
+                )
+            });
         }
-        let machine = self.options.machine_axes.iter().fold(0, |sum, &letter| sum | bit(letter));
-        self.set_coordinate_mode(coordinate_mode, length)?;
-        // The joints of a tool direction are axes of the program from here on.
-        self.meet(machine)?;
+        self.set_coordinate_mode(mode, length)?;
+        // From here on all joints are axes of the program: a tool direction may move any of them.
+        self.add_axes(bits(&self.options.machine_axes))?;
         self.set_system(block)
     }
 
@@ -248,7 +245,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// The offset of the tool that H names, or of the one in the spindle; 0 where no table tells it.
+    /// The offset of the tool that H names, or of the tool in the spindle; 0 where no table has it.
     fn length_of_tool(&mut self, block: &Block) -> Outcome<Point> {
         let number = count(block, b'H', 0, "tool number")?;
         let tool = match number {
@@ -256,19 +253,18 @@ impl Interpreter<'_> {
             Some(number) => self.needed_tool(number)?,
             None => self.tool,
         };
-        if self.tools.is_none() && number != Some(0) && !self.warned_tool {
-            self.warned_tool = true;
-            self.warn(
+        if self.tools.is_none() && number != Some(0) {
+            self.warn_once(Topic::NoToolTable, || {
                 "the tool lengths that G43 calls for are not known: 0 is taken for each (a tool table, or G43.1 Z, \
                  gives them)"
-                    .into(),
-            );
+                    .into()
+            });
         }
         Ok(tool.map_or([0.0; 9], |tool| tool.offset))
     }
 
-    /// G28 and G30: rapid to the place that the block names, then the axes named to the machine's home; all axes
-    /// where none is named. G28.1 and G30.1 make this place their home; G28.2 to G28.4 only find the machine's zero.
+    /// G28 and G30: a rapid to the axis words, then one of the axes named, or of all axes if none is, to the home position.
+    /// G28.1 and G30.1 set that to the current position. G28.2 to G28.4 home the axes and set nothing.
     pub(super) fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let first = if code < 300 { HOME } else { SECOND_HOME };
         if matches!(code, 281 | 301) {
@@ -281,12 +277,9 @@ impl Interpreter<'_> {
         let mut target = via;
         let home = self.parameters.row(first);
         if block.words & AXIS_WORDS != 0 {
-            self.places(block, |axis, _| target[axis] = home[axis])?;
+            self.axis_values(block, |axis, _| target[axis] = home[axis])?;
         } else {
-            let machine = self.options.machine_axes.iter().fold(0, |sum, &letter| sum | bit(letter));
-            if machine & !self.known != 0 {
-                self.meet(machine)?;
-            }
+            self.add_axes(bits(&self.options.machine_axes))?;
             for &axis in self.moves.axes() {
                 target[axis] = home[axis];
             }

@@ -1,18 +1,21 @@
-//! The geometry of offsets: where lines and arcs beside a path meet.
+//! Plane geometry: where lines and arcs beside a path meet, and angles between points.
 
 use std::f64::consts::{PI, TAU};
 
-/// A place in the plane of the path, in mm.
+use super::tolerance::SAME_ANGLE;
+
+/// A point in the plane of a path, in mm.
 pub type Point2 = [f64; 2];
 
-/// The offset of the last element: a line along a unit vector, or an arc about a centre with the sign of its sweep.
+/// A line along a unit vector, or an arc about a centre with the sign of its sweep.
 #[derive(Clone, Copy, Debug)]
 pub enum Shape {
     Line(Point2),
     Arc { centre: Point2, radius: f64, turn: f64 },
 }
 
-/// Where the offset that ends at `here` meets the next one, which goes by `beside`; the tool is on that side, 1 for left.
+/// The point where the offset `last`, which ends at `here`, meets the offset `next`, which passes through `beside`.
+/// `side` is the side of the path that the tool is on: 1 for left, -1 for right.
 pub fn crossing(side: f64, here: Point2, last: &Shape, beside: Point2, next: &Shape) -> Option<Point2> {
     let inside = |turn: f64| turn == side;
     match (*last, *next) {
@@ -23,7 +26,7 @@ pub fn crossing(side: f64, here: Point2, last: &Shape, beside: Point2, next: &Sh
             let end = [here[0] + t * before[0], here[1] + t * before[1]];
             t.is_finite().then_some(end)
         }
-        // Inside of the arc the line goes on to the circle, outside it ends there first.
+        // A tool inside the arc follows the line to the far side of the circle, a tool outside to the near side.
         (Shape::Line(along), Shape::Arc { centre, radius, turn }) => {
             on_circle(here, along, centre, radius, if inside(turn) { 1.0 } else { -1.0 })
         }
@@ -43,7 +46,7 @@ pub fn crossing(side: f64, here: Point2, last: &Shape, beside: Point2, next: &Sh
     }
 }
 
-/// Where the line by `point` along a unit vector meets a circle: the far place for 1, the near one for -1.
+/// The point where the line through `point` along a unit vector meets a circle: the far one for 1, the near one for -1.
 fn on_circle(point: Point2, along: Point2, centre: Point2, radius: f64, which: f64) -> Option<Point2> {
     let to = minus(centre, point);
     let foot = to[0] * along[0] + to[1] * along[1];
@@ -53,26 +56,22 @@ fn on_circle(point: Point2, along: Point2, centre: Point2, radius: f64, which: f
     (half >= 0.0).then(|| [point[0] + t * along[0], point[1] + t * along[1]])
 }
 
-/// The signed sweep from a start to an end about a centre, with the full turns of another sweep.
+/// The signed sweep in radians from a start to an end about a centre, with as many full turns as the sweep `like`.
 pub fn sweep_between(start: Point2, end: Point2, centre: Point2, turn: f64, like: f64) -> f64 {
     let mut sweep = turn * (direction(centre, end) - direction(centre, start));
     sweep = sweep.rem_euclid(TAU);
-    let turns = ((like.abs() - 1e-6) / TAU).floor().max(0.0);
+    let turns = ((like.abs() - SAME_ANGLE) / TAU).floor().max(0.0);
     turn * (sweep + turns * TAU)
 }
 
+/// The angle of the vector from one point to another, in radians from the first axis.
 pub fn direction(from: Point2, to: Point2) -> f64 {
     (to[1] - from[1]).atan2(to[0] - from[0])
 }
 
-/// An angle as one from -pi to pi.
+/// The angle from -π to π that equals an angle up to full turns.
 pub fn wrapped(angle: f64) -> f64 {
-    let turned = angle.rem_euclid(TAU);
-    if turned > PI {
-        turned - TAU
-    } else {
-        turned
-    }
+    PI - (PI - angle).rem_euclid(TAU)
 }
 
 pub fn minus(a: Point2, b: Point2) -> Point2 {
@@ -97,7 +96,7 @@ mod tests {
         let (east, north) = (Shape::Line([1.0, 0.0]), Shape::Line([0.0, 1.0]));
         near(crossing(1.0, [9.0, 1.0], &east, [4.0, 0.0], &north), [4.0, 1.0]);
         assert_eq!(crossing(1.0, [9.0, 1.0], &east, [4.0, 0.0], &east), None);
-        // Inside of a circle a line goes on to its far side, outside it ends at the near one.
+        // A tool inside the circle meets its far side, a tool outside its near side.
         let circle = |turn| Shape::Arc { centre: [5.0, 1.0], radius: 2.0, turn };
         near(crossing(1.0, [0.0, 1.0], &east, [0.0; 2], &circle(1.0)), [7.0, 1.0]);
         near(crossing(1.0, [0.0, 1.0], &east, [0.0; 2], &circle(-1.0)), [3.0, 1.0]);
