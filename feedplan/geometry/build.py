@@ -177,7 +177,7 @@ def _changes_of_group(names: tuple[str, ...], moving: NDArray[np.bool_]) -> NDAr
 def _rough_places(
     program: Program, reversals: NDArray[np.int64], zones: NDArray[np.int64]
 ) -> tuple[str, ...]:
-    """Sentences on the stops of a smooth path that the program does not ask for."""
+    """Sentences on the stops of a smooth path that the program does not require."""
     sentences = []
     if len(reversals):
         sentences.append(

@@ -18,9 +18,9 @@ from feedplan.program.program import Program
 class PathWords:
     """The axes of a path.
 
-    `names` are those of the machine that the program names, in the machine's order. `joints` (n,) tells of
-    each move whether its words are joint positions, `changes` (n − 1,) whether the words of the next move
-    mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding corners, the smaller ones
+    `names` are those of the machine that the program names, in the machine's order. `joints` (n,): the
+    words of the move are joint positions; `changes` (n − 1,): the mode or the tool length of the next move
+    differs. `max_velocity`, `max_acceleration` (axes,) are for rounding corners, the smaller ones
     of both directions: those of the joint where all words are joints; otherwise the least of all linear
     joints, or of the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all
     words are joints, and those that move allow a velocity jump at corners.

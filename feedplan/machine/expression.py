@@ -48,7 +48,7 @@ class Expression:
 
     Results are numbered: first the `inputs` coordinates, then one a row of `operations` (n, 3), each a code
     and the numbers of its operands; `constants` (n,) are those of operations that have one. `outputs`
-    (joints,) are the results that are joint positions; `turning` tells which are known up to whole turns.
+    (joints,) are the results that are joint positions; `turning`: the joint is known up to whole turns.
     """
 
     inputs: int

@@ -48,14 +48,14 @@ MethodName = Literal[
 
 # Keeps time for the work that follows a plan; it is given by `feedplan.plan`, and no option of users.
 RESERVE = "reserve"
-# Is told how far the plan is; given by `feedplan.plan` too.
+# A function that gets the part of the plan that is done; an argument of `feedplan.plan` too.
 PROGRESS = "progress"
 # Does parts of the work; given by `feedplan.plan` too.
 ELSEWHERE = "elsewhere"
 
 
 def methods() -> tuple[MethodName, ...]:
-    """The names of all planning methods; `feedplan.plan` tells the options of each."""
+    """The names of all planning methods; the documentation of `feedplan.plan` has their options."""
     names = (module.name for module in pkgutil.iter_modules(__path__))
     known = sorted(name.replace("_", "-") for name in names if not name.startswith("_"))
     return cast("tuple[MethodName, ...]", tuple(known))

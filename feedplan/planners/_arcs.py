@@ -20,9 +20,11 @@ _VARIES = 1e3
 
 @dataclass(frozen=True)
 class Arcs:
-    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n), `duration` (n,); and at most how
-    much of each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share; and the
-    mean of what it uses of the limit that it uses most at each place (n,)."""
+    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n) and `duration` (n,).
+
+    `acceleration` (n, joints) and `speed` (n,) are upper bounds of the used shares of limits, that of the
+    speed squared. `used` (n,) is the mean over the cell of the greatest used share at each place.
+    """
 
     kind: NDArray[np.uint8]
     axis: NDArray[np.uint8]

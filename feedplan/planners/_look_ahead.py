@@ -47,7 +47,7 @@ def look_ahead(
     the problem's speeds. `hold` (n + 1,) [s]: the speed is constant for this time before and after the end of
     a piece; beside a curve the tool stops instead. `queue` is the part of the path that the controller knows,
     and its limits along it; by default it knows all, without limits.
-    Raises SolverError (see `segments`) and InfeasibleError where start or end speed cannot be had.
+    Raises SolverError (see `segments`) and InfeasibleError where the start or end speed is not possible.
     """
     queue = queue or Queue()
     parts = segments(problem, rule, queue.velocity, queue.acceleration)
@@ -204,7 +204,7 @@ def _weighted_length(
 def shared_acceleration(
     tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
 ) -> tuple[Array, Array]:
-    """Half along the path, √3/2 across it, of what every direction in the plane of both allows.
+    """Half along the path and √3/2 across it of the acceleration that every direction in their plane allows.
 
     No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a
     tangential ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of

@@ -3,7 +3,7 @@
 Controllers hold some blocks, lines that arcs are chopped into as well, and can stop at the end of the last
 one. With the blocks behind the one in motion, of lengths L and accelerations a, that is v² ≤ Σ 2 a L at its
 end (grbl, `planner.c`: the last block is planned to a stop; LinuxCNC, `tp.c`: `tpRunOptimization` goes back
-so many segments as ARC_BLEND_OPTIMIZATION_DEPTH says).
+by ARC_BLEND_OPTIMIZATION_DEPTH segments).
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ class Chords:
 class Queue:
     """The path as one controller has it.
 
-    `ahead`: blocks known behind the one in motion (None: all). `chords` tell what blocks are on curves; a
-    whole piece is one without. `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the path.
-    `part` (pieces,) is what each piece has of the acceleration along it (None: all).
+    `ahead`: blocks known behind the one in motion (None: all). `chords` are the blocks of curves; without
+    them a whole piece is a block. `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the
+    path. `part` (pieces,) is the share of the acceleration along the path that each piece has (None: all).
     `least_time` [s]: no block of the program takes less. `cruise`: the part of the way between speeding up
     and slowing down that has one speed (Klipper's minimum_cruise_ratio).
     """

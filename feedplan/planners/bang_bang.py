@@ -12,7 +12,7 @@ from feedplan.progress import Listener
 def plan(problem: Problem, *, progress: Listener | None = None) -> SpeedProfile:
     """The fastest profile; its time is the least that the limits allow, to rounding.
 
-    Raises InfeasibleError where the start or end speed cannot be had, with the speed that can.
+    Raises InfeasibleError, with the reachable speed, where the start or end speed is not possible.
     """
     try:
         return SpeedProfile.of(plan_bang_bang(problem, progress))

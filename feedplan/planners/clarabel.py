@@ -37,8 +37,8 @@ def plan(
     """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
     piece.
 
-    `time_limit` [s]. Raises SolverError with Clarabel's status, InfeasibleError where a speed given at an end
-    cannot be had, MissingPackageError.
+    `time_limit` [s]. Raises SolverError with Clarabel's status, InfeasibleError where a given speed at an end
+    is not possible, MissingPackageError.
     """
     return plan_on_meshes(
         problem, Method("clarabel", _solve, mean_rows, others=("scipy",)), accuracy, cells, time_limit

@@ -37,5 +37,5 @@ def plan(problem: Problem) -> SpeedProfile:
 
 
 def transition_speed(problem: Problem) -> NDArray[np.float64]:
-    """Speed (n + 1,) [mm/s] at the ends of the pieces: 0 between runs, infinite where no corner is."""
+    """Speed (n + 1,) [mm/s] at the ends of the pieces: 0 between runs, infinite where there is no corner."""
     return junction_limit(problem.path, problem.limits("acceleration").min(axis=0) * problem.period)

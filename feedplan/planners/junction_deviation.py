@@ -15,8 +15,7 @@ Controllers chop arcs into lines, and pass from line to line by the same formula
 or `arc_segment` the speed on curves is √(a/κ), with the acceleration in the direction of the normal. The
 tangential one comes on top of it. They know some blocks ahead (`_queue`).
 
-The velocity jumps at the corner. No period enters, so the jump can be more than the axes do in one: the audit
-says at which lines.
+The velocity jumps at the corner, by more than the axes can change in a period: the audit names the lines.
 """
 
 from __future__ import annotations
@@ -59,10 +58,10 @@ def plan(
     `axis_jumps` [mm/s] of X, Y and Z.
 
     `blocks` are held at once, the one in motion among them (None: all). Arcs are chopped into lines within
-    `arc_tolerance` [mm], or of the length `arc_segment` [mm]. `short_lines` tells what keeps the speed
-    between these: nothing ("free"), "half" of each line as in Klipper, the "arc" of which they are chords as
-    in Marlin. `cruise_ratio` is the part of the way between speeding up and slowing down that has one speed.
-    `max_velocity` [mm/s] and `max_acceleration` [mm/s²] are those along the path.
+    `arc_tolerance` [mm], or of the length `arc_segment` [mm]. `short_lines` is the limit of speed
+    between short lines: none ("free"), by "half" of each line as in Klipper, or by the "arc" of which they
+    are chords as in Marlin. `cruise_ratio` is the part of the way between speeding up and slowing down that
+    has one speed. `max_velocity` [mm/s] and `max_acceleration` [mm/s²] are those along the path.
 
     Raises InputError for those, SolverError and InfeasibleError, all as sentences.
     """
@@ -92,7 +91,7 @@ def plan(
 
 
 def corner_speed(problem: Problem, junctions: Junctions) -> Array:
-    """Speed (n + 1,) [mm/s] at the ends of the pieces, infinite where no corner is."""
+    """Speed (n + 1,) [mm/s] at the ends of the pieces, infinite where there is no corner."""
     speed = np.full(len(problem.path) + 1, np.inf)
     if len(problem.path) < 2:
         return speed

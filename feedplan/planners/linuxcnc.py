@@ -11,9 +11,9 @@ MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION).
 A segment that may overlap the next one has half of the acceleration, all along it (`tc.c`:
 `tcGetTangentialMaxAccel`): so has the last one before a stop, unless a rapid and another move meet there.
 
-Not as there: corners of arcs and splines are rounded as the path's builder does it, others are stops where
-LinuxCNC overlaps segments, as it does on rotary axes; G64 without P keeps to the tolerance
-of the plan, where LinuxCNC leaves the path by up to a quarter of a line.
+Differences: corners of arcs and splines are rounded as the path builder does. Other corners are stops where
+LinuxCNC overlaps segments, as on rotary axes. G64 without P keeps the tolerance of the plan, where LinuxCNC
+leaves the path by up to a quarter of a line.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def plan(
 
 
 def _part(problem: Problem) -> Array:
-    """What each piece has of the acceleration along it: a half in the last segment before a stop."""
+    """The share of the acceleration along the path in each piece: 0.5 in the last segment before a stop."""
     path = problem.path
     last, rapid = path.runs[1:] - 1, np.isinf(path.feed)
     overlaps = path.tolerance[last] != 0.0
@@ -61,9 +61,9 @@ def _part(problem: Problem) -> Array:
 
 
 def on_arcs(tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array) -> tuple[Array, Array]:
-    """√3/2 across the path of what every direction allows, along it what the greatest speed leaves.
+    """√3/2 of the acceleration of every direction across the path, and the rest at the greatest speed along it.
 
-    That is half of it (`shared_acceleration`) where the bend holds the speed, more where the feed does
+    The rest is half of it (`shared_acceleration`) where the bend limits the speed, more where the feed does
     (`tc.c`: `tcUpdateCircleAccRatio`).
     """
     along, across = shared_acceleration(tangent, normal, limits, radius, speed)

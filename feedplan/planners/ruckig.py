@@ -52,7 +52,7 @@ MARGINS = [2.0**-k for k in range(24, -1, -1)]
 ROUNDING = 1e-9
 # Number of halvings that find a reachable speed to the last digit.
 HALVINGS = 60
-# On a segment of a repaired profile the speed is at least this part of what the path allows.
+# The least speed on a segment of a repaired profile as a share of the speed that the path allows.
 SLOWEST = 1e-3
 
 
@@ -259,7 +259,7 @@ def _speeds(problem: Problem, guide: SpeedProfile, piece: NDArray[np.uint32], u:
 
 
 def _improved(subrun: Subrun, motions: Motions, deadline: float) -> list[Section]:
-    """The sections of the quickest profile found; none where there are no segments, or none is found."""
+    """The sections of the fastest profile found; empty without segments, and where no profile is found."""
     segments, inner = subrun.segments, range(1, len(subrun.segments))
     for margin in MARGINS:
         shares = subrun.first_shares(margin)

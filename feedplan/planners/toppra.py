@@ -45,7 +45,7 @@ def plan(
 
     `time_limit` [s] ends the refinement; toppra itself cannot be interrupted. `scheme` is `one-sided`, or
     `collocation`, whose profile is faster than the limits allow. Raises SolverError where toppra fails,
-    InfeasibleError where a speed given at an end cannot be had, MissingPackageError.
+    InfeasibleError where a given speed at an end is not possible, MissingPackageError.
     """
     one_of(scheme, "scheme of toppra", SCHEMES)
     feasible = scheme == "one-sided"
@@ -123,7 +123,7 @@ def _constraint(task: Transcription, start: Array, end: Array, grid: Array, squa
 
 
 def _path(grid: Array) -> Any:
-    """A path of which toppra needs no more than where its parameter begins and ends."""
+    """A path for toppra, which uses only the ends of its parameter."""
     from toppra.interpolator import AbstractGeometricPath
 
     class Line(AbstractGeometricPath):  # type: ignore[misc]

@@ -45,8 +45,8 @@
 | / at the start of a block | left out, with a warning, unless `block_delete=False` |
 
 Parameters: #1 to #30 and #<name> belong to their call, #31 to #5602, #7001 to #8980 and #<_name> to all;
-#5161 to #5390 hold home and offsets, #5400 to #5428 tell tool and position, #<_x>, #<_metric> and their kin
-the modes. What is not set is 0, with a warning; names must be set. In a macro of G65 words of arguments
+#5161 to #5390 hold home and offsets, #5400 to #5428 are tool and position, #<_x>, #<_metric> and others like
+them the modes. What is not set is 0, with a warning; names must be set. In a macro of G65 words of arguments
 that are not given are left out; values of the control (#1000 to #5160) that nothing sets and alarms (#3000)
 are errors. Loops and calls are bounded: by `max_moves`, four lines a move beside the text, and 100 calls
 deep. Subprograms in files are looked for beside the program, then in `subprograms`; their moves have the

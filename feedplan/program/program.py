@@ -31,7 +31,7 @@ class MoveKind(IntEnum):
 
 
 class StopCause(IntEnum):
-    """Why a program asks for a full stop after a move; of several causes the last one here."""
+    """The cause of a full stop after a move; of several causes the last one in this list."""
 
     NONE = 0
     CHANGE = 1  # of the coordinate mode or the tool length

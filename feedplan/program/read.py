@@ -74,14 +74,14 @@ def read_program(
     """The moves of a part program: a path file (.json), a drawing (.dxf), else G-code.
 
     `source`: the path of a file; or the program itself, as bytes, as a str with a line break, or as an open
-    file or another stream. `name` stands in messages instead of the file's name, and its ending tells the
-    language; where there is none the first characters do. `machine`, or the name or file of one, gives work
-    offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete` leaves
-    out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and diameters of
-    tools; `subprograms` are folders of files that the program calls, after its own; `feed` [mm/s, deg/s] is
-    that of moves before the first F; `whole_step` is the unit of lengths without a decimal point, in units of
-    the program; G-code of more than `max_moves`, loops and calls counted, is refused. `progress` gets the
-    part done.
+    file or another stream. `name` stands in messages instead of the file's name, and its ending decides
+    the language; without an ending the first characters decide. `machine`, or the name or file of one, gives
+    work offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete`
+    leaves out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and
+    diameters of tools; `subprograms` are folders of files that the program calls, after its own; `feed`
+    [mm/s, deg/s] is that of moves before the first F; `whole_step` is the unit of lengths without a decimal
+    point, in units of the program; G-code of more than `max_moves`, loops and calls counted, is refused.
+    `progress` gets the part done.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.

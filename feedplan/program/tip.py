@@ -91,7 +91,7 @@ class TipControl:
     def _follow(
         self, chain: RotaryChain, entry: Sequence[float], places: Sequence[Sequence[float]]
     ) -> list[float]:
-        """The rotary joints after a stretch of directions, in the pose that it begins with."""
+        """The rotary joints after moves by directions, in the pose in which these begin."""
         names = chain.joint_names[3:]
         before = {name: entry[AXIS_LETTERS.index(name)] for name in names}
         first = ToolVector(chain).from_part[0].name

@@ -37,7 +37,7 @@ _MAY_TURN = "ABCUV"
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
-    """The machine of a dump of settings; raises MachineError where it has none of an axis."""
+    """The machine of a dump of settings; raises MachineError where no axis has a setting."""
     settings: dict[int, Setting] = {}
     for line, place in files.lines(path):
         match = _SETTING.match(line)

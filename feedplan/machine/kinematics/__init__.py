@@ -27,9 +27,9 @@ class Kinematics(ABC):
     """A machine type with its dimensions.
 
     `tip_names` are the program letters that `joints` takes in this order, `joint_names` the machine's axis
-    letters in its file's order. `rotary` tells which joints are angles [deg]; the others are lengths [mm].
-    `turning` tells which joints are known up to whole turns only, since they come from `atan2`: along a path
-    they are followed continuously. `always` is true where a program's words always mean the tip, as X, Y, Z
+    letters in its file's order. `rotary`: the joint is an angle [deg]; the others are lengths [mm].
+    `turning`: the joint is known up to whole turns only, since it comes from `atan2`; along a path it is
+    continuous. `always` is true where a program's words always mean the tip, as X, Y, Z
     on a cylindrical machine; false where they are joint positions until G43.4 or the like. `any_unit`: joints
     need not be in mm and degrees.
     """
