@@ -61,7 +61,7 @@ def _part(problem: Problem) -> Array:
 
 
 def on_arcs(tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array) -> tuple[Array, Array]:
-    """√3/2 across the path of the acceleration of every direction, and the rest along it at the greatest speed.
+    """√3/2 of the acceleration of every direction across the path; along it the rest at the greatest speed.
 
     The rest is half of it (`shared_acceleration`) where the bend limits the speed, more where the feed does
     (`tc.c`: `tcUpdateCircleAccRatio`).
