@@ -61,6 +61,9 @@ from feedplan.units import counted
 
 # How far the stage `plan` is when the profile is there, and the bound that is known for all methods.
 PLANNING, BOUND = 0.6, 0.8
+# Where a method's own bound leaves at most this gap, the bound for all methods is left out: it gains little,
+# and can cost half of a jerk-limited plan.
+CLOSE = 1e-3
 # How far an audit is when the times of the setpoints are laid out.
 LAID_OUT = 0.02
 
@@ -454,15 +457,18 @@ def plan(
         if not math.isfinite(profile.time):
             raise SolverError(f"{method} loses its digits on this path: take another method or machine")
     with _timed(compute, "bound"):
-        share_of_all = part(share, PLANNING, 1.0 if bound_of(method) is None else BOUND)
-        least = lower_bound(problem, profile, share_of_all)
-        left = time_limit if limit is None else limit.left
         settings = {**options_of(method), **given}
+        # A method's own bound takes what is left of a time limit.
+        first = bound_of(method) is None or time_limit is not None
+        least = lower_bound(problem, profile, part(share, PLANNING, BOUND)) if first else 0.0
+        left = time_limit if limit is None else limit.left
         known = bound_of(
             method, **{name: left if name == "time_limit" else own for name, own in given.items()}
         )
         if known is not None:
             least = max(least, known(problem, profile, progress=part(share, BOUND, 1.0), **others))
+        if not first and least < (1.0 - CLOSE) * profile.time:
+            least = max(least, lower_bound(problem, profile, part(share, 1.0, 1.0)))
         wanted = settings.get("accuracy", 0.0)
         short = shortfalls(
             profile,

@@ -20,7 +20,7 @@ from feedplan.lower_bound import lower_bound
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import bound_of, planner
-from feedplan.profile import ArcKind
+from feedplan.profile import ArcKind, SpeedProfile
 from tests.campaign import SEEDS, seeds
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
@@ -83,6 +83,22 @@ def test_the_relaxation_proves_the_lemniscate_and_more_than_the_second_order_bou
     assert known is not None
     assert lower_bound(problem, profile) < known(problem, profile) <= profile.time
     assert known(problem, profile) >= 0.9995 * profile.time
+
+
+def test_the_bound_for_all_methods_is_made_only_where_the_own_one_is_not_close(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: list[float] = []
+
+    def counted(problem: Problem, profile: SpeedProfile, progress: object = None) -> float:
+        made.append(profile.time)
+        return lower_bound(problem, profile)
+
+    monkeypatch.setattr("feedplan.planning.lower_bound", counted)
+    near = plan_program(Path.from_curve(lemniscate(), feed=FREE), CURVES, "jerk-limited")
+    assert (made, near.gap < 3e-4) == ([], True)
+    far = plan_program(Path.from_curve(butterfly(), feed=FREE), CURVES, "jerk-limited", accuracy=1e-3)
+    assert (made, far.gap < 0.035) == ([far.time], True)
 
 
 def test_other_solvers_find_the_same_time_on_the_same_grid() -> None:
