@@ -45,12 +45,13 @@ def build_path(
       `settings.exact_tolerance`, and stops where the direction jumps. A turn of less than a degree beside an
       arc or a spline comes from rounded coordinates: it is smoothed within the same tolerance.
     - G64 stays within a tolerance [mm] of the program, and the program within it of the path: chains of G1
-      moves are fitted, and corners are rounded. The tolerance is `tolerance`, else the program's P, else
-      `settings.default_tolerance`; 0 means exact lines with stops. Q limits the fit only.
+      moves are fitted, and corners are rounded, those of rapids too. The tolerance is `tolerance`, else the
+      program's P, else `settings.default_tolerance`; 0 means exact lines with stops. Q limits the fit only.
 
-    Where G64 meets G61 the stricter mode holds. Rapids are lines of their own. Arcs become true circles.
-    Splines enter the path unchanged, their widths scaled to about the length, without pieces of no length;
-    only at corners are their ends cut and bent, as those of lines and arcs are.
+    Where G64 meets G61 the stricter mode holds. A blend of a rapid and a feed move has the feed up to the
+    place nearest to the corner. Arcs become true circles. Splines enter the path unchanged, their widths
+    scaled to about the length, without pieces of no length; only at corners are their ends cut and bent, as
+    those of lines and arcs are.
 
     `corners` chooses another treatment of corners:
 
@@ -60,10 +61,10 @@ def build_path(
     - SMOOTH: all moves between two stops, arcs and splines too, are one curve of continuous fourth derivative
       within the tolerance; Q does not count. Exact moves are followed within `exact_tolerance`, with the
       lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and bends
-      of points keep their size, except with FASTEST. The path stops where G0 meets other moves, where an
-      exact path meets another one, and where it turns back by more than 135°. Where it goes back along its
-      own line, and nothing else asks for a stop, it rests within a run. Where no curve is found, corners are
-      rounded one by one between stops, and `Path.warnings` says so.
+      of points keep their size, except with FASTEST. The path stops where a rapid meets a feed below 1e-4 of
+      the machine's speed, where an exact path meets another one, and where it turns back by more than 135°.
+      Where it goes back along its own line, and nothing else asks for a stop, it rests within a run. Where no
+      curve is found, corners are rounded one by one between stops, and `Path.warnings` says so.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The tool
     also stops where the coordinate mode or the tool length changes.

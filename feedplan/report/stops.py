@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.program.program import MoveKind, PathControl, Program, StopCause
+from feedplan.program.program import PathControl, Program, StopCause
 from feedplan.report.activity import ACTIVE, Activity
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,6 @@ _ASKED = {
     StopCause.CHANGE: "change of mode or tool length (G43.4, G43.5, G49)",
 }
 _EXACT_STOP = "exact stop (G61.1)"
-_RAPID = "change between G0 and G1"
 
 # A path that turns by more than this [deg] turns back; by less than this it has no corner.
 _BACK, _STRAIGHT = 135.0, 0.5
@@ -82,15 +81,11 @@ def _causes(problem: Problem, program: Program | None, first: NDArray[np.int64])
         cause = OTHER
         if program is not None and control is not None and program.stop_cause is not None:
             asked = StopCause(int(program.stop_cause[before : max(after, before + 1)].max()))
-            rapid = program.kind[[before, after]] == MoveKind.RAPID
             if asked in _ASKED:
                 result.append(_ASKED[asked])
                 continue
             if control[before] == PathControl.EXACT_STOP:
                 result.append(_EXACT_STOP)
-                continue
-            if rapid[0] != rapid[1]:
-                result.append(_RAPID)
                 continue
         if turn[k] > _BACK:
             cause = TURN_BACK

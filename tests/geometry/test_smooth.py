@@ -19,6 +19,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.planning import plan
 from feedplan.program.program import MoveKind, PathControl, Program
+from feedplan.program.read import read_program
 
 MILL = Machine.load("mill")
 SQUARE = np.array([[0, 0], [100, 0], [100, 100], [0, 100], [0, 0]], dtype=float)
@@ -81,21 +82,54 @@ def test_a_square_in_g64_is_one_run_with_straight_sides_that_passes_the_audit(ma
     assert verdict.to_json()["deviation"]["ratio"] > 0.9
 
 
-def test_the_path_stops_where_it_turns_back_where_rapids_meet_feeds_and_where_it_is_told(
-    make_program: Any,
-) -> None:
+def test_the_path_stops_where_it_turns_back_and_where_it_is_told(make_program: Any) -> None:
     points = [[0, 0], [10, 0], [20, 5], [12, 0.5], [5, 0], [5, 10], [5, 20], [0, 25], [-5, 25], [-9, 20]]
     kind = [MoveKind.LINE] * 5 + [MoveKind.RAPID] * 2 + [MoveKind.LINE] * 2
     program = make_program(points, kind=kind, dwell=[0, 0, 0, 0, 0, 0, 0, 0.5, 0])
     path = smooth(program)
     assert_smooth(path)
-    np.testing.assert_array_equal(path.move[path.runs[1:] - 1, 1], [1, 4, 6, 7, 8])
-    assert path.dwell[3] == 0.5
+    np.testing.assert_array_equal(path.move[path.runs[1:] - 1, 1], [1, 7, 8])
+    assert path.dwell[1] == 0.5
     assert path.warnings == (
         "line 11: the path turns back by more than 135°, and stops: no curve within the tolerance goes "
         "around it",
     )
     assert audited(program, path).ok
+
+
+def test_a_rapid_between_feed_moves_is_one_run_and_each_keeps_its_feed_to_the_corner(
+    make_program: Any,
+) -> None:
+    # From X0 to X50, by a rapid to Y50, back to X0.
+    points = [[0, 0], [50, 0], [50, 50], [0, 50]]
+    kind = [MoveKind.LINE, MoveKind.RAPID, MoveKind.LINE]
+    program = make_program(points, kind=kind, feed=50.0, blend_tolerance=0.1)
+    path = smooth(program)
+    assert_smooth(path)
+    np.testing.assert_array_equal(path.runs, [0, len(path)])
+    assert 0.09 < path.fit.deviation <= 0.1
+    rapid = path.feed == np.inf
+    assert (path.move[rapid] == 1).all()
+    assert set(path.feed[~rapid]) == {50.0}
+    # To 1 % of the tolerance the rapid is nearer to its own line (X50) than to Y0 and Y50.
+    x, y = path.curve.control_points[path.curve.offsets[:-1], :2][rapid].T
+    from_feed = np.minimum(np.abs(y), np.abs(50 - y))
+    assert (from_feed >= np.abs(50 - x) - 1e-3).all()
+    assert 0.05 < from_feed.min() < 0.1
+    assert audited(program, path).ok
+    exact = make_program(points, kind=kind, feed=50.0, control=PathControl.EXACT_STOP)
+    np.testing.assert_array_equal(smooth(exact).runs, np.arange(4))
+    limited = [plan(own, MILL, "jerk-limited") for own in (program, exact)]
+    assert all(own.audit().ok for own in limited)
+    assert limited[0].time < limited[1].time - 0.05
+
+
+def test_an_event_between_a_rapid_and_a_feed_move_stops_there_or_keeps_its_place() -> None:
+    text = "G21 G90 G64 P0.1 F3000\nG1 X50\n{event}\nG0 Y50\nG1 X0\nM2\n"
+    for event, runs in (("M3 S900", 2), ("M62 P1", 1), ("G4 P0.2", 2), ("G61", 3)):
+        made = plan(read_program(text.format(event=event).encode()), MILL, "jerk-limited")
+        assert len(made.path.runs) - 1 == runs, event
+        assert made.audit().ok
 
 
 def test_pieces_are_cut_beside_the_points_where_feed_or_tolerance_change(make_program: Any) -> None:
@@ -217,8 +251,6 @@ def test_random_points_are_followed_within_the_tolerance_stops_and_all(axes: int
 
 
 def test_a_spline_of_the_program_is_followed_with_the_lines_beside_it(tmp_path: FilePath) -> None:
-    from feedplan.program.read import read_program
-
     file = tmp_path / "a.ngc"
     file.write_text("G64 P0.02\nF3000\nG1 X10\nG5 I5 J0 P-5 Q0 X30 Y10\nG1 X40\nM2\n")
     program = read_program(file, MILL)

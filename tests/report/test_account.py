@@ -110,7 +110,6 @@ def test_stops_are_counted_by_cause() -> None:
         "dwell (G4)": 1,
         "tool change (M6)": 1,
         "spindle, coolant and the like": 1,
-        "change between G0 and G1": 2,
         "exact stop (G61.1)": 2,
         "corner on the exact path (G61)": 2,
         "turning back": 1,

@@ -31,5 +31,5 @@ pub const SAME_ANGLE: f64 = 4.0 * f64::EPSILON;
 pub const LAST_STEP: f64 = 3e-9;
 /// Error of length tables as a fraction of their length. [so that steps down to 1e-7 of a table are right to 1e-6]
 pub const TABLE: f64 = 1e-13;
-/// A curvature that changes |C'|² by less than this fraction along a piece is none. [below rounding of |C'|]
+/// C'' that changes |C'|² by less than this fraction along a piece counts as 0. [below rounding of |C'|]
 pub const NO_CURVATURE: f64 = 1e-40;

@@ -10,7 +10,7 @@ mod corner_rounding;
 mod smooth_path;
 mod travel;
 
-use crate::program_pieces::{program_pieces, MoveError, Moves, PathOptions, ProgramPieces};
+use crate::program_pieces::{program_pieces, FitCounts, MoveError, Moves, PathOptions, ProgramPieces};
 use crate::smooth_fit::Offsets;
 use corner_rounding::round_corners;
 pub use corner_rounding::Chunk;
@@ -41,10 +41,7 @@ pub struct BuiltPath<const M: usize> {
     pub deviation: f64,
     /// The side of the program on which a smooth path lies, and its distance.
     pub offsets: Option<Offsets>,
-    /// Numbers of fitted chords, of splines fitted to them, and of the splines' polynomials.
-    pub points: usize,
-    pub splines: usize,
-    pub polynomials: usize,
+    pub fit: FitCounts,
     /// The first place outside the travel of an axis.
     pub outside: Option<Outside>,
     /// Where a smooth path stops without being told to.
@@ -58,8 +55,7 @@ pub fn build_path<const M: usize>(
     axes: &Axes<M>,
     watch: Watch,
 ) -> Result<BuiltPath<M>, MoveError> {
-    let ProgramPieces { pieces, points, splines, polynomials } =
-        program_pieces(moves, options, watch.part(0.6))?;
+    let ProgramPieces { pieces, fit } = program_pieces(moves, options, watch.part(0.6))?;
     let (chunks, runs) =
         round_corners(&pieces, moves.splines, moves.halt, options.rounding, axes, watch.part(0.4));
     Ok(BuiltPath {
@@ -67,9 +63,7 @@ pub fn build_path<const M: usize>(
         outside: outside(&chunks, moves, &axes.travel),
         chunks,
         runs,
-        points,
-        splines,
-        polynomials,
+        fit,
         ..BuiltPath::default()
     })
 }

@@ -7,7 +7,7 @@ mod chords;
 mod feed_cuts;
 mod shape;
 
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 
 use rayon::prelude::*;
 
@@ -117,12 +117,27 @@ pub enum MoveFault {
     Spline,
 }
 
-/// The pieces of a program, and the numbers of fitted chords, of splines fitted to them, and of their polynomials.
+/// The pieces of a program, and what was fitted.
+#[derive(Default)]
 pub struct ProgramPieces<const M: usize> {
     pub pieces: Vec<PathPiece<M>>,
-    pub points: usize,
+    pub fit: FitCounts,
+}
+
+/// Numbers of fitted chords, of splines fitted to them, and of the splines' polynomials.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FitCounts {
+    pub chords: usize,
     pub splines: usize,
     pub polynomials: usize,
+}
+
+impl AddAssign for FitCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.chords += other.chords;
+        self.splines += other.splines;
+        self.polynomials += other.polynomials;
+    }
 }
 
 /// Consecutive moves that one task turns into pieces.
@@ -257,13 +272,10 @@ pub fn program_pieces<const M: usize>(
         })
         .collect::<Result<_, _>>()?;
     let total = parts.iter().map(|part| part.pieces.len()).sum();
-    let mut whole =
-        ProgramPieces { pieces: Vec::with_capacity(total), points: 0, splines: 0, polynomials: 0 };
+    let mut whole = ProgramPieces { pieces: Vec::with_capacity(total), ..ProgramPieces::default() };
     for part in parts {
         whole.pieces.extend_from_slice(&part.pieces);
-        whole.points += part.points;
-        whole.splines += part.splines;
-        whole.polynomials += part.polynomials;
+        whole.fit += part.fit;
     }
     Ok(whole)
 }
@@ -311,7 +323,7 @@ fn one_by_one<const M: usize>(
             ..line
         }));
     }
-    Ok(ProgramPieces { pieces, points: 0, splines: 0, polynomials: 0 })
+    Ok(ProgramPieces { pieces, fit: FitCounts::default() })
 }
 
 /// The pieces of a chain, with one feed each.
@@ -356,7 +368,8 @@ fn chain<const M: usize>(
     }
     let mut splines: Vec<u32> = fitted.iter().map(|fit| fit.spline).collect();
     splines.dedup();
-    Ok(ProgramPieces { pieces, points: points.len() - 1, splines: splines.len(), polynomials: fitted.len() })
+    let fit = FitCounts { chords: end - first, splines: splines.len(), polynomials: fitted.len() };
+    Ok(ProgramPieces { pieces, fit })
 }
 
 #[cfg(test)]
@@ -447,7 +460,7 @@ mod tests {
         }
         fit.fill(0.0);
         let lines = pieces_of_lines(&target, &feed, &fit, &halt);
-        assert_eq!((lines.pieces.len(), lines.points), (100, 0));
+        assert_eq!((lines.pieces.len(), lines.fit.chords), (100, 0));
     }
 
     #[test]

@@ -31,9 +31,15 @@ pub const SWEEP: f64 = 0.1;
 /// A position this far beyond the travel is within. [coordinates, as sums of offsets]
 pub const TRAVEL: f64 = 1e-6;
 
+// Fractions of a speed.
+
+/// A feed below this fraction of the greatest speed is next to rest: a stop where it meets a rapid costs milliseconds, and
+/// the speeds of one run differ by no more than planners have digits for.
+pub const CRAWL: f64 = 1e-4;
+
 // Fractions of the allowed deviation.
 
-/// A deviation may exceed what is allowed by this fraction. [sums]
+/// A deviation may exceed the allowed one by this fraction. [sums]
 pub const EXCESS: f64 = 1e-9;
 /// A corner that exceeds the tolerance is made shorter by this fraction more than in proportion. [so that it ends]
 pub const SHORTER: f64 = 1e-5;

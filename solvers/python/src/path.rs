@@ -246,7 +246,7 @@ where
         PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
     let offsets = path.offsets.map(|offsets| [offsets.mean(), offsets.inside, offsets.outside]);
-    let summary = (path.points, path.splines, path.polynomials, path.deviation, offsets);
+    let summary = (path.fit.chords, path.fit.splines, path.fit.polynomials, path.deviation, offsets);
     let zones: Vec<i64> = path.not_smooth.corners.iter().flatten().map(|&i| i64::from(i)).collect();
     let not_smooth = (
         PyArray1::from_iter(py, path.not_smooth.reversals.iter().map(|&i| i64::from(i))),

@@ -1,10 +1,10 @@
-//! The lengths of blends that share the pieces between their corners.
+//! The lengths of blends, from those that they can use and the lengths between their corners.
 
-/// The length of each blend on either side of its corner, from the length that each has a use for, and the lengths
-/// between one corner and the next. Corners that are not rounded have a use for 0.
+/// The length of each blend on either side of its corner, in mm.
 ///
-/// A blend gets half of what is between it and its neighbour, or what the neighbour has no use for. What a blend cannot
-/// have on one side of its corner it has no use for on the other; two more rounds hand that on.
+/// `wanted` is the greatest length that the blend can use (0 where the corner is not rounded), `span[k]` the length between
+/// corner k and corner k + 1. A blend gets half of a span, or the part that the blend at the other end cannot use. A blend
+/// that is short on one side is as short on the other: in two more rounds its neighbours get the rest.
 pub fn share_lengths(wanted: &[f64], span: &[f64]) -> Vec<f64> {
     const ROUNDS: usize = 3;
     let grant = |span: f64, other: f64| (0.5 * span).max(span - other);
@@ -24,7 +24,7 @@ pub fn share_lengths(wanted: &[f64], span: &[f64]) -> Vec<f64> {
     };
     let mut length = shared(wanted);
     for _ in 1..ROUNDS {
-        // The others have at least `length`, so none can get more than what that leaves.
+        // Each blend gets at least `length`, so its neighbours get at most the rest.
         let limit = shared(&length);
         length = shared(&limit);
     }

@@ -4,11 +4,11 @@
 //! between corner k and corner k + 1; its stations are sums of widths. All is done for many corners in parallel and joined
 //! in order, so the path does not depend on the number of threads:
 //!
-//! 1. each corner that may be rounded says how long a blend it has a use for;
-//! 2. blends share the spans between them (`share_lengths`);
-//! 3. each blend is made shorter until its deviation is within the tolerance;
-//! 4. blends and what they leave of the spans become the path. A corner without a blend is a stop, unless the machine
-//!    allows a velocity jump there.
+//! 1. the greatest length that the blend of each corner can use, by feed, accelerations and tolerance;
+//! 2. the lengths of blends that share the spans between them (`share_lengths`);
+//! 3. shorter lengths, until the deviation of each blend is within the tolerance;
+//! 4. the path: blends, and the rest of the spans between them. A corner without a blend is a stop, unless the machine
+//!    allows a velocity jump.
 
 use rayon::prelude::*;
 
@@ -263,7 +263,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         None
     }
 
-    /// Blends and what they leave of the spans, in order, and the first piece of each run.
+    /// Blends and the rest of the spans between them, in order, and the first piece of each run.
     fn assemble(&self, cuts: &[Option<Cuts>], jump: bool, watch: Watch) -> (Vec<Chunk<M>>, Vec<usize>) {
         let count = self.length.len();
         let tasks: Vec<(Chunk<M>, Vec<usize>)> = (0..count.div_ceil(TASK))

@@ -3,8 +3,8 @@
 //! The tool stops where
 //!
 //! * the program halts,
-//! * rapids begin or end,
-//! * moves that ask for the exact path meet others, and
+//! * moves that ask for the exact path meet others,
+//! * a rapid meets a feed that is next to rest, and
 //! * the path turns back; along the line that it came on it rests within a run, if nothing else asks for a stop.
 //!
 //! Lines that ask for the exact path stay lines, and stop at their corners. Arcs and splines that ask for it, with the
@@ -17,7 +17,9 @@ use rayon::prelude::*;
 
 use super::travel::outside;
 use super::{deviation, Axes, BuiltPath, Chunk};
-use crate::program_pieces::{Chord, Chords, MoveError, Moves, PathOptions, PathPiece, Shape, RAPID};
+use crate::program_pieces::{
+    Chord, Chords, FitCounts, MoveError, Moves, PathOptions, PathPiece, Shape, RAPID,
+};
 use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 use crate::tolerance;
@@ -42,8 +44,7 @@ struct Section<const M: usize> {
     /// The first piece of each run.
     runs: Vec<usize>,
     not_smooth: NotSmooth,
-    /// Numbers of fitted chords, splines and polynomials.
-    fit: [usize; 3],
+    fit: FitCounts,
     offsets: Offsets,
 }
 
@@ -57,7 +58,7 @@ pub fn build_smooth_path<const M: usize>(
     watch: Watch,
 ) -> Result<BuiltPath<M>, MoveError> {
     let each = watch.each(moves.kind.len());
-    let sections: Vec<Section<M>> = sections(moves)
+    let sections: Vec<Section<M>> = sections(moves, tolerance::CRAWL * options.max_speed)
         .into_par_iter()
         .map(|range| Section::new(moves, options, axes, range.clone(), sized, each.part(range.len() as f64)))
         .collect::<Result<_, _>>()?;
@@ -67,9 +68,7 @@ pub fn build_smooth_path<const M: usize>(
         path.runs.extend(section.runs.iter().map(|start| start + total));
         total += section.chunk.pieces.len();
         path.chunks.push(section.chunk);
-        path.points += section.fit[0];
-        path.splines += section.fit[1];
-        path.polynomials += section.fit[2];
+        path.fit += section.fit;
         offsets.merge(&section.offsets);
         path.not_smooth.reversals.extend(section.not_smooth.reversals);
         path.not_smooth.corners.extend(section.not_smooth.corners);
@@ -83,18 +82,18 @@ pub fn build_smooth_path<const M: usize>(
     Ok(path)
 }
 
-/// The moves between places where the path stops whatever its shape.
-fn sections<const M: usize>(moves: &Moves<M>) -> Vec<Range<usize>> {
+/// The moves between places where the path stops whatever its shape. Rapids and feeds below `crawl` (mm/s) meet in a stop.
+fn sections<const M: usize>(moves: &Moves<M>, crawl: f64) -> Vec<Range<usize>> {
+    let is_rapid = |i: usize| moves.kind[i] == RAPID;
+    let crawls = |i: usize| !is_rapid(i) && moves.feed[i] < crawl;
     let mut sections = Vec::new();
     let mut first = 0;
     for i in 1..=moves.kind.len() {
-        let goes_on = i < moves.kind.len() && {
-            let alike = |f: &dyn Fn(usize) -> bool| f(i - 1) == f(i);
-            !moves.halt[i - 1]
-                && alike(&|k| moves.kind[k] == RAPID)
-                && alike(&|k| moves.tolerance[k] > 0.0)
-                && moves.changes.binary_search_by_key(&i, |change| change.0).is_err()
-        };
+        let goes_on = i < moves.kind.len()
+            && !moves.halt[i - 1]
+            && (moves.tolerance[i - 1] > 0.0) == (moves.tolerance[i] > 0.0)
+            && !(is_rapid(i - 1) && crawls(i) || crawls(i - 1) && is_rapid(i))
+            && moves.changes.binary_search_by_key(&i, |change| change.0).is_err();
         if !goes_on {
             sections.push(first..i);
             first = i;
@@ -231,9 +230,8 @@ impl<const M: usize> Section<M> {
             let like = piece_along(&own[along.first..=along.last], along.deviation, *exact);
             self.chunk.push(&control, piece.width, like);
         }
-        self.fit[0] += (own[own.len() - 1].last - own[0].first) as usize + 1;
-        self.fit[1] += smooth.splines;
-        self.fit[2] += smooth.polynomials;
+        let moves = (own[own.len() - 1].last - own[0].first) as usize + 1;
+        self.fit += FitCounts { chords: moves, splines: smooth.splines, polynomials: smooth.polynomials };
         self.offsets.merge(&smooth.offsets);
         let corners = smooth.corners.iter().map(|zone| [own[zone.start].first, own[zone.end - 1].last]);
         self.not_smooth.corners.extend(corners);
