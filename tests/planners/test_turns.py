@@ -86,3 +86,15 @@ def test_random_strokes_keep_all_limits_and_are_never_slower_than_with_stops(see
 def test_a_pause_at_the_turn_lets_the_acceleration_vanish() -> None:
     paused = planned("G1 X10 F15000\nG4 P0.1\nG1 X0")
     assert paused.time - 0.1 > 1.1 * planned("G1 X10 F15000\nG1 X0").time
+
+
+def test_arcs_there_and_back_take_one_acceleration_at_each_turn() -> None:
+    # A line and a half circle there, both back: neither side of a turn is a line with one feed.
+    lap = "G1 X4 Y4 F9000\nG2 X10 Y4 I3 J0\nG3 X4 Y4 I-3 J0\nG1 X0 Y0 F15000"
+    paused = planned(lap.replace("\nG3", "\nG4 P0.000000001\nG3"))
+    made = planned(lap)
+    turn = int(np.flatnonzero(made.profile.p1 == 0.0)[0])
+    accelerations = made.profile.a1[turn], made.profile.a0[turn + 1]
+    assert accelerations[0] == -accelerations[1] < -1000.0
+    assert made.time < 0.96 * paused.time
+    assert 0.98 * made.time < made.lower_bound <= made.time
