@@ -17,7 +17,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.geometry.path import Path
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, setpoints
 
 NAME = "interpolators"
@@ -112,7 +112,7 @@ def constant_feed(path: Path) -> SpeedProfile:
     p = (FEED * path.width[:, None] / 2 / np.linalg.norm(edges, axis=2)) ** 2
     return SpeedProfile(
         piece=np.arange(count, dtype=np.uint32),
-        kind=np.full(count, ArcKind.FEED, np.uint8),
+        kind=np.full(count, PhaseLaw.FEED, np.uint8),
         axis=np.full(count, 255, np.uint8),
         value=np.full(count, FEED**2),
         u0=np.zeros(count),

@@ -10,7 +10,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem, speed_square
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(20)
@@ -127,7 +127,7 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
     v = np.sqrt(np.maximum(w, 0.0))
     a, j = slope / 2, v * bend / 2
     # Constant jerk: bisection for the time at each length, from the slower end, where rounding matters most.
-    rows = profile.kind == ArcKind.PATH_JERK
+    rows = profile.kind == PhaseLaw.PATH_JERK
     back = (v1 < v0)[rows, None]
     way = np.where(back, h[rows] - s[rows], s[rows])
     low, high = np.zeros_like(way), np.repeat(profile.duration[rows, None], s.shape[1], axis=1)
@@ -146,7 +146,7 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
 def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
     """Differences of length and time (phases,) from the columns of the profile."""
     t, length = profile.duration, s[:, -1]
-    constant = profile.kind == ArcKind.PATH_JERK
+    constant = profile.kind == PhaseLaw.PATH_JERK
     way = t * (v[:, 0] + t * (profile.a0 / 2 + t * profile.value / 6))
     # Parts as for the lengths, because 1/v is nearly singular next to rest.
     ends = np.concatenate([[0.0], DECADES, [0.5], 1 - DECADES[::-1], [1.0]])

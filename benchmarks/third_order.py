@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from benchmarks.jerk_excess import lengths
 from feedplan.constraints.problem import Problem
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
 # Matrices for the unknowns, each with the upper limits of its rows.
@@ -114,7 +114,7 @@ class Grid:
 
 def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     """The grid of a profile from rest to rest whose ramps are one phase each."""
-    cubic = np.flatnonzero(profile.kind == ArcKind.SPEED_CUBIC)
+    cubic = np.flatnonzero(profile.kind == PhaseLaw.SPEED_CUBIC)
     assert len(cubic) == len(profile) - 2
     piece, u0, u1 = profile.piece, profile.u0, profile.u1
     u = u0[:, None] + (u1 - u0)[:, None] * PLACES

@@ -1,4 +1,4 @@
-"""A speed profile: the exact arcs of p = (du/dt)² along a path."""
+"""A speed profile: the exact phases of p = (du/dt)² along a path."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from feedplan._solvers import Profile
 from feedplan.native import OfNative
 from feedplan.units import counted
 
-# The `axis` of an arc whose constant belongs to none.
+# The `axis` of a phase whose constant belongs to none.
 NO_AXIS = 255
 
 
-class ArcKind(IntEnum):
-    """What stays constant on an arc of the profile; `value` holds the constant."""
+class PhaseLaw(IntEnum):
+    """What stays constant on a phase of the profile; `value` holds the constant."""
 
     AXIS_ACCELERATION = 0  # q'_k s + q''_k p = value [mm/s²], signed
     PARAMETER_ACCELERATION = 1  # s = p'/2 = value [mm/s²], so that p is linear in u
     FEED = 2  # the speed that the feed limits: |C'|² p = value [mm²/s²], by the problem's `feed_share`
     AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
-    CHORD = 4  # the chord-error limit on a quadratic piece: p = value · |C'|
-    SPEED_LINE = 5  # |C'|² p is linear in u from end to end [mm²/s²]; value is 0
-    PATH_JERK = 6  # the jerk along the path v̈ = value [mm/s³]: v is a quadratic polynomial of time
-    SPEED_CUBIC = 7  # v² is a cubic polynomial of the length from end to end, slopes 2a; value is 0
+    SPEED_LINE = 4  # |C'|² p is linear in u from end to end [mm²/s²]; value is 0
+    PATH_JERK = 5  # the jerk along the path v̈ = value [mm/s³]: v is a quadratic polynomial of time
+    SPEED_CUBIC = 6  # v² is a cubic polynomial of the length from end to end, slopes 2a; value is 0
 
 
-# Columns with an entry for each arc, and lists of pieces.
-OF_ARCS = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
+# Columns with an entry for each phase, and lists of pieces.
+OF_PHASES = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
 OF_PIECES = ("slowed", "kinked")
 _DTYPES = {
     **dict.fromkeys(("value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"), np.float64),
@@ -43,21 +42,18 @@ _DTYPES = {
 
 @dataclass(frozen=True, eq=False)
 class SpeedProfile(OfNative[Profile]):
-    """Arcs in the order of the path.
+    """Phases in the order of the path.
 
-    Per arc: `piece` (index into the path), `kind` (ArcKind), `axis` (the axis that the arc's constant
-    belongs to, 255 for none), `value` (see ArcKind), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
-    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) arc offsets of the path's runs. `slowed` (m,) pieces
+    Per phase: `piece` (index into the path), `kind` (PhaseLaw), `axis` (the axis that the phase's constant
+    belongs to, 255 for none), `value` (see PhaseLaw), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
+    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) phase offsets of the path's runs. `slowed` (m,) pieces
     on which the plan stops because rounding hides the way on, slower than it need be; once for each stop.
     Where the problem has a `tip_speed`, |C'|² of FEED and SPEED_LINE is that; q are the joints.
     Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
     axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
     where q'' p is large. On PARAMETER_ACCELERATION, `axis` is the one whose
     acceleration limit holds p where s is 0, if it is one.
-    An arc may begin or end with C' = 0. Paths are made so that the tool rests there: p is its limit then, or
-    0 where it has none. Where a path of another making passes such a place at a speed, p is infinite there;
-    the axis velocity follows from the other end of the arc: q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from
-    the duration where both ends are of that kind.
+    A phase may begin or end with C' = 0, where the tool rests: p is its limit there, or 0 where it has none.
     On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇ [mm/s²]; 0 on
     all other kinds. Speed v = |C'| √p and length are those along the path, by the problem's `way_speed` where
     it has one.
@@ -65,7 +61,7 @@ class SpeedProfile(OfNative[Profile]):
     `stopped`: a time limit ended the planning early. `excess`: how far the planner itself takes the time to
     be above the least on its grid [s], an estimate and no proof; NaN where it does not say.
     PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
-    All arrays are read-only. Raises InputError where those of the arcs differ in length.
+    All arrays are read-only. Raises InputError where those of the phases differ in length.
     """
 
     piece: NDArray[np.uint32]
@@ -97,7 +93,7 @@ class SpeedProfile(OfNative[Profile]):
         return len(self.piece)
 
     def __repr__(self) -> str:
-        return f"<SpeedProfile of {counted(len(self), 'arc')}: {self.time:.6g} s>"
+        return f"<SpeedProfile of {counted(len(self), 'phase')}: {self.time:.6g} s>"
 
     @property
     def time(self) -> float:

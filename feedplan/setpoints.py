@@ -73,7 +73,7 @@ class Setpoints:
     waits less than one period there, so that `duration` [s], the time of the last of `count` setpoints, is a
     little longer than the plan's time. A path that ends in motion ends at its true time, after a shorter last
     step. At a stop velocity, acceleration and jerk are 0; at a switching point, where the acceleration jumps,
-    a setpoint has the values of the arc that begins there. `computing` is the time that this took
+    a setpoint has the values of the phase that begins there. `computing` is the time that this took
     so far, `passing` what those took to whom they were passed on [s].
     """
 
@@ -214,8 +214,7 @@ def setpoints(
     on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere, the length at a
     time in closed form where the jerk along the path is constant. `newton`: steps
     of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
-    rational; arcs of kind CHORD are for quadratic ones. `progress` is told how far the laying out is;
-    `events` are those of the plan (`feedplan.event_places`).
+    rational. `progress` is told how far the laying out is; `events` are those of the plan (`feedplan.event_places`).
     Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
     setpoints than `max_setpoints`.
     """

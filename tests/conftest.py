@@ -18,7 +18,7 @@ from feedplan.events import TimedEvents
 from feedplan.geometry.path import Path
 from feedplan.knots import Knots
 from feedplan.machine.machine import Machine
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.report.account import Account, account
 from feedplan.setpoints import SetpointChunk
 from tests.campaign import EXAMPLES, examples
@@ -31,7 +31,7 @@ settings.load_profile("campaign" if EXAMPLES else "same")
 providers.is_local_module_file = lambda file: False
 
 SIDE, FEED, ACCELERATION = 20.0, 50.0, 500.0
-RAMP = ArcKind.AXIS_ACCELERATION
+RAMP = PhaseLaw.AXIS_ACCELERATION
 
 
 @dataclass
@@ -161,7 +161,7 @@ def _square(check: LimitCheck) -> SquarePlan:
     axis = np.array([[0, 255, 0], [1, 255, 1]] * 2)
     profile = SpeedProfile(
         piece=np.repeat(four, 3).astype(np.uint32),
-        kind=np.tile([RAMP, ArcKind.FEED, RAMP], 4).astype(np.uint8),
+        kind=np.tile([RAMP, PhaseLaw.FEED, RAMP], 4).astype(np.uint8),
         axis=axis.ravel().astype(np.uint8),
         value=value.ravel(),
         u0=np.tile([0.0, ramp, SIDE - ramp], 4),

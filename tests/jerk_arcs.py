@@ -11,10 +11,10 @@ from scipy.integrate import quad
 
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
-from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
+from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
-Row = tuple[int, ArcKind, float, float, float, float, float, float, float, float]
+Row = tuple[int, PhaseLaw, float, float, float, float, float, float, float, float]
 
 
 def rest_to_rest(length: float, jerk: float, share: float = 1.0) -> list[tuple[float, float]]:
@@ -51,7 +51,7 @@ def constant_jerk(
             whole = crosses or finished
             u1 = float(curve.width[piece]) if whole else float(table.locate([s1], 1e-14).u[0])
             p0, p1 = v**2 / square(curve, piece, u), v1**2 / square(curve, piece, u1)
-            rows.append((piece, ArcKind.PATH_JERK, jerk, u, u1, p0, p1, time, a, a1))
+            rows.append((piece, PhaseLaw.PATH_JERK, jerk, u, u1, p0, p1, time, a, a1))
             s, v, a, u = s1, v1, a1, u1
             left -= time
             if crosses:
@@ -73,7 +73,7 @@ def cubic_speed(
             p = [w[i] / square(curve, piece, u) for i, u in enumerate((u0, u1))]
             time = quad(lambda s, *row: 1.0 / math.sqrt(hermite(s, *row)), 0.0, s1 - s0,
                         args=(s1 - s0, *w, *dw), epsabs=1e-15, epsrel=1e-13)[0]  # fmt: skip
-            kind = ArcKind.SPEED_CUBIC
+            kind = PhaseLaw.SPEED_CUBIC
             rows.append((piece, kind, 0.0, u0, u1, p[0], p[1], time, 0.5 * dw[0], 0.5 * dw[1]))
     return profile_of(rows)
 

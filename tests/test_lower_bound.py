@@ -18,7 +18,7 @@ from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.lower_bound import lower_bound
 from feedplan.planners import planner
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from tests.campaign import seeds
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
@@ -38,7 +38,7 @@ def bare(problem: Problem, width: float = 1.0) -> SpeedProfile:
     nothing = np.zeros(count)
     return SpeedProfile(
         piece=np.arange(count, dtype=np.uint32),
-        kind=np.full(count, ArcKind.FEED, dtype=np.uint8),
+        kind=np.full(count, PhaseLaw.FEED, dtype=np.uint8),
         axis=np.full(count, 255, dtype=np.uint8),
         value=nothing,
         u0=nothing,
@@ -144,7 +144,7 @@ def test_a_profile_that_breaks_a_limit_shows_a_bound_above_its_time() -> None:
 
 def test_columns_that_differ_in_length_make_no_profile() -> None:
     profile = published()["lemniscate"].profile
-    with pytest.raises(InputError, match=f"{len(profile)} arcs, and `u1` has {len(profile) - 1} entries"):
+    with pytest.raises(InputError, match=f"{len(profile)} phases, and `u1` has {len(profile) - 1} entries"):
         replace(profile, u1=profile.u1[:-1])
 
 

@@ -24,7 +24,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ def problem_of(curve: CompositeCurve, velocity: Array | None = None, **changes: 
     return replace(problem, **changes)  # type: ignore[arg-type]
 
 
-def profile_of(*arcs: tuple[int, ArcKind, int, float, float, float, float, float, float]) -> SpeedProfile:
+def profile_of(*arcs: tuple[int, PhaseLaw, int, float, float, float, float, float, float]) -> SpeedProfile:
     """Rows of piece, kind, axis, value, u0, u1, p0, p1 and duration."""
     piece, kind, axis, value, u0, u1, p0, p1, duration = zip(*arcs, strict=True)
     return SpeedProfile(
@@ -106,7 +106,7 @@ def feed_profile(curve: CompositeCurve, feed: float) -> SpeedProfile:
     with np.errstate(divide="ignore"):
         p0, p1 = ((feed / at) ** 2 for at in speed)
     rows = zip(count, curve.width, p0, p1, np.diff(starts) / feed, strict=True)
-    return profile_of(*((int(i), ArcKind.FEED, 255, feed**2, 0.0, w, a, b, t) for i, w, a, b, t in rows))
+    return profile_of(*((int(i), PhaseLaw.FEED, 255, feed**2, 0.0, w, a, b, t) for i, w, a, b, t in rows))
 
 
 def _out_and_ahead(angle: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
@@ -142,8 +142,8 @@ def test_a_line_whose_parameter_speeds_up_is_the_school_formula(interpolator: st
     curve = CompositeCurve.from_bezier([[0.0, 1.0], [speed, 1.0], [30 - speed, 1.0], [30.0, 1.0]])
     half = math.sqrt(30 / 1000)
     peak = float((1000 * half / curve.evaluate(0, 0.5, 1)[1, 0, 0]) ** 2)
-    up = (0, ArcKind.AXIS_ACCELERATION, 0, 1000.0, 0.0, 0.5, 0.0, peak, half)
-    down = (0, ArcKind.AXIS_ACCELERATION, 0, -1000.0, 0.5, 1.0, peak, 0.0, half)
+    up = (0, PhaseLaw.AXIS_ACCELERATION, 0, 1000.0, 0.0, 0.5, 0.0, peak, half)
+    down = (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 0.5, 1.0, peak, 0.0, half)
     chunk = setpoints(problem_of(curve), profile_of(up, down), 0.001, interpolator).all()
     t = np.minimum(chunk.t, 2 * half)
     first, second = np.minimum(t, half), np.maximum(2 * half - t, 0.0)
@@ -153,34 +153,6 @@ def test_a_line_whose_parameter_speeds_up_is_the_school_formula(interpolator: st
     assert (chunk.position[:, 1] == 1.0).all()
     assert (chunk.velocity[:, 1] == 0.0).all()
     assert (chunk.jerk == 0.0).all()
-
-
-@INTERPOLATOR
-def test_a_line_with_a_cusp_at_both_ends_is_passed_at_constant_feed(interpolator: str) -> None:
-    # C' = 60 t (1 − t) (0.6, 0.8): p is infinite at both ends, the speed is not.
-    far = np.array([6.0, 8.0])
-    curve = CompositeCurve.from_bezier([0 * far, 0 * far, far, far])
-    profile = feed_profile(curve, 40.0)
-    assert np.isinf(profile.p0[0])
-    assert np.isinf(profile.p1[0])
-    chunk = setpoints(problem_of(curve), profile, 0.0007, interpolator).all()
-    np.testing.assert_allclose(chunk.position, np.outer(40 * chunk.t, far / 10), atol=1e-10)
-    np.testing.assert_allclose(chunk.velocity, np.tile([24.0, 32.0], (len(chunk), 1)), atol=1e-9)
-    assert np.abs(chunk.acceleration).max() <= 1e-4
-
-
-@INTERPOLATOR
-def test_rest_in_a_cusp_of_the_second_order_is_left_at_the_limit(interpolator: str) -> None:
-    # x = 8 t³ from rest: p grows without bound towards the start, and its limit is no number.
-    curve = CompositeCurve.from_bezier([[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [8.0, 4.0]])
-    time = math.sqrt(2 * 8 / 100.0)
-    end = (100 * time / 24) ** 2
-    arc = (0, ArcKind.AXIS_ACCELERATION, 0, 100.0, 0.0, 1.0, np.inf, end, time)
-    chunk = setpoints(problem_of(curve), profile_of(arc), 0.001, interpolator).all()
-    moving = chunk.t[1:-1, None]
-    np.testing.assert_allclose(chunk.position[1:-1], moving**2 * [50.0, 25.0], atol=1e-11)
-    np.testing.assert_allclose(chunk.velocity[1:-1], moving * [100.0, 50.0], rtol=1e-9)
-    np.testing.assert_allclose(chunk.acceleration[1:-1, 1], 50.0, rtol=1e-6)
 
 
 @INTERPOLATOR
@@ -198,7 +170,7 @@ def test_an_axis_that_turns_round_keeps_its_acceleration(interpolator: str, rati
         curve = CompositeCurve.from_bezier([[0, 0], [0, 1], [-2, 3]], width=2.0).elevated(5)
         pace, duration = math.sqrt(a), 2 / math.sqrt(a)
     end = float((a * duration / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
-    arc = (0, ArcKind.AXIS_ACCELERATION, 0, -a, 0.0, float(curve.width[0]), pace**2, end, duration)
+    arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, -a, 0.0, float(curve.width[0]), pace**2, end, duration)
     chunk = setpoints(problem_of(curve), profile_of(arc), 1e-4, interpolator).all()
     t = chunk.t
     np.testing.assert_allclose(chunk.position[:, 0], r - 0.5 * a * t**2, atol=1e-11)
@@ -289,7 +261,7 @@ def test_an_axis_that_has_all_but_turned_round_is_not_taken_for_one_at_rest() ->
     slope = float(curve.evaluate(0, 0.0, 1)[1, 0, 1])
     pace = math.sqrt(a * r) / slope
     end = float((a * time / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
-    arc = (0, ArcKind.AXIS_ACCELERATION, 0, -a, pace * t0, float(curve.width[0]), pace**2, end, time - t0)
+    arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, -a, pace * t0, float(curve.width[0]), pace**2, end, time - t0)
     chunk = setpoints(problem_of(curve), profile_of(arc), 1e-3, "sarfraz").all()
     x = r - a * (chunk.t + t0) ** 2 / 2
     expected = np.sqrt((r - x) * (r + x))
@@ -304,8 +276,8 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
     a = 80.0
     time, pace = math.sqrt(2 / a), a / 2
     profile = profile_of(
-        (0, ArcKind.AXIS_ACCELERATION, 0, a, 0.0, 1.0, pace, pace, time),
-        (0, ArcKind.AXIS_ACCELERATION, 0, a, 1.0, 2.0, pace, pace, time),
+        (0, PhaseLaw.AXIS_ACCELERATION, 0, a, 0.0, 1.0, pace, pace, time),
+        (0, PhaseLaw.AXIS_ACCELERATION, 0, a, 1.0, 2.0, pace, pace, time),
     )
     problem = problem_of(curve.elevated(degree))
     # The cusp falls between setpoints, next to one, and on one.
@@ -343,10 +315,10 @@ def test_time_and_place_agree_with_integration(seed: int) -> None:
         def tangent(u: float, piece: int = piece) -> Array:
             return np.asarray(curve.evaluate(piece, u, 1)[1, 0])
 
-        if kind in (ArcKind.AXIS_ACCELERATION, ArcKind.AXIS_VELOCITY):
+        if kind in (PhaseLaw.AXIS_ACCELERATION, PhaseLaw.AXIS_VELOCITY):
             # The way of the axis, from positions, is a quadratic of time.
             t, rest = chunk.t[row] - starts[i], starts[i] + profile.duration[i] - chunk.t[row]
-            a = value if kind == ArcKind.AXIS_ACCELERATION else 0.0
+            a = value if kind == PhaseLaw.AXIS_ACCELERATION else 0.0
             ends = curve.evaluate([piece, piece], [u0, u1])[0][:, axis]
             v0 = (ends[1] - ends[0]) / profile.duration[i] - a * profile.duration[i] / 2
             v1 = v0 + a * profile.duration[i]
@@ -360,7 +332,7 @@ def test_time_and_place_agree_with_integration(seed: int) -> None:
 
         def rate(
             u: float,
-            flat: bool = kind == ArcKind.PARAMETER_ACCELERATION,
+            flat: bool = kind == PhaseLaw.PARAMETER_ACCELERATION,
             p0: float = p0,
             ends: Any = ends,
             span: Any = (u0, u1),
@@ -388,7 +360,7 @@ def test_the_butterfly_is_followed_to_its_end(interpolator: str) -> None:
         assert abs(chunk.t[-1] - profile.time) <= period
 
 
-def joints_case(kind: ArcKind) -> tuple[Problem, SpeedProfile]:
+def joints_case(kind: PhaseLaw) -> tuple[Problem, SpeedProfile]:
     """The tip on x = u, y = u² at a constant speed, or one whose square grows evenly from 25 to 400 mm²/s²;
     three joints, of degree 9, move it."""
     tip = CompositeCurve.from_bezier([[0, 0], [1, 0], [2, 4]], width=2.0)
@@ -401,9 +373,9 @@ def joints_case(kind: ArcKind) -> tuple[Problem, SpeedProfile]:
         joints=joints,
         tip_speed=SpeedPolynomial(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
     )
-    speed_sq = (400.0, 400.0) if kind == ArcKind.FEED else (25.0, 400.0)
+    speed_sq = (400.0, 400.0) if kind == PhaseLaw.FEED else (25.0, 400.0)
     duration = tip_time(speed_sq, 2.0)
-    value = 400.0 if kind == ArcKind.FEED else 0.0
+    value = 400.0 if kind == PhaseLaw.FEED else 0.0
     return problem, profile_of((0, kind, 255, value, 0.0, 2.0, speed_sq[0], speed_sq[1] / 17, duration))
 
 
@@ -414,14 +386,14 @@ def tip_time(speed_sq: tuple[float, float], u: float) -> float:
 
 
 @INTERPOLATOR
-@pytest.mark.parametrize("kind", [ArcKind.FEED, ArcKind.SPEED_LINE])
-def test_joints_follow_the_speed_of_the_tip(interpolator: str, kind: ArcKind) -> None:
+@pytest.mark.parametrize("kind", [PhaseLaw.FEED, PhaseLaw.SPEED_LINE])
+def test_joints_follow_the_speed_of_the_tip(interpolator: str, kind: PhaseLaw) -> None:
     problem, profile = joints_case(kind)
     stream = setpoints(problem, profile, 0.0005, interpolator)
     chunk = stream.all()
     assert stream.axes == chunk.axes == ("X", "Y", "B")
     assert problem.joints is not None
-    speed_sq = (400.0, 400.0) if kind == ArcKind.FEED else (25.0, 400.0)
+    speed_sq = (400.0, 400.0) if kind == PhaseLaw.FEED else (25.0, 400.0)
     for t, u in zip(chunk.t[::37], chunk.u[::37], strict=True):
         assert tip_time(speed_sq, float(u)) == pytest.approx(t, abs=1e-10)
     on = problem.joints.evaluate(0, chunk.u, 1)
@@ -453,12 +425,11 @@ def test_what_general_pieces_cannot_do_is_refused_with_a_sentence() -> None:
     curve = CompositeCurve.from_bezier([[0.0, 0.0], [1.0, 2.0], [3.0, 2.0], [4.0, 0.0]])
     problem, profile = problem_of(curve), feed_profile(curve, 10.0)
     for change, words in (
-        ({"kind": np.array([4], np.uint8)}, "only quadratic pieces have: plan this path again"),
         (
             {"kind": np.array([1], np.uint8), "p0": np.array([np.inf])},
             "a speed that is negative or not finite",
         ),
-        ({"kind": np.array([8], np.uint8)}, "unknown kind 8"),
+        ({"kind": np.array([7], np.uint8)}, "unknown kind 7"),
     ):
         with pytest.raises((InputError, ValueError), match=words):
             setpoints(problem, replace(profile, **change), 0.001)  # type: ignore[arg-type]

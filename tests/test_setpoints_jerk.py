@@ -15,7 +15,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
 from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
 from tests.test_setpoints_curves import problem_of
@@ -86,7 +86,7 @@ def test_a_circle_at_constant_tangential_jerk_is_exact(interpolator: str) -> Non
     curve = circle([0.0, 0.0], radius)
     sections = rest_to_rest(CurveLength(curve).total, 2000.0, 0.7)
     profile = constant_jerk(curve, sections)
-    assert set(profile.kind) == {ArcKind.PATH_JERK}
+    assert set(profile.kind) == {PhaseLaw.PATH_JERK}
     assert len(profile) > len(curve)
     chunk = setpoints(problem_of(curve), profile, 0.0007, interpolator).all()
     keep = ~switching(profile, chunk.t, 1e-9)
@@ -160,7 +160,7 @@ def test_rates_on_random_curves_are_the_differences_of_the_positions(interpolato
         # Newton's error is in parts of each step: from rest the first is shorter than 1e-7 mm.
         assert stream.stats.length_error < (1e-6 if interpolator == "sarfraz" else 1e-5)
         assert stream.stats.iterations <= 30
-        if (profile.kind == ArcKind.PATH_JERK).all():
+        if (profile.kind == PhaseLaw.PATH_JERK).all():
             s = motion_at(rest_to_rest(length.total, 3000.0, 0.8), chunk.t)[0]
             np.testing.assert_allclose(length.length(chunk.piece, chunk.u), s, atol=1e-11)
 
@@ -224,7 +224,7 @@ def test_a_profile_that_cannot_be_followed_is_refused_with_a_sentence() -> None:
         columns = {name: getattr(profile, name).copy() for name in change}
         for name, value in change.items():
             columns[name][0] = value
-        with pytest.raises(InputError, match=rf"^arc 0 of the profile .*{words}.*: plan this path again$"):
+        with pytest.raises(InputError, match=rf"^phase 0 of the profile .*{words}.*: plan this path again$"):
             setpoints(problem, replace(profile, **columns), 0.001)
-    with pytest.raises(InputError, match=f"{len(jerk)} arcs, and `a0` has {len(jerk) - 1} entries"):
+    with pytest.raises(InputError, match=f"{len(jerk)} phases, and `a0` has {len(jerk) - 1} entries"):
         replace(jerk, a0=jerk.a0[:-1])

@@ -40,7 +40,7 @@ _KINDS = {
     "acceleration_continuity": _Kind("jump of the acceleration along the path", "mm/s²"),
     "junction": _Kind("speed beyond what is allowed where pieces meet or runs end,", "mm/s"),
     "duration": _Kind("relative error of a recorded duration", ""),
-    "order": _Kind("gap between the arcs of the profile", "mm"),
+    "order": _Kind("gap between the phases of the profile", "mm"),
     "gap": _Kind("gap in the path", "mm"),
     "place": _Kind("distance of a setpoint from its place on the path", "mm"),
     "grid": _Kind("irregularity of the time steps", "s"),

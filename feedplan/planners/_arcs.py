@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
-from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
+from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
     s = (end - start) / (2.0 * mesh.width)
     motion = _Motion(own, np.broadcast_to(s, own.shape))
     worst = motion.worst(problem, mesh)
-    kind = np.full(len(mesh), ArcKind.PARAMETER_ACCELERATION, np.uint8)
+    kind = np.full(len(mesh), PhaseLaw.PARAMETER_ACCELERATION, np.uint8)
     axis = np.full(len(mesh), NO_AXIS, np.uint8)
     value, duration = s.copy(), 2.0 * mesh.width / (np.sqrt(start) + np.sqrt(end))
     for k in range(len(problem.axes)):
@@ -89,7 +89,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
             better = steady & ((others < worst) | (mesh.by_length & (size[0] > 0.5)))
             time = 2.0 * np.abs(way[-1]) / (size[0] * np.sqrt(start) + size[-1] * np.sqrt(end))
         motion, worst = motion.where(better, other), np.where(better, others, worst)
-        kind[better], axis[better] = ArcKind.AXIS_ACCELERATION, k
+        kind[better], axis[better] = PhaseLaw.AXIS_ACCELERATION, k
         value, duration = np.where(better, a, value), np.where(better, time, duration)
     ends = np.stack([start, end])
     if mesh.by_length.any():

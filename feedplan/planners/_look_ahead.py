@@ -19,7 +19,7 @@ from feedplan.constraints.problem import Problem, feed_square, speed_square
 from feedplan.errors import InfeasibleError
 from feedplan.planners._queue import Queue
 from feedplan.planners._segments import Array, Rule, Segments, segments
-from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
+from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
 # Parts of a segment shorter than this many roundings of its parameter and of v² are left out.
 ROUNDINGS = 4.0
@@ -142,8 +142,8 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     constant = _CONSTANT[phase]
     # The speed in all axes is constant; on lines the speed that the feed limits is then constant too.
     counted, by_shares = _counted(problem, piece, u0)
-    even = np.where(by_shares & ~line, ArcKind.SPEED_LINE, ArcKind.FEED)
-    ramp_kind = np.where(line, ArcKind.AXIS_ACCELERATION, ArcKind.SPEED_LINE)
+    even = np.where(by_shares & ~line, PhaseLaw.SPEED_LINE, PhaseLaw.FEED)
+    ramp_kind = np.where(line, PhaseLaw.AXIS_ACCELERATION, PhaseLaw.SPEED_LINE)
     rate = np.stack([parts.rate[segment]] * 2)
     length = rate[0] * (u1 - u0)
     curved = np.flatnonzero(~line)
@@ -154,7 +154,7 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
             problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
         )
     # The speeds at the ends of the segments hold where a ramp is left out as well.
-    by_law = ~constant | (even == ArcKind.FEED)
+    by_law = ~constant | (even == PhaseLaw.FEED)
     first = np.flatnonzero(np.diff(segment, prepend=-1) * by_law)
     last = np.flatnonzero(np.diff(segment, append=len(parts)) * by_law)
     p0, p1 = from_sq / rate[0] ** 2, to_sq / rate[1] ** 2
@@ -166,7 +166,7 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
         axis=np.where(constant, NO_AXIS, parts.axis[_SLOWS[phase], segment]).astype(np.uint8),
         value=np.where(
             constant,
-            np.where(even == ArcKind.FEED, counted * from_sq, 0.0),
+            np.where(even == PhaseLaw.FEED, counted * from_sq, 0.0),
             parts.value[_SLOWS[phase], segment],
         ),
         u0=u0,

@@ -20,7 +20,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.lazy import cached_property
-from feedplan.profile import OF_ARCS, OF_PIECES, SpeedProfile
+from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
 from feedplan.progress import Listener
 
 Floats = NDArray[np.float64]
@@ -123,7 +123,7 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
 def part_of_profile(profile: SpeedProfile, part: Part) -> SpeedProfile:
     """The arcs of a part, as the native bound takes them."""
     runs = profile.runs[part.run : part.end_run + 1]
-    own = {name: getattr(profile, name)[runs[0] : runs[-1]] for name in OF_ARCS}
+    own = {name: getattr(profile, name)[runs[0] : runs[-1]] for name in OF_PHASES}
     none = {name: np.empty(0, np.uint32) for name in OF_PIECES}
     return replace(profile, **{**own, **none, "piece": own["piece"] - part.first, "runs": runs - runs[0]})
 
@@ -131,7 +131,7 @@ def part_of_profile(profile: SpeedProfile, part: Part) -> SpeedProfile:
 def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, NDArray[np.float64]]]) -> SpeedProfile:
     """The profile of the whole from those of the parts, and the excess of their runs."""
     profiles, excess = zip(*planned, strict=True)
-    names = (*OF_ARCS, *OF_PIECES)
+    names = (*OF_PHASES, *OF_PIECES)
     columns: dict[str, list[Any]] = {name: [getattr(each, name) for each in profiles] for name in names}
     for name in ("piece", *OF_PIECES):
         columns[name] = [column + part.first for part, column in zip(own, columns[name], strict=True)]

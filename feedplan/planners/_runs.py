@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError
-from feedplan.profile import OF_ARCS, OF_PIECES, SpeedProfile
+from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
 from feedplan.progress import Listener, part
 
 
@@ -43,12 +43,12 @@ def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:
     times = np.stack([profile.run_times for profile in profiles])
     planned = np.stack([np.diff(profile.runs) > 0 for profile in profiles])
     best = np.argmin(np.where(planned, times, np.inf), axis=0)
-    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in (*OF_ARCS, *OF_PIECES)}
+    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in (*OF_PHASES, *OF_PIECES)}
     runs = [0]
     for run, chosen in enumerate(best):
         profile = profiles[chosen]
         arcs = slice(int(profile.runs[run]), int(profile.runs[run + 1]))
-        for name in OF_ARCS:
+        for name in OF_PHASES:
             columns[name].append(getattr(profile, name)[arcs])
         own = profile.piece[arcs]
         for name in OF_PIECES:

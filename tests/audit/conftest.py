@@ -18,7 +18,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
 from feedplan.planning import plan
-from feedplan.profile import OF_ARCS, SpeedProfile
+from feedplan.profile import OF_PHASES, SpeedProfile
 from feedplan.program.program import Program
 from feedplan.setpoints import SetpointChunk, setpoints
 
@@ -65,7 +65,7 @@ class Case:
 
     def arcs(self, change: Callable[[NDArray[Any]], NDArray[Any]], runs: NDArray[np.int64]) -> Case:
         """The case with the same change, of rows, made to every column of the profile."""
-        columns = {name: change(getattr(self.profile, name)) for name in OF_ARCS}
+        columns = {name: change(getattr(self.profile, name)) for name in OF_PHASES}
         return self.with_profile(**columns, runs=runs)
 
     def rows(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Case:

@@ -15,7 +15,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import derivatives
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 
 Array = NDArray[np.float64]
@@ -85,7 +85,7 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
     ahead = q0 + since * (v0 + 0.5 * value * since)
     target = np.where(np.abs(v0) <= np.abs(v1), ahead, q1 - rest * (v1 - 0.5 * value * rest))
     target = np.where(
-        kind == ArcKind.AXIS_VELOCITY, q0 + np.sign(q1 - q0) * np.sqrt(np.abs(value)) * since, target
+        kind == PhaseLaw.AXIS_VELOCITY, q0 + np.sign(q1 - q0) * np.sqrt(np.abs(value)) * since, target
     )
     low, high = profile.u0[arc].copy(), profile.u1[arc].copy()
     for _ in range(70):
@@ -93,7 +93,7 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
         below = (motion(middle)[0] < target) == (q1 > q0)
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     u = np.where(
-        kind == ArcKind.PARAMETER_ACCELERATION,
+        kind == PhaseLaw.PARAMETER_ACCELERATION,
         profile.u0[arc] + np.sqrt(profile.p0[arc]) * since,
         0.5 * (low + high),
     )
@@ -104,10 +104,10 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
             0.0,
         )
     )
-    speed = np.where(kind == ArcKind.AXIS_VELOCITY, np.sqrt(np.abs(value)), speed)
+    speed = np.where(kind == PhaseLaw.AXIS_VELOCITY, np.sqrt(np.abs(value)), speed)
     with np.errstate(divide="ignore", invalid="ignore"):
         root_p = np.where(
-            kind == ArcKind.PARAMETER_ACCELERATION, np.sqrt(profile.p0[arc]), speed / np.abs(slope)
+            kind == PhaseLaw.PARAMETER_ACCELERATION, np.sqrt(profile.p0[arc]), speed / np.abs(slope)
         )
     return arc, u, root_p
 

@@ -16,7 +16,7 @@ from feedplan.machine.axis_words import axis_words
 from feedplan.machine.joint_interpolants import joint_interpolants
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import positions
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from tests.audit.curves import path_along
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def steady(problem: Problem, p: float) -> SpeedProfile:
     count, width = len(problem.path), problem.path.width
     return SpeedProfile(
         piece=np.arange(count, dtype=np.uint32),
-        kind=np.full(count, ArcKind.PARAMETER_ACCELERATION, np.uint8),
+        kind=np.full(count, PhaseLaw.PARAMETER_ACCELERATION, np.uint8),
         axis=np.full(count, 255, np.uint8),
         value=np.zeros(count),
         u0=np.zeros(count),

@@ -20,13 +20,13 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.program.program import MoveKind, Program
 from tests.audit.curves import machine_of, path_along, planned, problem_along, sampled
 
 Array = NDArray[np.float64]
 Change = Callable[..., NDArray[Any]]
-SPEED_LINE = 5
+SPEED_LINE = PhaseLaw.SPEED_LINE
 
 
 def broken(result: Audit) -> set[tuple[str, str | None]]:
@@ -86,7 +86,7 @@ def test_p_scaled_on_one_arc_is_a_jump_there(other: Any, changed: Change, arc: i
 
 def test_every_way_of_breaking_a_profile_is_named(other: Any, changed: Change) -> None:
     profile, problem = other.profile, other.problem
-    arc = int(np.flatnonzero((profile.kind == ArcKind.AXIS_ACCELERATION) & (profile.p0 != profile.p1))[8])
+    arc = int(np.flatnonzero((profile.kind == PhaseLaw.AXIS_ACCELERATION) & (profile.p0 != profile.p1))[8])
     assert ("duration", None) in broken(
         other.with_profile(duration=changed(profile.duration, arc, lambda t: 1.00001 * t)).audit()
     )
@@ -96,7 +96,7 @@ def test_every_way_of_breaking_a_profile_is_named(other: Any, changed: Change) -
             other.with_profile(value=changed(profile.value, arc, lambda a: 1.01 * a)).audit()
         )
     }
-    for kind in (ArcKind.PARAMETER_ACCELERATION, ArcKind.FEED, ArcKind.AXIS_VELOCITY, ArcKind.CHORD, 77):
+    for kind in (PhaseLaw.PARAMETER_ACCELERATION, PhaseLaw.FEED, PhaseLaw.AXIS_VELOCITY, 77):
         assert not other.with_profile(kind=changed(profile.kind, arc, kind)).audit().ok
     assert ("order", None) in broken(
         other.with_profile(u0=changed(profile.u0, arc, lambda u: u + 1e-6)).audit()

@@ -17,7 +17,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import setpoints
 from tests.audit.curves import machine_of, path_along, problem_along
 from tests.audit.test_joints import past_the_column, wavy, wide
@@ -199,7 +199,7 @@ def test_acceleration_that_steps_is_no_limited_jerk() -> None:
 
 def test_arcs_of_other_kinds_claim_what_nothing_limits() -> None:
     problem, profile = line()
-    arcs = replace(profile, kind=np.full(len(profile), ArcKind.AXIS_ACCELERATION, np.uint8))
+    arcs = replace(profile, kind=np.full(len(profile), PhaseLaw.AXIS_ACCELERATION, np.uint8))
     arcs = replace(arcs, axis=np.zeros(len(profile), np.uint8), a0=0 * profile.a0, a1=0 * profile.a1)
     result = judged(problem, arcs, with_setpoints=False)
     assert result.check("jerk", "X").ratio == math.inf

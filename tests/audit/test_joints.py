@@ -18,7 +18,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import derivatives
-from feedplan.profile import OF_ARCS, ArcKind, SpeedProfile
+from feedplan.profile import OF_PHASES, PhaseLaw, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 from tests.audit.curves import places_at, sampled
 from tests.audit.joints import joint_problem, planned_joints, steady
@@ -187,9 +187,9 @@ def test_every_way_of_breaking_a_profile_is_named(case: Case) -> None:
         result = case.audit(profile=bad)
         assert ("numbers", None) in broken(result)
         assert result.check("numbers").line == line
-    assert names(kind=changed(profile.kind, arc, ArcKind.PARAMETER_ACCELERATION)) >= {"jump"}
+    assert names(kind=changed(profile.kind, arc, PhaseLaw.PARAMETER_ACCELERATION)) >= {"jump"}
     assert "order" in names(runs=np.array([0, len(profile) - 1]))
-    without = {name: np.delete(getattr(profile, name), arc) for name in OF_ARCS}
+    without = {name: np.delete(getattr(profile, name), arc) for name in OF_PHASES}
     assert "order" in names(**without, runs=np.array([0, len(profile) - 1]))
 
 
@@ -346,9 +346,8 @@ def test_a_speed_along_the_tip_is_constant_over_its_length() -> None:
     flat = steady(problem, (40.0 / rate) ** 2)
     problem = replace(problem, start_speed=40.0, end_speed=40.0, feed=np.full(count, 40.0))
     kinds = {
-        ArcKind.FEED: np.full(count, 1600.0),
-        ArcKind.CHORD: flat.p0 / rate,
-        5: np.zeros(count),
+        PhaseLaw.FEED: np.full(count, 1600.0),
+        PhaseLaw.SPEED_LINE: np.zeros(count),
     }
     for kind, value in kinds.items():
         profile = replace(flat, kind=np.full(count, kind, np.uint8), value=value)

@@ -19,7 +19,7 @@ from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 
 Change = Callable[..., NDArray[Any]]
 
@@ -61,7 +61,7 @@ def problem_of(path: Path, **changes: Any) -> Problem:
     return replace(problem, **changes)
 
 
-def profile_of(*arcs: tuple[int, ArcKind, int, float, float, float, float, float, float]) -> SpeedProfile:
+def profile_of(*arcs: tuple[int, PhaseLaw, int, float, float, float, float, float, float]) -> SpeedProfile:
     piece, kind, axis, *numbers = zip(*arcs, strict=True)
     return SpeedProfile(
         np.array(piece, np.uint32),
@@ -79,13 +79,13 @@ def broken(result: Audit) -> set[tuple[str, str | None]]:
 LINE = path_of([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]], [10.0])
 # 10 mm from rest to rest at 1000 mm/s² and 50 mm/s: 0.05 s up, 0.15 s along, 0.05 s down.
 TRAPEZOID = profile_of(
-    (0, ArcKind.AXIS_ACCELERATION, 0, 1000.0, 0.0, 1.25, 0.0, 2500.0, 0.05),
-    (0, ArcKind.FEED, 255, 2500.0, 1.25, 8.75, 2500.0, 2500.0, 0.15),
-    (0, ArcKind.AXIS_ACCELERATION, 0, -1000.0, 8.75, 10.0, 2500.0, 0.0, 0.05),
+    (0, PhaseLaw.AXIS_ACCELERATION, 0, 1000.0, 0.0, 1.25, 0.0, 2500.0, 0.05),
+    (0, PhaseLaw.FEED, 255, 2500.0, 1.25, 8.75, 2500.0, 2500.0, 0.15),
+    (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 8.75, 10.0, 2500.0, 0.0, 0.05),
 )
 # x = u − 1, y = x²/2 for u in [0, 2] at 20 mm/s in X: Y accelerates at 400 mm/s² all the way.
 PARABOLA = path_of([[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]]], [2.0])
-STEADY_X = profile_of((0, ArcKind.AXIS_VELOCITY, 0, 400.0, 0.0, 2.0, 400.0, 400.0, 0.1))
+STEADY_X = profile_of((0, PhaseLaw.AXIS_VELOCITY, 0, 400.0, 0.0, 2.0, 400.0, 400.0, 0.1))
 THROUGH = {"start_speed": 20.0 * math.sqrt(2.0), "end_speed": 20.0 * math.sqrt(2.0)}
 
 
@@ -130,20 +130,20 @@ def test_arcs_of_a_nanosecond_pass_and_still_show_what_breaks_a_limit() -> None:
     far = replace(LINE, curve=CompositeCurve.from_pieces(LINE.curve.by_piece + 1e4, LINE.width))
     v, width = 50.0, 5e-8
     pieces = [(1.25 + i * width, 1.25 + (i + 1) * width) for i in range(20)]
-    tiny = [(0, ArcKind.FEED, 255, v * v, a, b, v * v, v * v, (b - a) / v) for a, b in pieces]
+    tiny = [(0, PhaseLaw.FEED, 255, v * v, a, b, v * v, v * v, (b - a) / v) for a, b in pieces]
     end = pieces[-1][1]
     arcs = (
-        (0, ArcKind.AXIS_ACCELERATION, 0, 1000.0, 0.0, 1.25, 0.0, v * v, 0.05),
+        (0, PhaseLaw.AXIS_ACCELERATION, 0, 1000.0, 0.0, 1.25, 0.0, v * v, 0.05),
         *tiny,
-        (0, ArcKind.FEED, 255, v * v, end, 8.75, v * v, v * v, (8.75 - end) / v),
-        (0, ArcKind.AXIS_ACCELERATION, 0, -1000.0, 8.75, 10.0, v * v, 0.0, 0.05),
+        (0, PhaseLaw.FEED, 255, v * v, end, 8.75, v * v, v * v, (8.75 - end) / v),
+        (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 8.75, 10.0, v * v, 0.0, 0.05),
     )
     assert audit(problem_of(far), profile_of(*arcs), plane()).ok
     # One of them gains 1e-5 mm/s in a nanosecond: 10 000 mm/s².
     faster = (v + 1e-5) ** 2
     gain = (faster - v * v) / (2 * width)
     a, b = pieces[7]
-    sharp = (0, ArcKind.AXIS_ACCELERATION, 0, gain, a, b, v * v, faster, width / v)
+    sharp = (0, PhaseLaw.AXIS_ACCELERATION, 0, gain, a, b, v * v, faster, width / v)
     result = audit(problem_of(far), profile_of(*arcs[:8], sharp, *arcs[9:]), plane())
     assert ("acceleration", "X") in broken(result)
     assert result.check("acceleration", "X").worst == pytest.approx(gain, rel=1e-3)
@@ -257,7 +257,7 @@ def test_a_wrong_duration_is_found(part: Any, changed: Change, arc: int) -> None
 
 
 def test_another_constant_on_an_arc_is_found(part: Any, changed: Change) -> None:
-    for arc in np.flatnonzero(part.profile.kind == ArcKind.AXIS_ACCELERATION)[[1, 8, 15]]:
+    for arc in np.flatnonzero(part.profile.kind == PhaseLaw.AXIS_ACCELERATION)[[1, 8, 15]]:
         value = changed(part.profile.value, arc, lambda a: 1.01 * a)
         names = {name for name, _ in broken(part.with_profile(value=value).audit())}
         assert {"acceleration", "jump"} <= names
@@ -265,11 +265,11 @@ def test_another_constant_on_an_arc_is_found(part: Any, changed: Change) -> None
 
 def test_another_kind_or_axis_of_an_arc_is_found(part: Any, changed: Change) -> None:
     profile = part.profile
-    curved = np.flatnonzero((profile.kind == ArcKind.AXIS_ACCELERATION) & (profile.p0 != profile.p1))
+    curved = np.flatnonzero((profile.kind == PhaseLaw.AXIS_ACCELERATION) & (profile.p0 != profile.p1))
     for arc in curved[[1, 8, 15]]:
-        for kind in (ArcKind.PARAMETER_ACCELERATION, ArcKind.FEED, ArcKind.AXIS_VELOCITY, ArcKind.CHORD, 77):
+        for kind in (PhaseLaw.PARAMETER_ACCELERATION, PhaseLaw.FEED, PhaseLaw.AXIS_VELOCITY, 77):
             value = profile.value
-            if kind == ArcKind.PARAMETER_ACCELERATION:
+            if kind == PhaseLaw.PARAMETER_ACCELERATION:
                 # With the value of an axis along which |C'| is 1 it would be the same arc.
                 value = changed(value, arc, 0.0)
             assert not part.with_profile(kind=changed(profile.kind, arc, kind), value=value).audit().ok
@@ -280,7 +280,7 @@ def test_another_kind_or_axis_of_an_arc_is_found(part: Any, changed: Change) -> 
 
 def test_a_run_that_ends_in_motion_is_found() -> None:
     # The last arc goes on at 50 mm/s instead of slowing down.
-    arc = (0, ArcKind.FEED, 255, 2500.0, 8.75, 10.0, 2500.0, 2500.0, 0.025)
+    arc = (0, PhaseLaw.FEED, 255, 2500.0, 8.75, 10.0, 2500.0, 2500.0, 0.025)
     columns = [tuple(column[i] for column in _columns(TRAPEZOID)) for i in range(2)]
     result = audit(problem_of(LINE), profile_of(*columns, arc), plane())
     assert broken(result) == {("junction", None)}
@@ -300,7 +300,7 @@ def corner(speed: float) -> tuple[Path, SpeedProfile]:
         [[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [10.0, 5.0], [10.0, 10.0]]], [10.0, 10.0]
     )
     p = speed * speed
-    arcs = [(i, ArcKind.FEED, 255, p, 0.0, 10.0, p, p, 10.0 / speed) for i in range(2)]
+    arcs = [(i, PhaseLaw.FEED, 255, p, 0.0, 10.0, p, p, 10.0 / speed) for i in range(2)]
     return path, profile_of(*arcs)
 
 
@@ -329,7 +329,7 @@ def test_a_jump_of_speed_between_pieces_is_found_even_where_the_machine_may_jump
         [[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [15.0, 0.0], [20.0, 0.0]]], [10.0, 10.0]
     )
     arcs = [
-        (i, ArcKind.FEED, 255, v * v, 0.0, 10.0, v * v, v * v, 10.0 / v) for i, v in enumerate((5.0, 5.001))
+        (i, PhaseLaw.FEED, 255, v * v, 0.0, 10.0, v * v, v * v, 10.0 / v) for i, v in enumerate((5.0, 5.001))
     ]
     problem = problem_of(straight, start_speed=5.0, end_speed=5.001)
     result = audit(problem, profile_of(*arcs), plane(1.0, 1.0))
@@ -390,9 +390,9 @@ def test_numbers_with_hardly_a_digit_left_end_in_a_verdict() -> None:
     # p has one or two significant bits: no rule ever agrees with another, however short the interval.
     p0, p1 = 2e-323, 8e-323
     for value in (p1 - p0, 5e-324):
-        arc = (0, ArcKind.AXIS_ACCELERATION, 0, value, 0.0, 10.0, p0, p1, 1e150)
+        arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, value, 0.0, 10.0, p0, p1, 1e150)
         assert not audit(problem_of(LINE), profile_of(arc), plane()).ok
-    bent = (0, ArcKind.AXIS_ACCELERATION, 1, 1e-322, 0.0, 2.0, p0, p1, 1e150)
+    bent = (0, PhaseLaw.AXIS_ACCELERATION, 1, 1e-322, 0.0, 2.0, p0, p1, 1e150)
     assert not audit(problem_of(PARABOLA), profile_of(bent), plane()).ok
 
 
@@ -458,7 +458,7 @@ def test_an_audit_of_nothing_is_not_fine() -> None:
 def test_parts_that_do_not_belong_together_are_refused(part: Any) -> None:
     with pytest.raises(InputError, match="no axis Z"):
         audit(part.problem, part.profile, plane())
-    with pytest.raises(InputError, match=r"arcs, and `p0` has \d+ entries"):
+    with pytest.raises(InputError, match=r"phases, and `p0` has \d+ entries"):
         part.with_profile(p0=part.profile.p0[:-1])
     with pytest.raises(InputError, match=r"has no axis Z: it has X, Y, A"):
         part.with_program(axes=("X", "Y", "A")).audit()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
 # Of a tangent, as a part of the longest one on its arc.
@@ -55,7 +55,7 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
     way = (u - anchor[:, None]) / 2 * (at(planned, between)[0][rows, :, :, axis] @ weights)
     speed_sq = (t1**2).sum(axis=2)
     limits = problem.feed[piece]
-    kinds = [kind == ArcKind.AXIS_ACCELERATION, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY]
+    kinds = [kind == PhaseLaw.AXIS_ACCELERATION, kind == PhaseLaw.FEED, kind == PhaseLaw.AXIS_VELOCITY]
     with np.errstate(divide="ignore", invalid="ignore"):
         p = np.select(
             kinds,
@@ -99,10 +99,10 @@ def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
         for part in (0.001, 0.01, 0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 0.99, 0.999):
             u = u0 + (u1 - u0) * Fraction(part)
             g, c = _value(rates, u / width), _value(bends, u / width)
-            if kind == ArcKind.FEED:
+            if kind == PhaseLaw.FEED:
                 p = value / sum(x * x for x in g)
                 s = -p * sum(x * y for x, y in zip(g, c, strict=True)) / sum(x * x for x in g)
-            elif kind == ArcKind.AXIS_VELOCITY:
+            elif kind == PhaseLaw.AXIS_VELOCITY:
                 p = value / g[axis] ** 2
                 s = -p * c[axis] / g[axis]
             else:

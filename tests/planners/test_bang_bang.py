@@ -23,7 +23,7 @@ from feedplan import InfeasibleError, InputError, Path
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.planners.bang_bang import plan
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
 
@@ -117,17 +117,17 @@ def worst_excess(task: Problem, profile: SpeedProfile, samples: int = 100) -> tu
         u = u0 + (u1 - u0) * inner
         tangent, second = left[piece] + np.outer(u, bend[piece]), bend[piece]
         speed_sq = (tangent**2).sum(axis=1)
-        if kind == ArcKind.AXIS_ACCELERATION:
+        if kind == PhaseLaw.AXIS_ACCELERATION:
             q, q0 = tangent[:, axis], left[piece, axis] + u0 * second[axis]
             p = (q0**2 * p0 + value * (u - u0) * (q + q0)) / q**2
             s = (value - second[axis] * p) / q
-        elif kind == ArcKind.PARAMETER_ACCELERATION:
+        elif kind == PhaseLaw.PARAMETER_ACCELERATION:
             p, s = np.full(samples, p0), np.zeros(samples)
-        elif kind == ArcKind.FEED:
+        elif kind == PhaseLaw.FEED:
             p = value / speed_sq
             s = -p * (tangent @ second) / speed_sq
         else:
-            assert kind == ArcKind.AXIS_VELOCITY
+            assert kind == PhaseLaw.AXIS_VELOCITY
             p = value / tangent[:, axis] ** 2
             s = -p * second[axis] / tangent[:, axis]
         acceleration = np.abs(tangent * s[:, None] + second * p[:, None]) / task.max_acceleration

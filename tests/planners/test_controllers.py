@@ -25,7 +25,7 @@ from feedplan.planners import corners, junction_deviation, methods, planner
 from feedplan.planners._junctions import Junctions
 from feedplan.planners._segments import is_line
 from feedplan.planners.junction_deviation import corner_speed
-from feedplan.profile import ArcKind
+from feedplan.profile import PhaseLaw
 from feedplan.program.read import read_program
 from feedplan.setpoints import setpoints
 
@@ -199,10 +199,10 @@ def test_setpoints_from_and_to_rest_follow_a_speed_whose_square_is_linear() -> N
     curve = arc([10.0, 0.0], (0.0, 0.0), 0.5).with_width([5.0])
     problem = build_problem(Path.from_curve(curve, feed=1e3), PLANE)
     profile = planner(TANGENTIAL)(problem)
-    assert (profile.kind == ArcKind.SPEED_LINE).sum() > 2
+    assert (profile.kind == PhaseLaw.SPEED_LINE).sum() > 2
     chunk = setpoints(problem, profile, T).all()
     # Times by midpoints over the root of the way, where the integrand is smooth.
-    for i in np.flatnonzero(profile.kind == ArcKind.SPEED_LINE):
+    for i in np.flatnonzero(profile.kind == PhaseLaw.SPEED_LINE):
         u0, u1 = profile.u0[i], profile.u1[i]
         ends = np.linalg.norm(curve.evaluate([0, 0], [u0, u1], 1)[1], axis=1) ** 2 * [
             profile.p0[i],
@@ -368,6 +368,6 @@ def test_a_circle_little_greater_than_the_chord_error_is_passed_by_its_formula()
     machine = Machine("chord", tuple(Axis(name, 500.0, 1e6) for name in "XY"), 0.01, 0.02)
     circle = arc([0.05, 0.0], [0.0, 0.0], 2.0 * math.pi)
     profile = planner(TANGENTIAL)(build_problem(Path.from_curve(circle, feed=1e3), machine))
-    cruise = profile.kind == ArcKind.FEED
+    cruise = profile.kind == PhaseLaw.FEED
     assert cruise.any()
     assert profile.value[cruise] == pytest.approx(64.0, rel=1e-9)

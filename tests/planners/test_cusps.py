@@ -14,7 +14,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.planning import rounding_stops
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import setpoints
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess, worst_excess_exactly
@@ -143,7 +143,7 @@ def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
     # A line through a cusp: its speed squared is rounding there, and halving it gains nothing.
     problem = problem_of(*random_curve(12790))
     profile = SpeedProfile.of(plan_bang_bang(problem))
-    feed = profile.kind == ArcKind.FEED
+    feed = profile.kind == PhaseLaw.FEED
     start, end = (problem.path.curve.evaluate(profile.piece, u, 0)[0] for u in (profile.u0, profile.u1))
     ways = np.linalg.norm(end - start, axis=1)
     np.testing.assert_allclose(profile.duration[feed], ways[feed] / problem.feed[0], rtol=1e-9)
@@ -164,7 +164,7 @@ def test_no_arc_goes_on_where_its_axis_turns_round(seed: int) -> None:
     profile = SpeedProfile.of(plan_bang_bang(problem))
     rows = zip(profile.piece, profile.kind, profile.axis, profile.u0, profile.u1, strict=True)
     for piece, kind, axis, u0, u1 in rows:
-        if kind == ArcKind.AXIS_ACCELERATION:
+        if kind == PhaseLaw.AXIS_ACCELERATION:
             u = u0 + (u1 - u0) * np.linspace(0.01, 0.99, 99)
             rate = problem.path.curve.evaluate(np.full(99, piece), u, 1)[1, :, axis]
             assert (rate > 0).all() or (rate < 0).all()

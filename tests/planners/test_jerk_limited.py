@@ -20,7 +20,7 @@ from feedplan.lower_bound import lower_bound
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import bound_of, planner
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from tests.campaign import SEEDS, seeds
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
@@ -63,7 +63,7 @@ def test_a_square_with_stops_takes_as_long_as_by_hand(method: str) -> None:
     profile = planner(method)(problem)
     assert profile.time == pytest.approx(4.84, rel=1e-8)
     assert len(profile.runs) == 5
-    assert (profile.kind == ArcKind.PATH_JERK).all()
+    assert (profile.kind == PhaseLaw.PATH_JERK).all()
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_piece_of_a_nanometre_keeps_the_limit_of_jerk() -> None:
     path = replace(Path.from_curve(curve, axes=("X", "Y"), feed=90.0), feed=np.array([90.0, 91.0, 92.0]))
     problem = build_problem(path, CURVES)
     profile = plan(problem)
-    assert (profile.kind == ArcKind.PATH_JERK).sum() == 3
+    assert (profile.kind == PhaseLaw.PATH_JERK).sum() == 3
     assert jerk_excess(problem, profile).worst <= EXCESS
     assert audit(problem, profile, CURVES, jerk=True).ok
 

@@ -23,7 +23,7 @@ from feedplan.lower_bound import lower_bound
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import _refinement, bang_bang, casadi, clarabel, methods, planner, toppra
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from tests.campaign import seeds
 from tests.constraints.test_joints import random_problem, without_travel
 from tests.planners.meshes import NAMED, machine_of, random_path_problem
@@ -154,7 +154,7 @@ def test_a_program_is_planned_sampled_and_audited(method: str, tmp_path: FilePat
     exact = feedplan.plan(file, "mill").time
     assert 0 <= plan.time / exact - 1 < 3e-3
     assert plan.audit().ok
-    assert ArcKind.PARAMETER_ACCELERATION in plan.profile.kind
+    assert PhaseLaw.PARAMETER_ACCELERATION in plan.profile.kind
 
 
 def test_a_cusp_of_a_straight_piece_is_passed_at_speed() -> None:
@@ -311,7 +311,7 @@ def test_the_audit_measures_arcs_of_constant_parameter_acceleration(degree: int)
 def one_arc(u: tuple[float, float], p: tuple[float, float], value: float, duration: float) -> SpeedProfile:
     return SpeedProfile(
         piece=np.zeros(1, np.uint32),
-        kind=np.array([ArcKind.PARAMETER_ACCELERATION], np.uint8),
+        kind=np.array([PhaseLaw.PARAMETER_ACCELERATION], np.uint8),
         axis=np.array([255], np.uint8),
         value=np.array([value]),
         u0=np.array(u[:1]),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.report.activity import NONE, activity
 from feedplan.report.losses import Share, SlowLine
 from feedplan.report.losses import slowest_lines as slowest_of
@@ -44,7 +44,7 @@ def test_shares_come_longest_first_and_dwells_count(square: Any) -> None:
 
 def test_a_flat_arc_counts_for_the_axis_that_holds_it(square: Any) -> None:
     kind = square.profile.kind.copy()
-    kind[0] = ArcKind.PARAMETER_ACCELERATION
+    kind[0] = PhaseLaw.PARAMETER_ACCELERATION
     shares = {
         share.limit: share.time
         for share in time_per_limit(square.problem, replace(square.profile, kind=kind))
@@ -94,7 +94,7 @@ def test_the_worst_lines_come_first_up_to_the_given_number(square: Any) -> None:
 def test_a_line_always_at_its_feed_loses_no_time(square: Any) -> None:
     steady = SpeedProfile(
         piece=np.arange(4, dtype=np.uint32),
-        kind=np.full(4, ArcKind.FEED, np.uint8),
+        kind=np.full(4, PhaseLaw.FEED, np.uint8),
         axis=np.full(4, 255, np.uint8),
         value=np.full(4, 2500.0),
         u0=np.zeros(4),

@@ -7,10 +7,10 @@
 
 use rayon::prelude::*;
 
-use super::arcs::Arcs;
 use super::curve::{distance, Followed};
 use super::moves::{Move, Neighbours, Programmed};
-use super::place::distance_to_piece;
+use super::nearest::distance_to_piece;
+use super::phases::Phases;
 use super::{tell, Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
 /// Even places of a piece of degree 2, and as many again between two of them where it comes near its tolerance.
@@ -30,11 +30,11 @@ const BLOCK: usize = 2048;
 /// The path on its own: finite numbers, piece on piece, within the travel of the axes.
 pub fn audit_path<const M: usize>(
     path: &Followed,
-    arcs: Option<&Arcs>,
+    phases: Option<&Phases>,
     limits: &Limits<M>,
     seen: Seen,
 ) -> Tally<M> {
-    let times = entry_times(path, arcs);
+    let times = entry_times(path, phases);
     blocks(path.len(), seen, |i, tally| {
         let (time, line) = (times[i], path.line[i]);
         let (rows, width) = (path.rows(i), path.width[i]);
@@ -106,10 +106,10 @@ pub fn offer_travel<const M: usize>(
 pub fn audit_deviation<const M: usize>(
     path: &Followed,
     program: &Programmed,
-    arcs: Option<&Arcs>,
+    phases: Option<&Phases>,
     seen: Seen,
 ) -> Tally<M> {
-    let times = entry_times(path, arcs);
+    let times = entry_times(path, phases);
     let followers = followers(path, program.len());
     let from_path =
         blocks(path.len(), seen, |i, tally| piece_to_moves(path, program, &followers, i, times[i], tally));
@@ -274,18 +274,18 @@ pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = 
 }
 
 /// When the tool enters each piece, and when it leaves the last one, in s.
-fn entry_times(path: &Followed, arcs: Option<&Arcs>) -> Vec<f64> {
+fn entry_times(path: &Followed, phases: Option<&Phases>) -> Vec<f64> {
     let mut times = vec![0.0; path.len() + 1];
-    let Some(arcs) = arcs else { return times };
-    let starts = arcs.starts(path);
+    let Some(phases) = phases else { return times };
+    let starts = phases.starts(path);
     let mut piece = 0;
-    for (i, &entered) in arcs.piece.iter().enumerate() {
+    for (i, &entered) in phases.piece.iter().enumerate() {
         while piece <= (entered as usize).min(path.len()) {
             times[piece] = starts[i];
             piece += 1;
         }
     }
-    times[piece..].fill(starts[arcs.len()]);
+    times[piece..].fill(starts[phases.len()]);
     times
 }
 

@@ -58,7 +58,7 @@ impl<const M: usize> Differences<'_, M> {
         let before = &self.rows[n.saturating_sub(1)];
         let periods = row.t.abs() / self.limits.period;
         let mut rounding = std::array::from_fn(|k| {
-            let magnitude = row.q[k].abs().max(row.spot.magnitude);
+            let magnitude = row.q[k].abs().max(row.nearest.magnitude);
             let way = (row.q[k] - before.q[k]).abs() * periods;
             0.5 * self.resolution + ROUNDINGS * EPS * (magnitude + way)
         });

@@ -3,26 +3,30 @@
 //! Nothing here comes from a planner, a fit or a sampler: positions are evaluated from the control points, times
 //! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
+//!
+//! The path: `curve`, `polygon`, `nearest`; the program: `moves`, `deviation`. The profile: `phases`, `phase_motion`,
+//! `phase_time`, `speed_by_length`, `phase_jerk`, `profile`. Setpoints: `setpoints`, `differences`; with their plan
+//! `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`.
 
-pub mod along;
-pub mod arcs;
-pub mod compare;
+pub mod against_plan;
 pub mod curve;
 pub mod deviation;
 pub mod differences;
-pub mod follow;
-pub mod integral;
-pub mod jerk;
 pub mod joints;
-pub mod motion;
 pub mod moves;
-pub mod place;
+pub mod nearest;
+pub mod phase_jerk;
+pub mod phase_motion;
+pub mod phase_time;
+pub mod phases;
 pub mod polygon;
 pub mod profile;
+pub mod profile_clock;
 pub mod setpoints;
-pub mod timed;
+pub mod speed_by_length;
+pub mod tracking;
 
-/// Told of how many more arcs, pieces or moves have been looked at; it may end the audit by unwinding.
+/// Told of how many more phases, pieces or moves have been looked at; it may end the audit by unwinding.
 pub type Seen<'a> = &'a (dyn Fn(usize) + Sync);
 
 /// It is told of so many at a time.
@@ -61,7 +65,7 @@ pub const GAP_TOLERANCE: f64 = 1e-9;
 pub enum Check {
     /// Numbers that are not finite, or out of their range.
     Numbers,
-    /// Arcs that do not cover the pieces in order, in mm of parameter.
+    /// Phases that do not cover the pieces in order, in mm of parameter.
     Order,
     /// Speed, in mm/s.
     Feed,

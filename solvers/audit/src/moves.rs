@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::curve::{distance, vector, Pieces, Segment};
 use super::deviation::{outwards, Followers};
-use super::place::distance_to_piece;
+use super::nearest::distance_to_piece;
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
 #[derive(Clone, Copy)]

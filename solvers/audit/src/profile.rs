@@ -1,20 +1,20 @@
-//! Audits a speed profile: every arc sampled in time, and the joints between the arcs.
+//! Audits a speed profile: every phase sampled in time, and the joints between the phases.
 //!
-//! On each arc the axis velocities C'√p are taken at some ten places, closer together where p changes fast and
+//! On each phase the axis velocities C'√p are taken at some ten places, closer together where p changes fast and
 //! very close at both ends, where accelerations have their extremes. Between two places the acceleration is the
 //! difference of the velocities over the time that the audit integrates itself. A velocity is known to `EPS`
 //! times its magnitude; that over the time is what rounding may add to an acceleration, and it is subtracted.
-//! A profile cannot hide in it: over all arcs together it allows `EPS` of the velocity per arc.
+//! A profile cannot hide in it: over all phases together it allows `EPS` of the velocity per phase.
 
 use rayon::prelude::*;
 
-use super::arcs::Arcs;
 use super::curve::{length, Followed};
-use super::jerk::Jerks;
-use super::motion::{Motion, State};
+use super::phase_jerk::Jerks;
+use super::phase_motion::{PhaseMotion, State};
+use super::phases::Phases;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
-/// Even intervals of an arc.
+/// Even intervals of a phase.
 const INTERVALS: usize = 8;
 
 /// Intervals of a slide on which some acceleration comes near its limit.
@@ -24,35 +24,32 @@ const SLIDE_INTERVALS: usize = 64;
 const NEAR: f64 = 0.9;
 
 /// The end intervals are as short as lets rounding hide this share of the acceleration limit, but no shorter than this part
-/// of the arc: their time would have no digits.
+/// of the phase: their time would have no digits.
 const HIDDEN: f64 = 1e-7;
 const SHORTEST: f64 = 1e-8;
 
-/// The direction of a piece at a cusp is known to this share.
-const CUSP_ROUNDING: f64 = 1e-12;
-
-/// Arcs a thread takes at a time.
+/// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
 
-/// The whole profile: arcs, joints, ends of runs. `junction_speed` has one more entry than the path has pieces.
+/// The whole profile: phases, joints, ends of runs. `junction_speed` has one more entry than the path has pieces.
 pub fn audit_profile<const M: usize>(
     path: &Followed,
     junction_speed: &[f64],
-    arcs: &Arcs,
+    phases: &Phases,
     limits: &Limits<M>,
     seen: Seen,
 ) -> Tally<M> {
-    let starts = arcs.starts(path);
-    let auditor = Auditor { path, junction_speed, arcs, limits, starts: &starts };
-    let blocks = arcs.len().div_ceil(BLOCK);
+    let starts = phases.starts(path);
+    let auditor = Auditor { path, junction_speed, phases, limits, starts: &starts };
+    let blocks = phases.len().div_ceil(BLOCK);
     let inside = (0..blocks)
         .into_par_iter()
         .map(|block| {
             let mut tally = Tally::default();
-            for i in block * BLOCK..((block + 1) * BLOCK).min(arcs.len()) {
+            for i in block * BLOCK..((block + 1) * BLOCK).min(phases.len()) {
                 tell(seen, i);
-                auditor.arc(i, &mut tally);
-                if i > 0 && arcs.runs.binary_search(&(i as i64)).is_err() {
+                auditor.phase(i, &mut tally);
+                if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
                     auditor.joint(i - 1, i, &mut tally);
                 }
             }
@@ -67,29 +64,29 @@ pub fn audit_profile<const M: usize>(
 struct Auditor<'a, const M: usize> {
     path: &'a Followed<'a>,
     junction_speed: &'a [f64],
-    arcs: &'a Arcs<'a>,
+    phases: &'a Phases<'a>,
     limits: &'a Limits<M>,
     starts: &'a [f64],
 }
 
 impl<const M: usize> Auditor<'_, M> {
-    fn arc(&self, i: usize, tally: &mut Tally<M>) {
-        let (arcs, time) = (self.arcs, self.starts[i]);
-        let piece = arcs.piece[i] as usize;
+    fn phase(&self, i: usize, tally: &mut Tally<M>) {
+        let (phases, time) = (self.phases, self.starts[i]);
+        let piece = phases.piece[i] as usize;
         let line = self.path.line.get(piece).copied().unwrap_or(0);
-        if arcs.has_bad_numbers(i, self.path) {
+        if !phases.has_good_numbers(i, self.path.axes) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return;
         }
         let width = self.path.width[piece];
-        let (u0, u1) = (arcs.u0[i], arcs.u1[i]);
+        let (u0, u1) = (phases.u0[i], phases.u1[i]);
         let slack = ROUNDINGS * EPS * width;
         if u1 <= u0 || u0 < 0.0 || u1 > width + slack {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
             return;
         }
         let curve = self.path.curve::<M>(piece);
-        let motion = arcs.motion(i, &curve);
+        let motion = phases.motion(i, &curve);
         let mut probe = Probe::new(self, &motion, tally, i, line);
         probe.run();
         let (elapsed, near) = (probe.elapsed, probe.nearest_limit >= NEAR);
@@ -99,31 +96,28 @@ impl<const M: usize> Auditor<'_, M> {
         }
         self.recorded_ends(i, &motion, line, tally);
         if self.limits.judges_jerk {
-            self.jerks().arc(i, &motion, &curve, line, tally);
+            self.jerks().phase(i, &motion, &curve, line, tally);
         }
 
         // A rounding of u0 or u1 changes the width, and with it the time, by this share.
         let rounding = ROUNDINGS * motion.width_rounding();
-        let error = (arcs.duration[i] - elapsed).abs() / elapsed - rounding;
+        let error = (phases.duration[i] - elapsed).abs() / elapsed - rounding;
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, time, line);
     }
 
     fn jerks(&self) -> Jerks<'_, M> {
-        let Self { path, arcs, limits, starts, .. } = *self;
-        Jerks { path, arcs, limits, starts }
+        let Self { path, phases, limits, starts, .. } = *self;
+        Jerks { path, phases, limits, starts }
     }
 
-    /// The recorded p at both ends against what the arc's definition gives there, as a jump of axis velocity. A place is
+    /// The recorded p at both ends against what the phase's definition gives there, as a jump of axis velocity. A place is
     /// known to its rounding: over that way the axis may accelerate.
-    fn recorded_ends(&self, i: usize, motion: &Motion<M>, line: i32, tally: &mut Tally<M>) {
+    fn recorded_ends(&self, i: usize, motion: &PhaseMotion<M>, line: i32, tally: &mut Tally<M>) {
         let way = ROUNDINGS * motion.width_rounding() * motion.width;
         for (y, recorded) in [(0.0, motion.root_anchor), (1.0, motion.root_far)] {
-            if recorded.is_infinite() {
-                continue; // the next arc's velocity is compared with that of the law
-            }
             let state = motion.state(y);
             let at_end = (y == 1.0) != motion.anchored_at_end;
-            let time = self.starts[i] + if at_end { self.arcs.duration[i] } else { 0.0 };
+            let time = self.starts[i] + if at_end { self.phases.duration[i] } else { 0.0 };
             for k in 0..M {
                 let size = state.tangent[k].abs();
                 let [slow, fast] = [state.root_p.min(recorded), state.root_p.max(recorded)].map(|p| size * p);
@@ -135,14 +129,14 @@ impl<const M: usize> Auditor<'_, M> {
         }
     }
 
-    /// Arcs must follow each other without gap over every piece, and runs begin and end at rest.
+    /// Phases must follow each other without gap over every piece, and runs begin and end at rest.
     fn order(&self, tally: &mut Tally<M>) {
-        let (arcs, path) = (self.arcs, self.path);
+        let (phases, path) = (self.phases, self.path);
         let runs = path.runs.len().saturating_sub(1);
-        if arcs.runs.len() != path.runs.len()
-            || arcs.runs.first().is_some_and(|&first| first != 0)
-            || arcs.runs.last().is_some_and(|&last| last != arcs.len() as i64)
-            || arcs.runs.windows(2).any(|pair| pair[0] > pair[1])
+        if phases.runs.len() != path.runs.len()
+            || phases.runs.first().is_some_and(|&first| first != 0)
+            || phases.runs.last().is_some_and(|&last| last != phases.len() as i64)
+            || phases.runs.windows(2).any(|pair| pair[0] > pair[1])
         {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, self.line(0));
             return;
@@ -150,32 +144,32 @@ impl<const M: usize> Auditor<'_, M> {
         for run in 0..runs {
             let [first, last] = [run, run + 1].map(|r| path.runs[r] as usize);
             let mut next = Next { piece: first, u: 0.0 };
-            let here = arcs.runs[run] as usize..arcs.runs[run + 1] as usize;
+            let here = phases.runs[run] as usize..phases.runs[run + 1] as usize;
             for i in here.clone() {
-                if arcs.has_bad_numbers(i, path) {
-                    return; // reported with the arc itself
+                if !phases.has_good_numbers(i, path.axes) {
+                    return; // reported with the phase itself
                 }
-                let entered = arcs.piece[i] as usize;
+                let entered = phases.piece[i] as usize;
                 if entered != next.piece {
                     self.finish_piece(&mut next, entered.min(last), self.starts[i], tally);
                 }
-                let gap = if entered == next.piece { (arcs.u0[i] - next.u).abs() } else { f64::INFINITY };
+                let gap = if entered == next.piece { (phases.u0[i] - next.u).abs() } else { f64::INFINITY };
                 let slack = ROUNDINGS * EPS * path.width[entered];
                 tally.offer(Check::Order, 0, gap - slack, GAP_TOLERANCE, self.starts[i], self.line(entered));
-                next.u = arcs.u1[i];
+                next.u = phases.u1[i];
                 if i == here.start {
                     let at_path_start = run == 0;
                     let wanted = if at_path_start { self.limits.end_speeds[0] } else { 0.0 };
-                    self.run_end(i, arcs.u0[i], arcs.p0[i], wanted, self.starts[i], tally);
+                    self.run_end(i, phases.u0[i], phases.p0[i], wanted, self.starts[i], tally);
                 }
                 if i + 1 == here.end {
                     let at_path_end = run + 1 == runs;
                     let wanted = if at_path_end { self.limits.end_speeds[1] } else { 0.0 };
-                    let time = self.starts[i] + arcs.duration[i];
-                    self.run_end(i, arcs.u1[i], arcs.p1[i], wanted, time, tally);
+                    let time = self.starts[i] + phases.duration[i];
+                    self.run_end(i, phases.u1[i], phases.p1[i], wanted, time, tally);
                 }
             }
-            let time = here.end.checked_sub(1).map_or(0.0, |i| self.starts[i] + arcs.duration[i]);
+            let time = here.end.checked_sub(1).map_or(0.0, |i| self.starts[i] + phases.duration[i]);
             self.finish_piece(&mut next, last, time, tally);
         }
     }
@@ -192,27 +186,18 @@ impl<const M: usize> Auditor<'_, M> {
         }
     }
 
-    /// The step from one arc to the next: no jump of the speed, and of the axis velocities only at corners.
+    /// The change from one phase to the next: no jump of the speed, and of the axis velocities only at corners.
     fn joint(&self, i: usize, j: usize, tally: &mut Tally<M>) {
-        let arcs = self.arcs;
-        if [i, j].iter().any(|&arc| arcs.has_bad_numbers(arc, self.path)) {
-            return; // reported with the arc itself
+        let phases = self.phases;
+        if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, self.path.axes)) {
+            return; // reported with the phase itself
         }
-        let (before, after) = (arcs.piece[i] as usize, arcs.piece[j] as usize);
-        let ends = [(before, arcs.u1[i], arcs.p1[i]), (after, arcs.u0[j], arcs.p0[j])];
+        let (before, after) = (phases.piece[i] as usize, phases.piece[j] as usize);
+        let ends = [(before, phases.u1[i], phases.p1[i]), (after, phases.u0[j], phases.p0[j])];
         let mut velocity = [[0.0; M]; 2];
         let mut rounding = [0.0; M];
         for (side, (piece, u, p)) in ends.into_iter().enumerate() {
             let curve = self.path.curve::<M>(piece);
-            if p.is_infinite() {
-                let motion = arcs.motion([i, j][side], &curve);
-                let state = motion.state(if (side == 0) != motion.anchored_at_end { 1.0 } else { 0.0 });
-                velocity[side] = state.velocity;
-                for k in 0..M {
-                    rounding[k] += ROUNDINGS * CUSP_ROUNDING * state.magnitude[k];
-                }
-                continue;
-            }
             let (tangent, root_p) = (curve.derivative(u), p.sqrt());
             let scale = ROUNDINGS * EPS * root_p;
             let size = curve.derivative_size();
@@ -251,14 +236,13 @@ impl<const M: usize> Auditor<'_, M> {
 
     /// The speed at the start or the end of a run.
     fn run_end(&self, i: usize, u: f64, p: f64, wanted: f64, time: f64, tally: &mut Tally<M>) {
-        let piece = self.arcs.piece[i] as usize;
-        let root_p = if p.is_infinite() { 0.0 } else { p.sqrt() };
-        let speed = length(&self.path.curve::<M>(piece).derivative(u)) * root_p;
+        let piece = self.phases.piece[i] as usize;
+        let speed = length(&self.path.curve::<M>(piece).derivative(u)) * p.sqrt();
         let rounding = ROUNDINGS * EPS * (speed + wanted);
         let limit = self.negligible_speed();
         tally.offer(Check::Junction, 0, (speed - wanted).abs() - rounding, limit, time, self.line(piece));
         if self.limits.judges_jerk && wanted == 0.0 {
-            self.jerks().rest(i, u > self.arcs.u0[i], self.line(piece), tally);
+            self.jerks().rest(i, u > self.phases.u0[i], self.line(piece), tally);
         }
     }
 
@@ -272,15 +256,15 @@ impl<const M: usize> Auditor<'_, M> {
     }
 }
 
-/// Where the next arc has to begin.
+/// Where the next phase has to begin.
 struct Next {
     piece: usize,
     u: f64,
 }
 
-/// Walks one arc and offers what it meets.
+/// Walks one phase and offers what it meets.
 struct Probe<'a, const M: usize> {
-    motion: &'a Motion<M>,
+    motion: &'a PhaseMotion<M>,
     limits: &'a Limits<M>,
     tally: &'a mut Tally<M>,
     feeds: [f64; FEEDS],
@@ -296,7 +280,7 @@ struct Probe<'a, const M: usize> {
 impl<'a, const M: usize> Probe<'a, M> {
     fn new(
         auditor: &'a Auditor<'a, M>,
-        motion: &'a Motion<M>,
+        motion: &'a PhaseMotion<M>,
         tally: &'a mut Tally<M>,
         i: usize,
         line: i32,
@@ -305,9 +289,9 @@ impl<'a, const M: usize> Probe<'a, M> {
             motion,
             limits: auditor.limits,
             tally,
-            feeds: auditor.path.feeds(auditor.arcs.piece[i] as usize),
+            feeds: auditor.path.feeds(auditor.phases.piece[i] as usize),
             start: auditor.starts[i],
-            duration: auditor.arcs.duration[i],
+            duration: auditor.phases.duration[i],
             line,
             elapsed: 0.0,
             nearest_limit: 0.0,
@@ -359,11 +343,11 @@ impl<'a, const M: usize> Probe<'a, M> {
         let middle = self.clock(self.elapsed + 0.5 * time);
         self.elapsed += time;
         let held = self.motion.held_axis();
-        // The time is known as well as the width of the arc.
+        // The time is known as well as the width of the phase.
         let in_time = ROUNDINGS * self.motion.width_rounding();
         for k in 0..M {
             let rounding = ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time;
-            // An arc that is anchored at its end is walked against the time.
+            // A phase that is anchored at its end is walked against the time.
             let [early, late] = if self.motion.anchored_at_end { [to, from] } else { [from, to] };
             let change = late.velocity[k] - early.velocity[k];
             let acceleration = change.abs() / time * (1.0 - in_time) - rounding;

@@ -6,11 +6,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::compare::Comparison;
+use super::against_plan::Comparison;
 use super::curve::{distance, length, vector};
 use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
-use super::follow::{Plan, Spot};
+use super::tracking::{Nearest, Plan};
 use super::{Check, Limits, Seen, Tally, PLACE_TOLERANCE};
 
 /// Setpoints before and after the one at which an acceleration is judged.
@@ -43,7 +43,7 @@ pub struct Row<const M: usize> {
     pub acceleration: Option<[f64; M]>,
     pub line: i32,
     /// Its place on the path, where there is a path.
-    pub spot: Spot,
+    pub nearest: Nearest,
 }
 
 impl<const M: usize> Row<M> {
@@ -84,7 +84,7 @@ impl<const M: usize> Stream<M> {
             velocity: chunk.velocity.map(|table| vector(table, chunk.axes, i)),
             acceleration: chunk.acceleration.map(|table| vector(table, chunk.axes, i)),
             line: chunk.line.map_or(0, |line| line[i]),
-            spot: Spot::default(),
+            nearest: Nearest::default(),
         }));
         if let Some(plan) = plan {
             plan.extend_clock(&self.limits, &rows, &mut self.clock);
@@ -92,7 +92,7 @@ impl<const M: usize> Stream<M> {
         let plan = plan.map(|plan| plan.with_clock(&self.clock));
         let plan = plan.as_ref();
         if let Some(plan) = plan {
-            plan.find_spots(&self.limits, &mut rows, old, seen);
+            plan.find_nearest(&self.limits, &mut rows, old, seen);
         }
         let view = View { differences: self.differences(&rows), plan };
         let found = (old..rows.len())
@@ -234,7 +234,7 @@ impl<const M: usize> View<'_, M> {
         }
         if let Some(comparison) = comparison {
             let rounding = length(rounding);
-            comparison.spot(row, rounding, tally);
+            comparison.nearest(row, rounding, tally);
             if n > 0 {
                 comparison.step(&rows[n - 1], row, recent.steps[2], rounding, tally);
             }

@@ -1,4 +1,4 @@
-//! Time per setpoint with all derivatives, by the law of the arcs, and per inversion of a length table.
+//! Time per setpoint with all derivatives, by the law of the phases, and per inversion of a length table.
 //!
 //! The path is one C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each, the same with its degree
 //! raised, and with weights that change the parameter; its profile is synthetic (no planner takes part): constant
@@ -10,7 +10,7 @@ use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::motion::ProfileArc;
+use feedplan_setpoints::phase_motion::Phase;
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 
 const PIECES: usize = 1000;
@@ -45,15 +45,15 @@ fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
     raised
 }
 
-fn profile(kind: PhaseLaw, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> {
+fn profile(law: PhaseLaw, curve: &CompositeCurve<3>, r: f64) -> Vec<Phase> {
     let lengths = CurveLength::new(curve, 1e-13, Watch::default());
     // x' of the weights 1, r, …, r^d on a piece with x' = 1 without them: r at its start, 1/r at its end.
     let at_ends = |p0: f64, p1: f64| (p0 / (r * r), p1 * r * r);
     (0..PIECES)
         .map(|i| {
-            let arc = ProfileArc {
+            let phase = Phase {
                 piece: i as u32,
-                kind,
+                law,
                 axis: 0,
                 value: 1e4,
                 u0: 0.0,
@@ -64,18 +64,18 @@ fn profile(kind: PhaseLaw, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc>
                 a0: 0.0,
                 a1: 0.0,
             };
-            match kind {
+            match law {
                 PhaseLaw::Feed => {
-                    ProfileArc { duration: (lengths.length(i, 1.0) - lengths.length(i, 0.0)) / 100.0, ..arc }
+                    Phase { duration: (lengths.length(i, 1.0) - lengths.length(i, 0.0)) / 100.0, ..phase }
                 }
                 // Between 50 and 100 mm/s on 1 mm.
                 PhaseLaw::AxisAcceleration => {
                     let (p0, p1) = if i % 2 == 0 { (2500.0, 1e4) } else { (1e4, 2500.0) };
                     let value = 0.5 * (p1 - p0);
                     let (p0, p1) = at_ends(p0, p1);
-                    ProfileArc { value, p0, p1, duration: 1.0 / 75.0, ..arc }
+                    Phase { value, p0, p1, duration: 1.0 / 75.0, ..phase }
                 }
-                _ => arc,
+                _ => phase,
             }
         })
         .collect()
@@ -87,11 +87,11 @@ fn setpoints(c: &mut Criterion) {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let shapes = [("quadratic", 0, 1.0), ("cubic", 1, 1.0), ("quintic", 3, 1.0), ("rational cubic", 1, 1.5)];
     for (shape, by, r) in shapes {
-        for kind in [PhaseLaw::AxisAcceleration, PhaseLaw::Feed] {
+        for law in [PhaseLaw::AxisAcceleration, PhaseLaw::Feed] {
             for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
                 let curve = changed(&spline(), by, r);
-                let arcs = profile(kind, &curve, r);
-                let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
+                let phases = profile(law, &curve, r);
+                let time: f64 = phases.iter().map(|phase| phase.duration).sum();
                 let path = PathData {
                     curve: curve.into(),
                     tip_speed: None,
@@ -103,9 +103,9 @@ fn setpoints(c: &mut Criterion) {
                     dwell: vec![0.0],
                 };
                 let period = time / (SETPOINTS - 1) as f64;
-                let sampler = Sampler::new(path.into(), arcs, &[0, PIECES], period, Watch::default())
+                let sampler = Sampler::new(path.into(), phases, &[0, PIECES], period, Watch::default())
                     .expect("a profile");
-                let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{kind:?}"));
+                let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{law:?}"));
                 group.bench_function(name, |b| {
                     b.iter(|| {
                         one_thread.install(|| {

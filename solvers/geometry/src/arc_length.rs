@@ -124,33 +124,6 @@ impl Integrand for Length {
     }
 }
 
-/// f = |C'|^(−1/2): with p = κ |C'| its integral is √κ times the time.
-#[derive(Clone, Copy, Debug)]
-pub struct ChordTime(pub QuadraticSpeed);
-
-impl Integrand for ChordTime {
-    #[inline(always)]
-    fn at(&self, u: f64) -> f64 {
-        1.0 / self.0.squared(u).sqrt().sqrt()
-    }
-
-    // |f| ≤ (E δ (1−θ))^(−1/2) on the disc of radius θδ; θ = 4n/(4n+1) makes the estimate least.
-    fn disc(&self, a: f64, b: f64) -> Disc {
-        const THETA: f64 = (4 * N) as f64 / (4 * N + 1) as f64;
-        let (speed, distance) = self.0.least(a, b);
-        Disc { radius: THETA * distance, bound: 1.0 / (speed * (1.0 - THETA)).sqrt() }
-    }
-
-    fn foot(&self) -> f64 {
-        self.0.foot
-    }
-
-    // f ≤ (E|x|)^(−1/2), whose quadrature stays below its integral because its even derivatives are positive.
-    fn foot_error(&self, width: f64) -> f64 {
-        2.0 * (width / self.0.e).sqrt()
-    }
-}
-
 /// One row of the table: the parameter, the integral up to it, and f there.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
@@ -360,14 +333,6 @@ mod tests {
         assert!((nodes[2].sum - 5f64.sqrt()).abs() < 1e-15);
     }
 
-    #[test]
-    fn the_time_along_a_chord_limit_matches_a_fine_sum() {
-        let f = ChordTime(QuadraticSpeed::new(&parabola()));
-        let (nodes, bound) = table_of(f, 0.0, 1.0, 1e-13);
-        let fine: f64 = (0..64).map(|i| quadrature(&f, i as f64 / 64.0, (i + 1) as f64 / 64.0)).sum();
-        assert!(bound <= 1e-13 && (nodes[nodes.len() - 1].sum - fine).abs() < 1e-14);
-    }
-
     prop_compose! {
         /// Quadratics from plain to a hair off a cusp: the middle point is pulled towards a fold.
         fn quadratic()(
@@ -397,18 +362,6 @@ mod tests {
             let error = (Table { f, nodes: &nodes }.integral(u) - exact_length(&piece, u)).abs();
             prop_assert!(error <= bound + 4e-15 * whole, "{error:e} > {bound:e}");
             prop_assert!(nodes.len() < 300);
-        }
-
-        #[test]
-        fn a_chord_table_holds_its_bound_against_a_tighter_one(piece in quadratic(), at in 0.0..1.0f64) {
-            let f = ChordTime(QuadraticSpeed::new(&piece));
-            let estimate = quadrature(&f, 0.0, piece.width);
-            let (coarse, bound) = table_of(f, 0.0, piece.width, 1e-6 * estimate);
-            let (fine, fine_bound) = table_of(f, 0.0, piece.width, 1e-13 * estimate);
-            let u = at * piece.width;
-            let difference =
-                (Table { f, nodes: &coarse }.integral(u) - Table { f, nodes: &fine }.integral(u)).abs();
-            prop_assert!(difference <= bound + fine_bound + 1e-14 * estimate, "{difference:e} > {bound:e}");
         }
     }
 }

@@ -12,14 +12,12 @@ pub enum PhaseLaw {
     Feed = 2,
     /// q'_k² p = value [mm²/s²].
     AxisVelocity = 3,
-    /// p = value · |C'|.
-    Chord = 4,
     /// |C'|² p is linear in u.
-    SpeedLine = 5,
+    SpeedLine = 4,
     /// The jerk along the path is value [mm/s³].
-    PathJerk = 6,
+    PathJerk = 5,
     /// |C'|² p is a cubic in the length, given by both ends and their accelerations.
-    SpeedCubic = 7,
+    SpeedCubic = 6,
 }
 
 impl PhaseLaw {
@@ -35,7 +33,6 @@ impl PhaseLaw {
             Self::ParameterAcceleration,
             Self::Feed,
             Self::AxisVelocity,
-            Self::Chord,
             Self::SpeedLine,
             Self::PathJerk,
             Self::SpeedCubic,

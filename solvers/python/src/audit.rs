@@ -10,14 +10,16 @@ use super::native::Of;
 use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_audit::arcs::Arcs;
+
 use feedplan_audit::curve::{Followed, Pieces};
 use feedplan_audit::deviation::{audit_deviation, audit_path};
-use feedplan_audit::follow::Plan;
+
 use feedplan_audit::moves::Programmed;
+use feedplan_audit::phases::Phases;
 use feedplan_audit::profile::audit_profile;
+use feedplan_audit::profile_clock::ProfileClock;
 use feedplan_audit::setpoints::{Chunk, Stream};
-use feedplan_audit::timed::Timed;
+use feedplan_audit::tracking::Plan;
 use feedplan_audit::{Check, Limits, Sided, Tally, FEEDS};
 use feedplan_geometry::watch::Watch;
 
@@ -135,9 +137,9 @@ impl ProblemArrays<'_> {
     }
 }
 
-/// The arcs of a profile as the audit takes them.
-pub fn arcs<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
-    Ok(Arcs {
+/// The phases of a profile as the audit takes them.
+pub fn phases<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyResult<Phases<'a>> {
+    Ok(Phases {
         piece: &profile.piece,
         kind: &profile.kind,
         axis: &profile.axis,
@@ -250,7 +252,7 @@ fn audit_plan(
 ) -> PyResult<Findings> {
     let path = problem.followed(&feed)?;
     let junction_speed = problem.junction_speed.as_slice()?;
-    let arcs = profile.as_ref().map(|profile| arcs(profile, &problem)).transpose()?;
+    let phases = profile.as_ref().map(|profile| phases(profile, &problem)).transpose()?;
     let program = program.as_ref().map(|moves| programmed(moves, problem.axes())).transpose()?;
     with_padded_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
@@ -259,14 +261,14 @@ fn audit_plan(
             // About what each takes of the time.
             let [of_path, of_profile, of_deviation] = [0.05, 0.45, 0.5].map(|share| watch.part(share));
             let seen = |count| of_path.each(pieces).advance(count);
-            let mut tally = audit_path(&path, arcs.as_ref(), &limits, &seen);
-            if let Some(arcs) = &arcs {
-                let seen = |count| of_profile.each(arcs.len()).advance(count);
-                tally = tally.merge(audit_profile(&path, junction_speed, arcs, &limits, &seen));
+            let mut tally = audit_path(&path, phases.as_ref(), &limits, &seen);
+            if let Some(phases) = &phases {
+                let seen = |count| of_profile.each(phases.len()).advance(count);
+                tally = tally.merge(audit_profile(&path, junction_speed, phases, &limits, &seen));
             }
             if let Some(program) = &program {
                 let seen = |count| of_deviation.each(pieces + program.len()).advance(count);
-                tally = tally.merge(audit_deviation(&path, program, arcs.as_ref(), &seen));
+                tally = tally.merge(audit_deviation(&path, program, phases.as_ref(), &seen));
             }
             findings(&tally, path.axes)
         })
@@ -312,7 +314,7 @@ struct Compared {
     feed: Py<PyAny>,
     profile: Option<Py<Profile>>,
     program: Option<Py<Moves>>,
-    /// When every arc of the profile begins.
+    /// When every phase of the profile begins.
     starts: Vec<f64>,
 }
 
@@ -327,10 +329,10 @@ impl Compared {
         let problem: ProblemArrays = self.problem.bind(py).extract()?;
         let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
         let path = problem.followed(&feed)?;
-        let arcs = self.profile.as_ref().map(|profile| arcs(profile.get(), &problem)).transpose()?;
+        let phases = self.profile.as_ref().map(|profile| phases(profile.get(), &problem)).transpose()?;
         let program =
             self.program.as_ref().map(|moves| programmed(moves.get(), problem.axes())).transpose()?;
-        let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
+        let profile = phases.map(|phases| ProfileClock { phases, starts: &self.starts, run_starts: &[] });
         let plan = Plan { path, profile, program };
         run(py, progress, |watch| work(&plan, watch))
     }
@@ -431,16 +433,16 @@ fn compare(
     let mut starts = Vec::new();
     let mut usable = None;
     if let Some(profile) = profile {
-        let arcs = arcs(&profile, &arrays)?;
-        let runs = arcs.runs;
-        let good = !arcs.is_empty()
+        let phases = phases(&profile, &arrays)?;
+        let runs = phases.runs;
+        let good = !phases.is_empty()
             && runs.len() == path.runs.len()
             && runs.first() == Some(&0)
-            && runs.last() == Some(&(arcs.len() as i64))
+            && runs.last() == Some(&(phases.len() as i64))
             && runs.windows(2).all(|pair| pair[0] <= pair[1])
-            && (0..arcs.len()).all(|i| !arcs.has_bad_numbers(i, &path));
+            && (0..phases.len()).all(|i| phases.has_good_numbers(i, path.axes));
         if good {
-            starts = arcs.starts(&path);
+            starts = phases.starts(&path);
             usable = Some(profile.native().clone_ref(problem.py()));
         }
     }

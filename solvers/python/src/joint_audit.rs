@@ -6,7 +6,9 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::audit::{arcs, findings, finished, require, setpoint_chunk, Findings, LimitArrays, ProblemArrays};
+use super::audit::{
+    findings, finished, phases, require, setpoint_chunk, Findings, LimitArrays, ProblemArrays,
+};
 use super::kinematics::{operation_rows, ExpressionArrays};
 use super::native::Of;
 use super::profile::Profile;
@@ -119,7 +121,7 @@ impl Kept {
             xyz: of(["X", "Y", "Z"]),
             ijk: of(["I", "J", "K"]),
             way_scale,
-            starts: arcs(profile, &arrays)?.starts(&path),
+            starts: phases(profile, &arrays)?.starts(&path),
         })
     }
 
@@ -147,7 +149,7 @@ impl Kept {
                 feed: own.feed.as_slice()?,
                 junction_speed: arrays.junction_speed()?,
             },
-            arcs: arcs(profile, &arrays)?,
+            phases: phases(profile, &arrays)?,
             limits: limits.limits::<M>(joints)?,
             starts: &self.starts,
         };
@@ -173,9 +175,9 @@ fn audit_joints(
     let kept = Kept::new(&problem, &profile, joints)?;
     with_padded_axes!(widest(&problem, &limits)?, M, {
         kept.with::<M, _>(&problem, &profile, &limits, progress.as_ref(), |audit, watch| {
-            // Arcs are measured once, and once more for their jerk.
+            // Phases are measured once, and once more for their jerk.
             let times = if audit.limits.judges_jerk { 2 } else { 1 };
-            let each = watch.each(times * audit.arcs.len());
+            let each = watch.each(times * audit.phases.len());
             findings(&audit.profile(&|count| each.advance(count)), joints)
         })
     })

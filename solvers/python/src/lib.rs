@@ -3,6 +3,7 @@
 mod arrays;
 mod audit;
 mod bound;
+mod csv;
 mod curve;
 mod curve_length;
 mod fit;
@@ -17,7 +18,6 @@ mod plan;
 mod problem;
 mod profile;
 mod sampling;
-mod text;
 mod views;
 mod work;
 
@@ -56,7 +56,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fit::register(module)?;
     moves::register(module)?;
     path::register(module)?;
-    text::register(module)?;
+    csv::register(module)?;
     audit::register(module)?;
     sampling::register(module)?;
     curve::register(module)?;

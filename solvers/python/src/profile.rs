@@ -11,7 +11,7 @@ use feedplan_planner::profile::{self, NO_AXIS};
 pyo3::import_exception!(feedplan.errors, InputError);
 
 macro_rules! profile {
-    (arcs: $($column:ident: $type:ty),+; others: $($other:ident: $of:ty),+) => {
+    (phases: $($column:ident: $type:ty),+; others: $($other:ident: $of:ty),+) => {
         /// The columns of `feedplan.profile.SpeedProfile`.
         #[pyclass(frozen, module = "feedplan._solvers")]
         pub struct Profile {
@@ -27,7 +27,7 @@ macro_rules! profile {
 
         #[pymethods]
         impl Profile {
-            /// From the arrays of a `SpeedProfile`. Raises InputError where those of its arcs differ in length.
+            /// From the arrays of a `SpeedProfile`. Raises InputError where those of its phases differ in length.
             #[new]
             fn new(columns: Columns<'_>) -> PyResult<Self> {
                 let profile = Self {
@@ -38,7 +38,7 @@ macro_rules! profile {
                 $(if profile.$column.len() != count {
                     let (name, length) = (stringify!($column), profile.$column.len());
                     return Err(InputError::new_err(format!(
-                        "the profile has {count} arcs, and `{name}` has {length} entries: give one for each arc"
+                        "the profile has {count} phases, and `{name}` has {length} entries: give one for each phase"
                     )));
                 })+
                 Ok(profile)
@@ -56,7 +56,7 @@ macro_rules! profile {
 }
 
 profile! {
-    arcs: piece: u32, kind: u8, axis: u8, value: f64, u0: f64, u1: f64, p0: f64, p1: f64, duration: f64, a0: f64, a1: f64;
+    phases: piece: u32, kind: u8, axis: u8, value: f64, u0: f64, u1: f64, p0: f64, p1: f64, duration: f64, a0: f64, a1: f64;
     others: runs: i64, slowed: u32, kinked: u32
 }
 

@@ -14,7 +14,7 @@ use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::motion::ProfileArc;
+use feedplan_setpoints::phase_motion::Phase;
 use feedplan_setpoints::sampling::{Chunk, Interpolator, Resume, Sampler};
 
 pyo3::import_exception!(feedplan.errors, InputError);
@@ -33,19 +33,19 @@ type ChunkArrays<'py> = (
     f64,
 );
 
-/// Arc i of a profile on a path in so many axes. The error is a sentence for the user.
-fn arc(profile: &Profile, i: usize, axes: usize) -> Result<ProfileArc, String> {
+/// Phase i of a profile on a path in so many axes. The error is a sentence for the user.
+fn phase(profile: &Profile, i: usize, axes: usize) -> Result<Phase, String> {
     let (kind, axis) = (profile.kind[i], profile.axis[i]);
-    let kind = PhaseLaw::from_number(kind)
-        .ok_or_else(|| format!("arc {i} of the profile has the unknown kind {kind}"))?;
-    if matches!(kind, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) && axis as usize >= axes {
+    let law = PhaseLaw::from_number(kind)
+        .ok_or_else(|| format!("phase {i} of the profile has the unknown kind {kind}"))?;
+    if matches!(law, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) && axis as usize >= axes {
         return Err(format!(
-            "arc {i} of the profile is governed by axis {axis}, but the path has {axes}: plan this path again"
+            "phase {i} of the profile is governed by axis {axis}, but the path has {axes}: plan this path again"
         ));
     }
-    Ok(ProfileArc {
+    Ok(Phase {
         piece: profile.piece[i],
-        kind,
+        law,
         axis,
         value: profile.value[i],
         u0: profile.u0[i],
@@ -117,10 +117,10 @@ impl PySampler {
                 let each = watch.part(0.5).each(count);
                 let counted = |i: usize| {
                     each.count(i);
-                    arc(profile, i, axes)
+                    phase(profile, i, axes)
                 };
-                let arcs = (0..count).map(counted).collect::<Result<Vec<_>, String>>()?;
-                Sampler::new(path, arcs, &runs, period, watch.part(0.5))
+                let phases = (0..count).map(counted).collect::<Result<Vec<_>, String>>()?;
+                Sampler::new(path, phases, &runs, period, watch.part(0.5))
             })?;
             sampler.map(InAxes::new).map_err(InputError::new_err)
         })?;

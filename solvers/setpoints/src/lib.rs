@@ -1,5 +1,5 @@
 //! From a speed profile to the motion at any time: setpoints, and their text.
 
-pub mod motion;
+pub mod csv;
+pub mod phase_motion;
 pub mod sampling;
-pub mod text;

@@ -1,18 +1,19 @@
 //! Setpoints at the servo period: positions, velocities, accelerations and jerks of a profile on its path.
 //!
 //! Every run starts on a setpoint and its end is hit exactly: run r with time T_r and pause D_r takes
-//! ceil((T_r + D_r)/period) periods, so the stream waits less than one period at a stop; a pause before the first
-//! run takes whole periods as well. A setpoint is found
-//! from its index alone (run, time in the run, arc, place on the arc), so any part of the stream can be computed
-//! on its own, in parallel and with the same digits. The Newton–Raphson interpolator goes step by step instead.
+//! ceil((T_r + D_r)/period) periods, so the stream waits less than one period at a stop; a pause before the first run takes
+//! whole periods as well. A setpoint is found from its index alone (run, time in the run, phase, place on the phase), so any
+//! part of the stream can be computed on its own, in parallel and with the same digits. The Newton–Raphson interpolator goes
+//! step by step instead.
 //!
 //! At a stop velocity, acceleration and jerk are 0. At a switching point, where the acceleration jumps, a
-//! setpoint has the values of the arc that begins there.
+//! setpoint has the values of the phase that begins there.
 
 mod check;
 mod chunk;
 
 use std::ops::Range;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -20,7 +21,7 @@ use rayon::prelude::*;
 use self::check::check;
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
-use crate::motion::{Motion, ProfileArc, Rates, State, TipSpeed};
+use crate::phase_motion::{Counts, Phase, PhaseMotion, PiecePath, Rates, State, TipSpeed};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
@@ -31,11 +32,11 @@ pub const MAX_COUNT: f64 = 2e9;
 /// A run that ends this part of a period after a setpoint ends on it.
 const SLACK: f64 = 1e-9;
 
-/// An end is at rest when its p is 0, whatever the arc's law: a ramp may be too short for its places to show it. And when
-/// its speed is this part of the speed at the other end of its arc: a rounding error of p leaves the square root of one.
+/// An end is at rest when its p is 0, whatever the phase's law, because a ramp may be too short for its places to show it;
+/// and when its speed is this part of the speed at the other end of its phase: a rounding error of p leaves its square root.
 const STANDSTILL: f64 = 1e-6;
 
-/// A speed is none beside one so many times greater that a step gains.
+/// A speed below this part of what a step gains is treated as rest.
 const REST: f64 = 1e-9;
 
 /// A Newton–Raphson step is repeated so often before halving; two or three times are usual.
@@ -47,7 +48,7 @@ const BLOCK: usize = 4096;
 /// How the place at the next setpoint is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolator {
-    /// Closed forms on arcs; length table and Sarfraz predictor-corrector elsewhere.
+    /// Closed forms where a law has them; length table and Sarfraz predictor-corrector elsewhere.
     Sarfraz,
     /// Zhang 4.2: step length from speed and tangential acceleration, then Newton–Raphson.
     Newton,
@@ -56,7 +57,7 @@ pub enum Interpolator {
 /// A run between stops.
 #[derive(Clone, Debug)]
 struct Run {
-    arcs: Range<usize>,
+    phases: Range<usize>,
     /// Setpoint on which the run starts.
     first: usize,
     periods: usize,
@@ -67,11 +68,11 @@ struct Run {
     last_piece: usize,
 }
 
-/// Where the Newton–Raphson interpolator stands: the setpoint it found last, in which run, on which arc.
+/// Where the Newton–Raphson interpolator stands: the setpoint it found last, in which run, on which phase.
 #[derive(Clone, Copy, Debug)]
 pub struct Resume {
     index: usize,
-    arc: usize,
+    phase: usize,
     u: f64,
 }
 
@@ -93,8 +94,8 @@ pub struct PathData<const M: usize> {
 /// A profile on its path, ready to be read at any setpoint.
 pub struct Sampler<const M: usize> {
     path: Arc<PathData<M>>,
-    arcs: Vec<ProfileArc>,
-    /// Time from the start of the arc's run.
+    phases: Vec<Phase>,
+    /// Time from the start of the phase's run.
     starts: Vec<f64>,
     runs: Vec<Run>,
     period: f64,
@@ -104,65 +105,66 @@ pub struct Sampler<const M: usize> {
 }
 
 impl<const M: usize> PathData<M> {
-    /// The motion along an arc.
-    fn motion(&self, arc: &ProfileArc, with_lengths: bool) -> Motion<'_, M> {
-        let i = arc.piece as usize;
-        let share = self.feed_share.get(i).filter(|share| **share != [1.0; M]);
-        Motion::new(self.curve.piece(i), self.speed_of(arc), share, arc, with_lengths)
+    /// Piece i with the lengths that laws are about.
+    fn piece(&self, i: usize) -> PiecePath<'_, M> {
+        let [feed, way] = [&self.tip_speed, &self.way_speed].map(|speed| {
+            speed.as_ref().map(|(coefficients, offsets)| {
+                let coefficients = &coefficients[offsets[i]..offsets[i + 1]];
+                Counts::Tip(TipSpeed { coefficients, width: self.curve.width[i] })
+            })
+        });
+        let shares = self.feed_share.get(i).filter(|share| **share != [1.0; M]).copied();
+        let feed = feed.or(shares.map(Counts::Shares)).unwrap_or(Counts::Axes);
+        PiecePath::new(self.curve.piece(i), feed, way.unwrap_or(Counts::Axes))
     }
 
-    /// The speed that the law of an arc is about, where it is not that of the axes.
-    fn speed_of(&self, arc: &ProfileArc) -> Option<TipSpeed<'_>> {
-        let i = arc.piece as usize;
-        let speed = if arc.kind.is_along() { &self.way_speed } else { &self.tip_speed };
-        speed.as_ref().map(|(coefficients, offsets)| TipSpeed {
-            coefficients: &coefficients[offsets[i]..offsets[i + 1]],
-            width: self.curve.width[i],
-        })
+    /// The motion on a phase.
+    fn motion(&self, phase: &Phase) -> PhaseMotion<'_, M> {
+        PhaseMotion::new(Rc::new(self.piece(phase.piece as usize)), phase)
     }
 }
 
 impl<const M: usize> Sampler<M> {
-    /// Lays the time grid. `arc_runs` are the arc offsets of the runs. The error is a sentence for the user.
+    /// Lays the time grid. `phase_runs` are the phase offsets of the runs. The error is a sentence for the user.
     pub fn new(
         path: Arc<PathData<M>>,
-        arcs: Vec<ProfileArc>,
-        arc_runs: &[usize],
+        phases: Vec<Phase>,
+        phase_runs: &[usize],
         period: f64,
         watch: Watch,
     ) -> Result<Self, String> {
-        check(&path, &arcs, arc_runs, watch)?;
+        check(&path, &phases, phase_runs, watch)?;
         if !(period.is_finite() && period > 0.0) {
             return Err(format!("the period is {period} s: give a positive one"));
         }
-        let mut starts = Vec::with_capacity(arcs.len());
+        let mut starts = Vec::with_capacity(phases.len());
         let (mut runs, mut ends_moving) = (Vec::with_capacity(path.dwell.len()), false);
         let mut first = periods_of(path.start_dwell, period);
         let mut begin = path.start_dwell;
         for r in 0..path.dwell.len() {
-            let (arc_range, pieces) = (arc_runs[r]..arc_runs[r + 1], path.runs[r]..path.runs[r + 1]);
+            let (of_run, pieces) = (phase_runs[r]..phase_runs[r + 1], path.runs[r]..path.runs[r + 1]);
             let mut time = 0.0;
-            for arc in &arcs[arc_range.clone()] {
+            for phase in &phases[of_run.clone()] {
                 starts.push(time);
-                time += arc.duration;
+                time += phase.duration;
             }
             let last = r + 1 == path.dwell.len();
-            if let Some(arc) = arcs[arc_range.clone()].last() {
-                let motion = path.motion(arc, false);
+            if let Some(phase) = phases[of_run.clone()].last() {
+                let motion = path.motion(phase);
                 let speed = |u| norm(&motion.rates(&motion.at(u)).velocity);
-                if arc.p1 > 0.0 && speed(arc.u1) > STANDSTILL * speed(arc.u0) {
-                    let line = path.lines[arc.piece as usize];
+                if phase.p1 > 0.0 && speed(phase.u1) > STANDSTILL * speed(phase.u0) {
+                    let line = path.lines[phase.piece as usize];
                     if !last {
                         return Err(format!(
                             "line {line}: the profile ends run {} at {:.6} mm/s: only the last run may end in motion",
                             r + 1,
-                            speed(arc.u1)
+                            speed(phase.u1)
                         ));
                     }
                     if path.dwell[r] > 0.0 {
                         return Err(format!(
                             "line {line}: the plan ends at {:.6} mm/s, but the program pauses {} s there: plan with end speed 0",
-                            speed(arc.u1),
+                            speed(phase.u1),
                             path.dwell[r]
                         ));
                     }
@@ -176,7 +178,7 @@ impl<const M: usize> Sampler<M> {
                 ));
             }
             runs.push(Run {
-                arcs: arc_range,
+                phases: of_run,
                 first: first as usize,
                 periods: periods as usize,
                 begin,
@@ -187,7 +189,7 @@ impl<const M: usize> Sampler<M> {
             begin += time + path.dwell[r];
         }
         let count = first as usize + 1;
-        let sampler = Self { path, arcs, starts, runs, period, count, ends_moving };
+        let sampler = Self { path, phases, starts, runs, period, count, ends_moving };
         match sampler.start() {
             Some((speed, ..)) if speed > 0.0 && sampler.path.start_dwell > 0.0 => Err(format!(
                 "line {}: the plan begins at {speed:.6} mm/s, but the program pauses {} s there: plan with start speed 0",
@@ -255,17 +257,17 @@ impl<const M: usize> Sampler<M> {
         let mut chunk = Chunk::with_size(times.len());
         let cuts: Vec<usize> = (0..times.len()).step_by(BLOCK).skip(1).collect();
         chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
-            let mut cursor = Cursor::new(self, false);
+            let mut cursor = Cursor::new(self);
             for i in 0..part.t.len() {
                 watch.check_at(i);
                 let t = times[part.start + i];
                 match self.runs.partition_point(|run| run.begin < t).checked_sub(1) {
                     None => self.set_start(&mut part, i),
                     Some(r) if t - self.runs[r].begin < self.runs[r].time => {
-                        let arc = cursor.seek(&self.runs[r], t - self.runs[r].begin);
+                        let phase = cursor.seek(&self.runs[r], t - self.runs[r].begin);
                         let state =
-                            cursor.motion().at_time(t - self.runs[r].begin - self.starts[arc], self.period);
-                        self.set(&mut part, i, arc, cursor.motion(), &state);
+                            cursor.motion().at_time(t - self.runs[r].begin - self.starts[phase], self.period);
+                        self.set(&mut part, i, phase, cursor.motion(), &state);
                     }
                     Some(r) => self.set_end(
                         &self.runs[r],
@@ -281,7 +283,7 @@ impl<const M: usize> Sampler<M> {
     }
 
     /// The states at places of the path, with their times on the plan's own clock. In the last place of a piece
-    /// the arc that ends there counts.
+    /// the phase that ends there counts.
     pub fn along(&self, pieces: &[u32], u: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(pieces.len());
         let cuts: Vec<usize> = (0..pieces.len()).step_by(BLOCK).skip(1).collect();
@@ -289,18 +291,18 @@ impl<const M: usize> Sampler<M> {
             for i in 0..part.t.len() {
                 watch.check_at(i);
                 let (piece, u) = (pieces[part.start + i], u[part.start + i]);
-                let after = self.arcs.partition_point(|arc| (arc.piece, arc.u1) < (piece, u));
-                let Some(found) = self.arcs.get(after) else {
+                let after = self.phases.partition_point(|phase| (phase.piece, phase.u1) < (piece, u));
+                let Some(found) = self.phases.get(after) else {
                     let run = &self.runs[self.runs.len() - 1];
                     self.set_end(run, &mut part, i, self.ends_moving);
                     part.t[i] = run.begin + run.time;
                     continue;
                 };
-                let run = &self.runs[self.runs.partition_point(|run| run.arcs.end <= after)];
-                let motion = self.path.motion(found, false);
+                let run = &self.runs[self.runs.partition_point(|run| run.phases.end <= after)];
+                let motion = self.path.motion(found);
                 let state = motion.at(u.clamp(found.u0, found.u1));
                 self.set(&mut part, i, after, &motion, &state);
-                part.t[i] = run.begin + self.starts[after] + motion.time(&state);
+                part.t[i] = run.begin + self.starts[after] + state.pace.t;
             }
         });
         chunk
@@ -331,7 +333,7 @@ impl<const M: usize> Sampler<M> {
 
     fn fill_by_time(&self, mut part: Slices<M>, watch: Watch) -> Effort {
         let mut effort = Effort::default();
-        let mut cursor = Cursor::new(self, false);
+        let mut cursor = Cursor::new(self);
         let mut i = 0;
         while i < part.t.len() {
             let index = part.start + i;
@@ -351,10 +353,10 @@ impl<const M: usize> Sampler<M> {
                     self.set_end(run, &mut part, i, self.ends_moving && index + 1 == self.count);
                     continue;
                 };
-                let arc = cursor.seek(run, time);
-                let state = cursor.motion().at_time(time - self.starts[arc], self.period);
-                effort.raise(state.iterations, state.error * self.arcs[arc].duration / self.period);
-                self.set(&mut part, i, arc, cursor.motion(), &state);
+                let phase = cursor.seek(run, time);
+                let state = cursor.motion().at_time(time - self.starts[phase], self.period);
+                effort.raise(state.iterations, state.error * self.phases[phase].duration / self.period);
+                self.set(&mut part, i, phase, cursor.motion(), &state);
             }
             i = stop;
         }
@@ -362,7 +364,7 @@ impl<const M: usize> Sampler<M> {
     }
 
     /// Zhang 4.2, corrected. The paper's step v·T is of first order and stands still at rest: here it is of third
-    /// order on the arc that it ends on, and is repeated for the time that the profile still has to go from the
+    /// order on the phase that it ends on, and is repeated for the time that the profile still has to go from the
     /// place reached, so that errors do not add up and every run ends on time.
     fn fill_by_steps(
         &self,
@@ -380,8 +382,8 @@ impl<const M: usize> Sampler<M> {
             return (effort, None);
         }
         let run = self.run_of(part.start + begin);
-        let mut cursor = Cursor::new(self, true);
-        let fresh = Resume { index: run.first, arc: run.arcs.start, u: f64::NAN };
+        let mut cursor = Cursor::new(self);
+        let fresh = Resume { index: run.first, phase: run.phases.start, u: f64::NAN };
         let known = resume.filter(|known| run.first < known.index && known.index < part.start + begin);
         let mut at = known.unwrap_or(fresh);
         while at.index + 1 < part.start + part.t.len() {
@@ -395,34 +397,34 @@ impl<const M: usize> Sampler<M> {
                 }
                 continue;
             };
-            cursor.from(at.arc);
-            let arc = cursor.seek(run, time);
+            cursor.from(at.phase);
+            let phase = cursor.seek(run, time);
             let motion = cursor.motion();
-            if arc != at.arc || at.u.is_nan() {
-                at = Resume { arc, u: self.arcs[arc].u0, ..at };
+            if phase != at.phase || at.u.is_nan() {
+                at = Resume { phase, u: self.phases[phase].u0, ..at };
             }
-            let (rounds, error) = self.step(motion, time - self.starts[arc], &mut at.u);
+            let (rounds, error) = self.step(motion, time - self.starts[phase], &mut at.u);
             effort.raise(rounds, error);
             if let Some(i) = out {
-                self.set(&mut part, i, arc, motion, &motion.at(at.u));
+                self.set(&mut part, i, phase, motion, &motion.at(at.u));
                 part.t[i] = self.time(at.index);
             }
         }
         (effort, Some(at))
     }
 
-    /// Moves u to `time` on the arc; returns the rounds of Newton–Raphson and the length error left, in steps.
-    fn step(&self, motion: &Motion<M>, time: f64, u: &mut f64) -> (u32, f64) {
+    /// Moves u to `time` on the phase; returns the rounds of Newton–Raphson and the length error left, in steps.
+    fn step(&self, motion: &PhaseMotion<M>, time: f64, u: &mut f64) -> (u32, f64) {
         let (mut low, mut high) = motion.span();
-        let (rounding, allowed) = (motion.length_rounding(), motion.step_error());
+        let ([rounding, table_error], allowed) = (motion.path().length_errors(), motion.step_error());
         let (mut rounds, mut whole) = (0, 0.0);
         for repeat in 0.. {
             let state = motion.at(*u);
-            let left = time - motion.time(&state);
+            let left = time - state.pace.t;
             let rates = motion.rates(&state);
             let step = step_length(&rates, left);
             if repeat == 0 {
-                // The step may have begun on an earlier arc.
+                // The step may have begun on an earlier phase.
                 whole = step_length(&rates, self.period).max(step.abs());
             }
             if left > 0.0 {
@@ -434,11 +436,11 @@ impl<const M: usize> Sampler<M> {
             // The derivatives of the speed may be rounding where an axis turns round: the speed alone must agree.
             let off = step.abs().max(0.5 * left.abs() * norm(&rates.velocity));
             if off <= allowed * whole + 2.0 * rounding || !(low < middle && middle < high) {
-                let error = if whole > 0.0 { (step.abs() + motion.length_error()) / whole } else { 0.0 };
+                let error = if whole > 0.0 { (step.abs() + table_error) / whole } else { 0.0 };
                 return (rounds, error);
             }
             let tolerance = 0.1 * allowed * whole + rounding;
-            let located = motion.advance(*u, step, tolerance);
+            let located = motion.path().advance(*u, step, tolerance);
             rounds += located.iterations;
             // A large period can be too much for the series.
             let usable = low < located.u && located.u < high && repeat < MAX_REPEATS;
@@ -447,9 +449,9 @@ impl<const M: usize> Sampler<M> {
         unreachable!("halving comes to an end")
     }
 
-    fn set(&self, part: &mut Slices<M>, i: usize, arc: usize, motion: &Motion<M>, state: &State) {
+    fn set(&self, part: &mut Slices<M>, i: usize, phase: usize, motion: &PhaseMotion<M>, state: &State) {
         let (position, Rates { velocity, acceleration, jerk }) = motion.sample(state);
-        let piece = self.arcs[arc].piece;
+        let piece = self.phases[phase].piece;
         part.position[i] = position;
         part.velocity[i] = velocity;
         part.acceleration[i] = acceleration;
@@ -459,20 +461,20 @@ impl<const M: usize> Sampler<M> {
         part.u[i] = state.u;
     }
 
-    /// Speed, first arc and its motion where the path begins; a speed of 0 is exact.
-    fn start(&self) -> Option<(f64, usize, Motion<'_, M>)> {
-        let first = self.runs[0].arcs.clone().next()?;
-        let arc = &self.arcs[first];
-        let motion = self.path.motion(arc, false);
-        let [begin, end] = [arc.u0, arc.u1].map(|u| norm(&motion.rates(&motion.at(u)).velocity));
-        let rests = arc.p0 == 0.0 || begin <= STANDSTILL * end;
+    /// Speed, first phase and its motion where the path begins; a speed of 0 is exact.
+    fn start(&self) -> Option<(f64, usize, PhaseMotion<'_, M>)> {
+        let first = self.runs[0].phases.clone().next()?;
+        let phase = &self.phases[first];
+        let motion = self.path.motion(phase);
+        let [begin, end] = [phase.u0, phase.u1].map(|u| norm(&motion.rates(&motion.at(u)).velocity));
+        let rests = phase.p0 == 0.0 || begin <= STANDSTILL * end;
         Some((if rests { 0.0 } else { begin }, first, motion))
     }
 
     fn set_start(&self, part: &mut Slices<M>, i: usize) {
-        if let Some((speed, arc, motion)) = self.start() {
+        if let Some((speed, phase, motion)) = self.start() {
             if speed > 0.0 {
-                self.set(part, i, arc, &motion, &motion.at(self.arcs[arc].u0));
+                self.set(part, i, phase, &motion, &motion.at(self.phases[phase].u0));
             }
         }
         part.position[i] = self.path.curve.control[0];
@@ -484,9 +486,9 @@ impl<const M: usize> Sampler<M> {
     /// The end of a run; `moving` where the path ends there at a speed.
     fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize, moving: bool) {
         let curve = &self.path.curve;
-        if let (true, Some(arc)) = (moving, self.arcs[run.arcs.clone()].last()) {
-            let motion = self.path.motion(arc, false);
-            self.set(part, i, run.arcs.end - 1, &motion, &motion.at(arc.u1));
+        if let (true, Some(phase)) = (moving, self.phases[run.phases.clone()].last()) {
+            let motion = self.path.motion(phase);
+            self.set(part, i, run.phases.end - 1, &motion, &motion.at(phase.u1));
         }
         part.position[i] = curve.control[curve.offsets[run.last_piece + 1] - 1];
         part.line[i] = self.path.lines[run.last_piece];
@@ -524,40 +526,46 @@ fn periods_of(time: f64, period: f64) -> f64 {
     }
 }
 
-/// The arc at a time, kept from one setpoint to the next.
+/// The phase at a time, kept from one setpoint to the next, and its piece, kept from one phase to the next.
 struct Cursor<'a, const M: usize> {
     sampler: &'a Sampler<M>,
-    arc: usize,
-    motion: Option<(usize, Motion<'a, M>)>,
-    with_lengths: bool,
+    phase: usize,
+    piece: Option<(u32, Rc<PiecePath<'a, M>>)>,
+    motion: Option<(usize, PhaseMotion<'a, M>)>,
 }
 
 impl<'a, const M: usize> Cursor<'a, M> {
-    fn new(sampler: &'a Sampler<M>, with_lengths: bool) -> Self {
-        Self { sampler, arc: usize::MAX, motion: None, with_lengths }
+    fn new(sampler: &'a Sampler<M>) -> Self {
+        Self { sampler, phase: usize::MAX, piece: None, motion: None }
     }
 
-    fn from(&mut self, arc: usize) {
-        self.arc = arc;
+    fn from(&mut self, phase: usize) {
+        self.phase = phase;
     }
 
-    /// Goes to the arc of a run that contains the time.
+    /// Goes to the phase of a run that contains the time.
     fn seek(&mut self, run: &Run, time: f64) -> usize {
         let starts = &self.sampler.starts;
-        if !run.arcs.contains(&self.arc) || starts[self.arc] > time {
-            self.arc = run.arcs.start + starts[run.arcs.clone()].partition_point(|&start| start <= time) - 1;
+        if !run.phases.contains(&self.phase) || starts[self.phase] > time {
+            self.phase =
+                run.phases.start + starts[run.phases.clone()].partition_point(|&start| start <= time) - 1;
         }
-        while self.arc + 1 < run.arcs.end && starts[self.arc + 1] <= time {
-            self.arc += 1;
+        while self.phase + 1 < run.phases.end && starts[self.phase + 1] <= time {
+            self.phase += 1;
         }
-        if self.motion.as_ref().is_none_or(|(arc, _)| *arc != self.arc) {
-            let arc = &self.sampler.arcs[self.arc];
-            self.motion = Some((self.arc, self.sampler.path.motion(arc, self.with_lengths)));
+        if self.motion.as_ref().is_none_or(|(phase, _)| *phase != self.phase) {
+            let phase = &self.sampler.phases[self.phase];
+            let piece = match self.piece.take() {
+                Some((number, piece)) if number == phase.piece => piece,
+                _ => Rc::new(self.sampler.path.piece(phase.piece as usize)),
+            };
+            self.piece = Some((phase.piece, piece.clone()));
+            self.motion = Some((self.phase, PhaseMotion::new(piece, phase)));
         }
-        self.arc
+        self.phase
     }
 
-    fn motion(&self) -> &Motion<'a, M> {
+    fn motion(&self) -> &PhaseMotion<'a, M> {
         &self.motion.as_ref().expect("seek comes first").1
     }
 }

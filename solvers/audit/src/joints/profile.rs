@@ -1,23 +1,22 @@
 //! Audits a profile whose limits belong to joints that are not the path's axes.
 //!
-//! Every arc is sampled at some ten places. Between two of them the acceleration of a joint is the difference of its
+//! Every phase is sampled at some ten places. Between two of them the acceleration of a joint is the difference of its
 //! velocities over the time; what velocities and times may be wrong by is allowed for.
 
 use rayon::prelude::*;
 
-use super::along::is_by_way;
-use super::jerk::audit_jerk;
-use super::motion::{motion, State, ROUNDING};
 use super::path::{JointPath, Piece, Place, TURN};
-use crate::arcs::Arcs;
-use crate::curve::{length, Followed};
+use super::phase_jerk::audit_jerk;
+use super::phase_motion::{motion, State, ROUNDING};
+use crate::curve::length;
+use crate::phases::Phases;
 use crate::{Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
 
-/// Places of an arc, as shares of the variable in which √p would be linear if p were: close at the ends, where accelerations
+/// Places of a phase, as shares of the variable in which √p would be linear if p were: close at the ends, where accelerations
 /// have their extremes.
 const PLACES: [f64; 11] = [0.0, 1.0 / 64.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 63.0 / 64.0, 1.0];
 
-/// Arcs measured at once: the memory for their places stays below some 30 MB.
+/// Phases measured at once: the memory for their places stays below some 30 MB.
 const CHUNK: usize = 2048;
 
 /// The chord error is measured with tangents this share of the piece apart.
@@ -26,29 +25,15 @@ const TANGENTS: f64 = 1e-4;
 /// What an audit of joints knows.
 pub struct JointAudit<'a, const M: usize> {
     pub path: JointPath<'a>,
-    pub arcs: Arcs<'a>,
+    pub phases: Phases<'a>,
     pub limits: Limits<M>,
-    /// When each arc begins, and the last one ends.
+    /// When each phase begins, and the last one ends.
     pub starts: &'a [f64],
 }
 
-/// Whether the numbers of an arc can be measured.
-pub fn has_good_numbers(path: &Followed, joints: usize, arcs: &Arcs, i: usize) -> bool {
-    let numbers = [&arcs.value, &arcs.duration, &arcs.u0, &arcs.u1, &arcs.p0, &arcs.p1, &arcs.a0, &arcs.a1];
-    let needs_axis = matches!(arcs.kind[i], 0 | 3);
-    (arcs.piece[i] as usize) < path.len()
-        && arcs.kind[i] <= 7
-        && numbers.iter().all(|column| column[i].is_finite())
-        && (is_by_way(arcs.kind[i]) || (arcs.a0[i] == 0.0 && arcs.a1[i] == 0.0))
-        && arcs.p0[i] >= 0.0
-        && arcs.p1[i] >= 0.0
-        && arcs.duration[i] >= 0.0
-        && (!needs_axis || (arcs.axis[i] as usize) < joints)
-}
-
-/// An arc at its places.
+/// A phase at its places.
 struct Measured<'a, const M: usize> {
-    arc: usize,
+    phase: usize,
     piece: Piece<'a, M>,
     places: Vec<Place<M>>,
     states: Vec<State<M>>,
@@ -62,9 +47,9 @@ impl<const M: usize> Measured<'_, M> {
     }
 }
 
-/// What the end of an arc passes on to the next one.
+/// What the end of a phase passes on to the next one.
 struct End<'a, const M: usize> {
-    arc: usize,
+    phase: usize,
     piece: Piece<'a, M>,
     velocity: [f64; M],
     doubt: [f64; M],
@@ -75,32 +60,32 @@ struct End<'a, const M: usize> {
 struct Reach<const M: usize> {
     /// Least and greatest, with time and source line.
     ends: [[(f64, f64, i32); 2]; M],
-    /// As the kinematics gives it and as it goes on, at the end of the last arc.
+    /// As the kinematics gives it and as it goes on, at the end of the last phase.
     last: Option<(usize, [f64; M], [f64; M])>,
     /// What these angles are off by, in degrees; not a number before a joint's turn is known.
     turns: [f64; M],
 }
 
-/// Velocity, acceleration and jumps of the joints, feed, chord error, times and order of the arcs; where the limits say so
+/// Velocity, acceleration and jumps of the joints, feed, chord error, times and order of the phases; where the limits say so
 /// the jerk of the joints too, and the jumps of their accelerations.
 pub(super) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: Seen) -> Tally<M> {
     let mut tally = Tally::default();
     let good = order(audit, &mut tally);
-    let arcs: Vec<usize> = (0..audit.arcs.len()).filter(|&arc| good[arc]).collect();
+    let phases: Vec<usize> = (0..audit.phases.len()).filter(|&phase| good[phase]).collect();
     let nowhere = [(f64::NAN, 0.0, 0); 2];
     let mut reach = Reach { ends: [nowhere; M], last: None, turns: [f64::NAN; M] };
     let mut before: Option<End<M>> = None;
-    for chunk in arcs.chunks(CHUNK) {
+    for chunk in phases.chunks(CHUNK) {
         let measured: Vec<(Measured<M>, Tally<M>)> = chunk
             .par_iter()
             .map_init(
                 || audit.path.work(),
-                |work, &arc| {
-                    let piece: Piece<M> = audit.path.piece(audit.arcs.piece[arc] as usize);
-                    let places: Vec<_> = places(&audit.arcs, arc).map(|u| piece.place(u, work)).into();
-                    let states = motion(&piece, &audit.arcs, arc, &places, places.len() - 1);
-                    let (own, mut tally) = (Measured { arc, piece, places, states }, Tally::default());
-                    audit.arc(&own, &mut tally);
+                |work, &phase| {
+                    let piece: Piece<M> = audit.path.piece(audit.phases.piece[phase] as usize);
+                    let places: Vec<_> = places(&audit.phases, phase).map(|u| piece.place(u, work)).into();
+                    let states = motion(&piece, &audit.phases, phase, &places, places.len() - 1);
+                    let (own, mut tally) = (Measured { phase, piece, places, states }, Tally::default());
+                    audit.phase(&own, &mut tally);
                     (own, tally)
                 },
             )
@@ -119,10 +104,10 @@ pub(super) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: S
     tally
 }
 
-/// u at the places of an arc.
-fn places(arcs: &Arcs, arc: usize) -> [f64; 11] {
-    let (u0, u1) = (arcs.u0[arc], arcs.u1[arc]);
-    let (near, both) = match (arcs.p0[arc].sqrt(), arcs.p0[arc].sqrt() + arcs.p1[arc].sqrt()) {
+/// u at the places of a phase.
+fn places(phases: &Phases, phase: usize) -> [f64; 11] {
+    let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
+    let (near, both) = match (phases.p0[phase].sqrt(), phases.p0[phase].sqrt() + phases.p1[phase].sqrt()) {
         (near, both) if both.is_finite() && both > 0.0 => (near, both),
         _ => (1.0, 2.0),
     };
@@ -136,35 +121,35 @@ fn places(arcs: &Arcs, arc: usize) -> [f64; 11] {
     })
 }
 
-/// Numbers, and arcs that cover every piece in order; which arcs can be measured.
+/// Numbers, and phases that cover every piece in order; which phases can be measured.
 fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<bool> {
-    let (path, arcs, starts) = (&audit.path.path, &audit.arcs, audit.starts);
-    let piece_of = |arc: usize| (arcs.piece[arc] as usize).min(path.len().saturating_sub(1));
-    let line = |arc: usize| path.line.get(piece_of(arc)).copied().unwrap_or(0);
+    let (path, phases, starts) = (&audit.path.path, &audit.phases, audit.starts);
+    let piece_of = |phase: usize| (phases.piece[phase] as usize).min(path.len().saturating_sub(1));
+    let line = |phase: usize| path.line.get(piece_of(phase)).copied().unwrap_or(0);
     let mut offer = |check: Check, value: f64, limit: f64, time: f64, line: i32| {
         tally.offer(check, 0, value, limit, time, line);
     };
     let wrong = |good: bool| if good { 0.0 } else { f64::INFINITY };
     let numbers: Vec<bool> =
-        (0..arcs.len()).map(|arc| has_good_numbers(path, audit.path.joints, arcs, arc)).collect();
-    for (arc, &good) in numbers.iter().enumerate() {
-        offer(Check::Numbers, wrong(good), 0.0, starts[arc], line(arc));
+        (0..phases.len()).map(|phase| phases.has_good_numbers(phase, audit.path.joints)).collect();
+    for (phase, &good) in numbers.iter().enumerate() {
+        offer(Check::Numbers, wrong(good), 0.0, starts[phase], line(phase));
     }
     if path.is_empty() {
         return numbers;
     }
-    let slack = |arc: usize| 8.0 * EPS * path.width[piece_of(arc)];
+    let slack = |phase: usize| 8.0 * EPS * path.width[piece_of(phase)];
     let mut good = numbers;
-    for (arc, good) in good.iter_mut().enumerate() {
-        let (u0, u1) = (arcs.u0[arc], arcs.u1[arc]);
-        let inside = u1 > u0 && u0 >= 0.0 && u1 <= path.width[piece_of(arc)] + slack(arc);
-        offer(Check::Order, wrong(inside || !*good), GAP_TOLERANCE, starts[arc], line(arc));
+    for (phase, good) in good.iter_mut().enumerate() {
+        let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
+        let inside = u1 > u0 && u0 >= 0.0 && u1 <= path.width[piece_of(phase)] + slack(phase);
+        offer(Check::Order, wrong(inside || !*good), GAP_TOLERANCE, starts[phase], line(phase));
         *good &= inside;
     }
-    let runs = arcs.runs;
+    let runs = phases.runs;
     let fits = runs.len() == path.runs.len()
         && runs.first() == Some(&0)
-        && runs.last() == Some(&(arcs.len() as i64))
+        && runs.last() == Some(&(phases.len() as i64))
         && runs.windows(2).all(|pair| pair[0] <= pair[1]);
     if !fits {
         offer(Check::Order, f64::INFINITY, GAP_TOLERANCE, 0.0, path.line[0]);
@@ -173,28 +158,28 @@ fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<boo
     for run in 0..runs.len() - 1 {
         let (first, end) = (runs[run] as usize, runs[run + 1] as usize);
         let pieces = path.runs[run] as usize..path.runs[run + 1] as usize;
-        // Arc by arc the parameter from the start of the run; pieces passed over show as gaps.
-        for arc in first..end {
-            let piece = piece_of(arc);
-            let gap = if arc == first {
+        // Phase by phase the parameter from the start of the run; pieces passed over show as gaps.
+        for phase in first..end {
+            let piece = piece_of(phase);
+            let gap = if phase == first {
                 if piece == pieces.start {
-                    arcs.u0[arc].abs()
+                    phases.u0[phase].abs()
                 } else {
                     f64::INFINITY
                 }
             } else {
-                let (before, ended) = (piece_of(arc - 1), arcs.u1[arc - 1]);
+                let (before, ended) = (piece_of(phase - 1), phases.u1[phase - 1]);
                 match piece {
-                    same if same == before => (arcs.u0[arc] - ended).abs(),
-                    next if next == before + 1 => arcs.u0[arc].abs() + (path.width[before] - ended).abs(),
+                    same if same == before => (phases.u0[phase] - ended).abs(),
+                    next if next == before + 1 => phases.u0[phase].abs() + (path.width[before] - ended).abs(),
                     _ => f64::INFINITY,
                 }
             };
-            offer(Check::Order, gap - 2.0 * slack(arc), GAP_TOLERANCE, starts[arc], line(arc));
+            offer(Check::Order, gap - 2.0 * slack(phase), GAP_TOLERANCE, starts[phase], line(phase));
         }
         let whole = if end > first {
             let (last, piece) = (end - 1, pieces.end.wrapping_sub(1));
-            piece_of(last) == piece && path.width[piece] - arcs.u1[last] <= GAP_TOLERANCE + slack(last)
+            piece_of(last) == piece && path.width[piece] - phases.u1[last] <= GAP_TOLERANCE + slack(last)
         } else {
             pieces.is_empty()
         };
@@ -212,18 +197,18 @@ impl<const M: usize> JointAudit<'_, M> {
         PASS_EXCESS * self.limits.acceleration.least(joint) * time.max(self.limits.period)
     }
 
-    /// Whether an arc is the first of a run.
-    pub fn is_first(&self, arc: usize) -> bool {
-        self.arcs.runs.binary_search(&(arc as i64)).is_ok()
+    /// Whether a phase is the first of a run.
+    pub fn is_first(&self, phase: usize) -> bool {
+        self.phases.runs.binary_search(&(phase as i64)).is_ok()
     }
 
-    /// Offers what an arc shows by itself.
-    fn arc(&self, own: &Measured<M>, tally: &mut Tally<M>) {
-        let Measured { arc, piece, places, states } = own;
-        let arc = *arc;
+    /// Offers what a phase shows by itself.
+    fn phase(&self, own: &Measured<M>, tally: &mut Tally<M>) {
+        let Measured { phase, piece, places, states } = own;
+        let phase = *phase;
         let (limits, line, joints) = (&self.limits, piece.line, self.path.joints);
         tally.samples += states.len() as u64;
-        let mut clock = self.starts[arc];
+        let mut clock = self.starts[phase];
         let size = places.iter().flat_map(|place| place.position).map(f64::abs).fold(0.0, f64::max);
         for (i, (state, place)) in states.iter().zip(places).enumerate() {
             if i > 0 {
@@ -256,8 +241,8 @@ impl<const M: usize> JointAudit<'_, M> {
         }
         let total: f64 = states.iter().map(|state| state.time).sum();
         let doubt = states.iter().map(|state| state.time * state.time_error).sum::<f64>() / total;
-        let error = (self.arcs.duration[arc] - total).abs() / total - doubt;
-        tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[arc], line);
+        let error = (self.phases.duration[phase] - total).abs() / total - doubt;
+        tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[phase], line);
         self.ends(own, tally);
     }
 
@@ -283,7 +268,7 @@ impl<const M: usize> JointAudit<'_, M> {
     /// Velocities at both ends by the recorded p, with how wrong they may be, and the speeds of the tip.
     fn recorded(&self, own: &Measured<M>) -> [([f64; M], [f64; M], f64); 2] {
         let [(first, _), (last, _)] = own.ends();
-        [(first, self.arcs.p0[own.arc]), (last, self.arcs.p1[own.arc])].map(|(place, p)| {
+        [(first, self.phases.p0[own.phase]), (last, self.phases.p1[own.phase])].map(|(place, p)| {
             let root = p.sqrt();
             let velocity = place.slope.map(|slope| slope * root);
             let doubt = std::array::from_fn(|k| place.slope_error[k] * root + ROUNDING * velocity[k].abs());
@@ -293,14 +278,14 @@ impl<const M: usize> JointAudit<'_, M> {
 
     /// Recorded p against the law's.
     fn ends(&self, own: &Measured<M>, tally: &mut Tally<M>) {
-        let (arc, duration) = (own.arc, self.arcs.duration[own.arc]);
-        let roots = [self.arcs.p0[arc].sqrt(), self.arcs.p1[arc].sqrt()];
+        let (phase, duration) = (own.phase, self.phases.duration[own.phase]);
+        let roots = [self.phases.p0[phase].sqrt(), self.phases.p1[phase].sqrt()];
         for (side, (velocity, doubt, _)) in self.recorded(own).iter().enumerate() {
             let (_, state) = own.ends()[side];
-            let time = self.starts[arc] + side as f64 * duration;
+            let time = self.starts[phase] + side as f64 * duration;
             for k in 0..self.path.joints {
                 let mut away = (state.velocity[k] - velocity[k]).abs() - doubt[k] - state.velocity_error[k];
-                // Where the arc's own joint stands the other joints have no velocity to compare.
+                // Where the phase's own joint stands the other joints have no velocity to compare.
                 if roots[side] == state.root_p {
                     away = 0.0;
                 }
@@ -309,7 +294,7 @@ impl<const M: usize> JointAudit<'_, M> {
         }
     }
 
-    /// What jumps from the arc before to this one; what this one passes on.
+    /// What jumps from the phase before to this one; what this one passes on.
     fn joint<'a>(
         &self,
         before: Option<End<'a, M>>,
@@ -317,10 +302,10 @@ impl<const M: usize> JointAudit<'_, M> {
         tally: &mut Tally<M>,
     ) -> End<'a, M> {
         let [(velocity, doubt, speed), (end_velocity, end_doubt, end_speed)] = self.recorded(&own);
-        let slack = self.slow(self.arcs.duration[own.arc], &own.places[0]);
-        let Measured { arc, piece, .. } = own;
-        let (duration, line, start) = (self.arcs.duration[arc], piece.line, self.starts[arc]);
-        let joined = before.filter(|before| before.arc + 1 == arc && !self.is_first(arc));
+        let slack = self.slow(self.phases.duration[own.phase], &own.places[0]);
+        let Measured { phase, piece, .. } = own;
+        let (duration, line, start) = (self.phases.duration[phase], piece.line, self.starts[phase]);
+        let joined = before.filter(|before| before.phase + 1 == phase && !self.is_first(phase));
         let corner = joined.as_ref().is_some_and(|before| before.piece.number != piece.number);
         for k in 0..self.path.joints {
             let jump = joined
@@ -342,18 +327,18 @@ impl<const M: usize> JointAudit<'_, M> {
         let most = self.path.junction_speed[piece.number] + slack;
         tally.offer(Check::Junction, 0, over, most, start, line);
         // Speeds at the ends of runs: at rest, but for the ends of the path.
-        let last = self.arcs.len() - 1;
+        let last = self.phases.len() - 1;
         let wanted = [
-            if arc == 0 { self.limits.end_speeds[0] } else { 0.0 },
-            if arc == last { self.limits.end_speeds[1] } else { 0.0 },
+            if phase == 0 { self.limits.end_speeds[0] } else { 0.0 },
+            if phase == last { self.limits.end_speeds[1] } else { 0.0 },
         ];
-        let ends = [self.is_first(arc) && arc < self.arcs.len(), self.is_first(arc + 1)];
+        let ends = [self.is_first(phase) && phase < self.phases.len(), self.is_first(phase + 1)];
         for (side, speed) in [speed, end_speed].into_iter().enumerate() {
             let off = (speed - wanted[side]).abs();
             let off = if ends[side] { off } else { 0.0 } - ROUNDING * (speed + wanted[side]);
             tally.offer(Check::Junction, 0, off, slack, start + side as f64 * duration, line);
         }
-        End { arc, piece, velocity: end_velocity, doubt: end_doubt, speed: end_speed }
+        End { phase, piece, velocity: end_velocity, doubt: end_doubt, speed: end_speed }
     }
 
     /// A jump of the tip's speed that means nothing to any joint.
@@ -375,9 +360,9 @@ impl<const M: usize> JointAudit<'_, M> {
         }
     }
 
-    /// Positions, angles continuous from arc to arc.
+    /// Positions, angles continuous from phase to phase.
     fn follow(&self, reach: &mut Reach<M>, own: &Measured<M>) {
-        let Measured { arc, piece, states, .. } = own;
+        let Measured { phase, piece, states, .. } = own;
         let [(first, _), (last, end)] = own.ends();
         let first = first.position;
         let begin: [f64; M] = match &reach.last {
@@ -388,7 +373,7 @@ impl<const M: usize> JointAudit<'_, M> {
                 std::array::from_fn(|k| seen[k] + step[k])
             }
         };
-        let mut clock = self.starts[*arc];
+        let mut clock = self.starts[*phase];
         for k in 0..self.path.joints {
             // Angles known up to whole turns are those that they are where they are known.
             if !piece.turning(k) && reach.turns[k].is_nan() {

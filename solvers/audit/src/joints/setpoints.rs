@@ -1,14 +1,14 @@
 //! The places of joint setpoints on the path of the tool tip, and when the profile is there.
 //!
-//! A setpoint is compared with K(C(u)): u on the arc that the profile is on at its time, moved along it until no nearer place
+//! A setpoint is compared with K(C(u)): u on the phase that the profile is on at its time, moved along it until no nearer place
 //! is found. How far the setpoint stays off is one error, how far the profile gets between the time of the setpoint and being
 //! at that place the other. The clock starts every run anew: setpoints may wait at a stop for their next period.
 
 use rayon::prelude::*;
 
-use super::motion::{motion, ROUNDING};
 use super::path::{Piece, Place, Work};
-use super::profile::{has_good_numbers, JointAudit};
+use super::phase_motion::{motion, ROUNDING};
+use super::profile::JointAudit;
 use crate::curve::{length, Segment};
 use crate::setpoints::Chunk;
 use crate::{Check, Tally, EPS, PLACE_TOLERANCE, ROUNDINGS};
@@ -41,7 +41,7 @@ struct Row<const M: usize> {
 
 /// Where a setpoint is on the path.
 #[derive(Clone, Copy)]
-struct Spot<const M: usize> {
+struct Nearest<const M: usize> {
     row: Row<M>,
     is_finite: bool,
     piece: usize,
@@ -82,16 +82,16 @@ pub struct JointSetpoints<const M: usize> {
 
 impl<const M: usize> JointSetpoints<M> {
     pub(super) fn new(audit: &JointAudit<M>) -> Self {
-        let (arcs, path) = (&audit.arcs, &audit.path.path);
-        let runs = arcs.runs;
-        let is_usable = !arcs.is_empty()
+        let (phases, path) = (&audit.phases, &audit.path.path);
+        let runs = phases.runs;
+        let is_usable = !phases.is_empty()
             && runs.len() == path.runs.len()
             && runs.first() == Some(&0)
-            && runs.last() == Some(&(arcs.len() as i64))
+            && runs.last() == Some(&(phases.len() as i64))
             && runs.windows(2).all(|pair| pair[0] < pair[1])
-            && (0..arcs.len()).all(|arc| has_good_numbers(path, audit.path.joints, arcs, arc))
-            && (0..arcs.len()).all(|arc| arcs.u1[arc] > arcs.u0[arc])
-            && arcs.piece.windows(2).all(|pair| pair[0] <= pair[1]);
+            && (0..phases.len()).all(|phase| phases.has_good_numbers(phase, audit.path.joints))
+            && (0..phases.len()).all(|phase| phases.u1[phase] > phases.u0[phase])
+            && phases.piece.windows(2).all(|pair| pair[0] <= pair[1]);
         let mut tally = Tally::default();
         if !is_usable {
             tally.offer(Check::Place, 0, f64::INFINITY, PLACE_TOLERANCE, 0.0, 0);
@@ -167,14 +167,14 @@ impl<const M: usize> JointSetpoints<M> {
 
     /// Adds the starts of the runs that the rows reach: at the next row where they stand on the stop.
     fn extend_clock(&mut self, audit: &JointAudit<M>, rows: &[Row<M>], last: bool, work: &mut Work) {
-        let (arcs, path, period) = (&audit.arcs, &audit.path.path, audit.limits.period);
-        while self.clock.len() < arcs.runs.len() - 1 {
+        let (phases, path, period) = (&audit.phases, &audit.path.path, audit.limits.period);
+        while self.clock.len() < phases.runs.len() - 1 {
             let run = self.clock.len();
             let due = if run == 0 {
                 path.start_dwell
             } else {
-                let (first, end) = (arcs.runs[run - 1] as usize, arcs.runs[run] as usize);
-                let motion_time = audit.starts[end - 1] + arcs.duration[end - 1] - audit.starts[first];
+                let (first, end) = (phases.runs[run - 1] as usize, phases.runs[run] as usize);
+                let motion_time = audit.starts[end - 1] + phases.duration[end - 1] - audit.starts[first];
                 self.clock[run - 1] + motion_time + path.dwell[run - 1]
             };
             let slack = UNEVEN * period + 2.0 * ROUNDINGS * EPS * due;
@@ -217,7 +217,7 @@ struct Judge<'a, const M: usize> {
     work: Work,
     /// The piece before the one of the last setpoint.
     earlier: Option<Piece<'a, M>>,
-    /// The arc of the last setpoint, its piece, and the places at its ends.
+    /// The phase of the last setpoint, its piece, and the places at its ends.
     known: Option<(usize, Piece<'a, M>, [Place<M>; 2])>,
     tally: Tally<M>,
     chords: Vec<Chord>,
@@ -231,15 +231,15 @@ impl<'a, const M: usize> Judge<'a, M> {
 
     /// Judges rows by themselves and against those before them, the first one against `before`.
     fn judge(mut self, before: Option<Row<M>>, rows: &[Row<M>]) -> (Tally<M>, Vec<Chord>) {
-        let mut last = before.map(|row| self.spot(row));
+        let mut last = before.map(|row| self.nearest(row));
         for row in rows {
-            let spot = self.spot(*row);
-            self.place(last.as_ref(), &spot);
+            let nearest = self.nearest(*row);
+            self.place(last.as_ref(), &nearest);
             if let Some(before) = &last {
-                self.step(before, &spot);
+                self.step(before, &nearest);
             }
             self.tally.samples += 1;
-            last = Some(spot);
+            last = Some(nearest);
         }
         (self.tally, self.chords)
     }
@@ -251,28 +251,29 @@ impl<'a, const M: usize> Judge<'a, M> {
     }
 
     /// Offers what a setpoint shows.
-    fn place(&mut self, last: Option<&Spot<M>>, spot: &Spot<M>) {
+    fn place(&mut self, last: Option<&Nearest<M>>, nearest: &Nearest<M>) {
         let Some((_, piece, _)) = &self.known else { unreachable!("a setpoint has been found") };
-        let (t, line, tally) = (spot.row.t, piece.line, &mut self.tally);
-        let wrong = if spot.is_finite { 0.0 } else { f64::INFINITY };
+        let (t, line, tally) = (nearest.row.t, piece.line, &mut self.tally);
+        let wrong = if nearest.is_finite { 0.0 } else { f64::INFINITY };
         tally.offer(Check::Numbers, 0, wrong, 0.0, t, line);
-        let away = if spot.is_finite { spot.off } else { f64::INFINITY };
+        let away = if nearest.is_finite { nearest.off } else { f64::INFINITY };
         tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, t, line);
-        let earlier = last.map_or(spot.row.position, |last| last.row.position);
-        let step = length(&piece.between(&earlier, &spot.target, None));
+        let earlier = last.map_or(nearest.row.position, |last| last.row.position);
+        let step = length(&piece.between(&earlier, &nearest.target, None));
         let allowed = if step.is_nan() { step } else { PLACE_TOLERANCE.max(STEP_SHARE * step) };
-        tally.offer(Check::Place, 0, spot.late, allowed, t, line);
+        tally.offer(Check::Place, 0, nearest.late, allowed, t, line);
         // A recorded velocity against the profile's, where the setpoint is on its place.
-        let Some(recorded) = spot.row.velocity else { return };
+        let Some(recorded) = nearest.row.velocity else { return };
         let limits = &self.audit.limits;
-        let at_joint = spot.u.min(piece.width - spot.u) <= PLACE_TOLERANCE;
-        let size = spot.row.position.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let away = spot.off.max(0.0) + spot.late + ROUNDING * size;
-        let good = spot.off <= PLACE_TOLERANCE && spot.velocity.iter().all(|velocity| velocity.is_finite());
+        let at_joint = nearest.u.min(piece.width - nearest.u) <= PLACE_TOLERANCE;
+        let size = nearest.row.position.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let away = nearest.off.max(0.0) + nearest.late + ROUNDING * size;
+        let good =
+            nearest.off <= PLACE_TOLERANCE && nearest.velocity.iter().all(|velocity| velocity.is_finite());
         for k in 0..self.audit.path.joints {
             // From rest, a place known to `away` is passed at a speed known to this.
-            let unknown = (2.0 * limits.acceleration.greatest(k) * away).sqrt() + spot.velocity_error[k];
-            let value = if good { (recorded[k] - spot.velocity[k]).abs() - unknown } else { 0.0 };
+            let unknown = (2.0 * limits.acceleration.greatest(k) * away).sqrt() + nearest.velocity_error[k];
+            let value = if good { (recorded[k] - nearest.velocity[k]).abs() - unknown } else { 0.0 };
             let jump = if at_joint { limits.jump[k] } else { 0.0 };
             let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
             tally.offer(Check::RecordedVelocity, k, value, limit, t, line);
@@ -280,13 +281,13 @@ impl<'a, const M: usize> Judge<'a, M> {
     }
 
     /// Speed and chord error of the tip from one setpoint to the next.
-    fn step(&mut self, before: &Spot<M>, spot: &Spot<M>) {
+    fn step(&mut self, before: &Nearest<M>, nearest: &Nearest<M>) {
         let (audit, piece) = (self.audit, self.piece());
-        let (limits, t, line) = (&audit.limits, spot.row.t, piece.line);
+        let (limits, t, line) = (&audit.limits, nearest.row.t, piece.line);
         let time = t - before.row.t;
-        let follows = before.piece <= spot.piece && spot.piece - before.piece <= 1;
+        let follows = before.piece <= nearest.piece && nearest.piece - before.piece <= 1;
         let is_step = time > 0.0 && time <= 2.0 * limits.period && follows;
-        let crosses = before.piece != spot.piece;
+        let crosses = before.piece != nearest.piece;
         let (made, first);
         first = match &self.earlier {
             _ if !crosses => piece,
@@ -297,14 +298,14 @@ impl<'a, const M: usize> Judge<'a, M> {
             }
         };
         // To the end of the piece before, and from the start of this one, whose words may mean another thing.
-        let until = if crosses { first.width } else { spot.u };
-        let since = if crosses { 0.0 } else { spot.u };
+        let until = if crosses { first.width } else { nearest.u };
+        let since = if crosses { 0.0 } else { nearest.u };
         let [there, here] =
-            if crosses { [first.curve.at(until), piece.curve.at(since)] } else { [spot.tip; 2] };
-        let size = before.tip.iter().chain(&spot.tip).fold(0.0, |most: f64, x| most.max(x.abs()));
+            if crosses { [first.curve.at(until), piece.curve.at(since)] } else { [nearest.tip; 2] };
+        let size = before.tip.iter().chain(&nearest.tip).fold(0.0, |most: f64, x| most.max(x.abs()));
         let rounding = ROUNDING * size;
         let (mut way, mut least) = (0.0, 0.0);
-        for (piece, from, to) in [(first, &before.tip, &there), (piece, &here, &spot.tip)] {
+        for (piece, from, to) in [(first, &before.tip, &there), (piece, &here, &nearest.tip)] {
             let step = (piece.feed_way(from, to) - 2.0 * rounding).max(0.0);
             way += step;
             least += step / audit.path.feed[piece.number];
@@ -315,41 +316,41 @@ impl<'a, const M: usize> Judge<'a, M> {
         if limits.chord_tolerance.is_finite() {
             // From one run to the next the tool stands still: each side has a chord of its own.
             let stops = first.run != piece.run;
-            let far = if stops { &there } else { &spot.tip };
+            let far = if stops { &there } else { &nearest.tip };
             let near = if stops { &here } else { &before.tip };
             let mut error = 0.0;
             if crosses {
                 error = chord_error(first, before.u, until, &before.tip, far);
             }
             let start = if crosses { 0.0 } else { before.u };
-            error = chord_error(piece, start, spot.u, near, &spot.tip).max(error);
-            let error = if is_step { error - rounding - spot.off.max(0.0) } else { 0.0 };
+            error = chord_error(piece, start, nearest.u, near, &nearest.tip).max(error);
+            let error = if is_step { error - rounding - nearest.off.max(0.0) } else { 0.0 };
             let linear = piece.linear();
-            let length = length::<M>(&std::array::from_fn(|k| linear[k] * (spot.tip[k] - near[k])));
+            let length = length::<M>(&std::array::from_fn(|k| linear[k] * (nearest.tip[k] - near[k])));
             chord = Some(Chord { error, length, time: t, line });
         }
         self.tally.offer(Check::Feed, 0, speed, feed, t, line);
         self.chords.extend(chord);
     }
 
-    /// The arc that a time falls into, and the time since the arc began.
-    fn arc_at(&self, t: f64) -> (usize, f64) {
-        let (arcs, starts) = (&self.audit.arcs, self.audit.starts);
+    /// The phase that a time falls into, and the time since the phase began.
+    fn phase_at(&self, t: f64) -> (usize, f64) {
+        let (phases, starts) = (&self.audit.phases, self.audit.starts);
         let clock = if self.clock.is_empty() { &[self.audit.path.path.start_dwell][..] } else { self.clock };
         let run = clock.partition_point(|&begin| begin <= t).saturating_sub(1);
-        let (first, end) = (arcs.runs[run] as usize, arcs.runs[run + 1] as usize);
+        let (first, end) = (phases.runs[run] as usize, phases.runs[run + 1] as usize);
         let own = t - (clock[run] - starts[first]);
-        let arc = starts[..arcs.len()].partition_point(|&start| start <= own).saturating_sub(1);
-        let arc = arc.clamp(first, end - 1);
-        (arc, (own - starts[arc]).clamp(0.0, arcs.duration[arc]))
+        let phase = starts[..phases.len()].partition_point(|&start| start <= own).saturating_sub(1);
+        let phase = phase.clamp(first, end - 1);
+        (phase, (own - starts[phase]).clamp(0.0, phases.duration[phase]))
     }
 
-    fn spot(&mut self, row: Row<M>) -> Spot<M> {
-        let (audit, arcs) = (self.audit, &self.audit.arcs);
+    fn nearest(&mut self, row: Row<M>) -> Nearest<M> {
+        let (audit, phases) = (self.audit, &self.audit.phases);
         let t = if row.t.is_finite() { row.t } else { 0.0 };
-        let (arc, since) = self.arc_at(t);
-        if self.known.as_ref().is_none_or(|(known, ..)| *known != arc) {
-            let number = arcs.piece[arc] as usize;
+        let (phase, since) = self.phase_at(t);
+        if self.known.as_ref().is_none_or(|(known, ..)| *known != phase) {
+            let number = phases.piece[phase] as usize;
             let piece = match self.known.take() {
                 Some((_, piece, _)) if piece.number == number => piece,
                 other => {
@@ -357,21 +358,21 @@ impl<'a, const M: usize> Judge<'a, M> {
                     audit.path.piece(number)
                 }
             };
-            let ends = [arcs.u0[arc], arcs.u1[arc]].map(|u| piece.place(u, &mut self.work));
-            self.known = Some((arc, piece, ends));
+            let ends = [phases.u0[phase], phases.u1[phase]].map(|u| piece.place(u, &mut self.work));
+            self.known = Some((phase, piece, ends));
         }
-        let Some((_, piece, ends)) = &self.known else { unreachable!("the arc is known") };
+        let Some((_, piece, ends)) = &self.known else { unreachable!("the phase is known") };
         let is_finite = row.t.is_finite() && row.position.iter().all(|x| x.is_finite());
         let target = if is_finite { row.position } else { [0.0; M] };
-        let place = nearest(piece, arcs, arc, since, &target, &mut self.work);
-        let states = motion(piece, arcs, arc, &[ends[0], place, ends[1]], 1);
+        let place = nearest(piece, phases, phase, since, &target, &mut self.work);
+        let states = motion(piece, phases, phase, &[ends[0], place, ends[1]], 1);
         let here = &states[1];
         let doubt = here.time * here.time_error;
         let doubt = if doubt.is_nan() { 0.0 } else { doubt };
-        let wait = (here.time - since).abs() - doubt - EPS * row.t.abs() * (arc as f64 + 2.0 * ROUNDINGS);
+        let wait = (here.time - since).abs() - doubt - EPS * row.t.abs() * (phase as f64 + 2.0 * ROUNDINGS);
         let wait = if wait.is_nan() { wait } else { wait.max(0.0) };
         let pull = length(&audit.limits.acceleration.greater());
-        Spot {
+        Nearest {
             row,
             is_finite,
             piece: piece.number,
@@ -402,18 +403,18 @@ fn chord_error<const M: usize>(
     [0.25, 0.5, 0.75, 1.0].map(away).into_iter().fold(0.0, f64::max)
 }
 
-/// The place of an arc that a position is nearest to.
+/// The place of a phase that a position is nearest to.
 fn nearest<const M: usize>(
     piece: &Piece<M>,
-    arcs: &crate::arcs::Arcs,
-    arc: usize,
+    phases: &crate::phases::Phases,
+    phase: usize,
     since: f64,
     target: &[f64; M],
     work: &mut Work,
 ) -> Place<M> {
-    let (low, high) = (arcs.u0[arc], arcs.u1[arc]);
-    let (near, far) = (arcs.p0[arc].sqrt(), arcs.p1[arc].sqrt());
-    let x = (since / arcs.duration[arc]).clamp(0.0, 1.0);
+    let (low, high) = (phases.u0[phase], phases.u1[phase]);
+    let (near, far) = (phases.p0[phase].sqrt(), phases.p1[phase].sqrt());
+    let x = (since / phases.duration[phase]).clamp(0.0, 1.0);
     let share = x * (2.0 * near + (far - near) * x) / (near + far);
     let share = if share.is_nan() { 0.5 } else { share };
     let mut place = piece.place((low + (high - low) * share).clamp(low, high), work);

@@ -1,11 +1,11 @@
-//! Motion along arcs and the time grid, against hand calculation, their own derivatives and each other.
+//! Motion along phases and the time grid, against hand calculation, their own derivatives and each other.
 
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
 use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::motion::{Motion, ProfileArc, State};
+use feedplan_setpoints::phase_motion::{Counts, Phase, PhaseMotion, PiecePath, State};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
 
@@ -16,20 +16,20 @@ fn raised<const M: usize>(piece: &Quadratic<M>, by: usize) -> CompositeCurve<M> 
     curve
 }
 
-fn motion<'a, const M: usize>(curve: &'a CompositeCurve<M>, arc: &ProfileArc) -> Motion<'a, M> {
-    Motion::new(curve.piece(0), None, None, arc, true)
+fn motion<'a, const M: usize>(curve: &'a CompositeCurve<M>, phase: &Phase) -> PhaseMotion<'a, M> {
+    PhaseMotion::new(PiecePath::new(curve.piece(0), Counts::Axes, Counts::Axes).into(), phase)
 }
 
-fn arc(kind: PhaseLaw, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> ProfileArc {
+fn phase(law: PhaseLaw, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> Phase {
     let ((u0, u1), (p0, p1)) = (u, p);
-    ProfileArc { piece: 0, kind, axis: 0, value, u0, u1, p0, p1, duration, a0: 0.0, a1: 0.0 }
+    Phase { piece: 0, law, axis: 0, value, u0, u1, p0, p1, duration, a0: 0.0, a1: 0.0 }
 }
 
 /// A line of 10 mm from rest to rest at 1000 mm/s²: up for 0.1 s to 100 mm/s, and down.
-fn triangle() -> (Quadratic<2>, [ProfileArc; 2]) {
+fn triangle() -> (Quadratic<2>, [Phase; 2]) {
     let line = Quadratic::line([0.0, 5.0], [10.0, 5.0]);
-    let up = arc(PhaseLaw::AxisAcceleration, 1000.0, (0.0, 5.0), (0.0, 1e4), 0.1);
-    let down = arc(PhaseLaw::AxisAcceleration, -1000.0, (5.0, 10.0), (1e4, 0.0), 0.1);
+    let up = phase(PhaseLaw::AxisAcceleration, 1000.0, (0.0, 5.0), (0.0, 1e4), 0.1);
+    let down = phase(PhaseLaw::AxisAcceleration, -1000.0, (5.0, 10.0), (1e4, 0.0), 0.1);
     (line, [up, down])
 }
 
@@ -47,9 +47,9 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
 }
 
 fn sampler(period: f64) -> Sampler<2> {
-    let (line, arcs) = triangle();
+    let (line, phases) = triangle();
     let path = path_of(&line);
-    Sampler::new(path.into(), arcs.to_vec(), &[0, 2], period, Watch::default()).unwrap()
+    Sampler::new(path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).unwrap()
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn any_part_of_the_stream_has_the_same_digits() {
 fn the_speed_next_to_a_standstill_keeps_its_digits() {
     // x' grows from 1 to 4 on [0, 3]: 7.5 mm from 15 mm/s down to rest in 1 s at 15 mm/s².
     let piece = Quadratic { control: [[0.0], [1.5], [7.5]], width: 3.0 };
-    let down = arc(PhaseLaw::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
+    let down = phase(PhaseLaw::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
     for by in [0, 1, 7] {
         let curve = raised(&piece, by);
         let motion = motion(&curve, &down);
@@ -126,38 +126,13 @@ fn the_speed_next_to_a_standstill_keeps_its_digits() {
 }
 
 #[test]
-fn speed_through_a_full_cusp_stays_finite() {
-    // C' = u (3, 4)/5 on [0, 2]: length u²/2. p is infinite at 0, the speed is not.
-    let piece = Quadratic { control: [[0.0, 0.0], [0.0, 0.0], [1.2, 1.6]], width: 2.0 };
-    let speed = 20.0;
-    let feed = arc(PhaseLaw::Feed, speed * speed, (0.0, 2.0), (f64::INFINITY, 100.0), 0.1);
-    // X gains speed from 3 to 9 mm/s on its 1.2 mm: 0.2 s at 30 mm/s².
-    let axis = arc(PhaseLaw::AxisAcceleration, 30.0, (0.0, 2.0), (f64::INFINITY, 81.0 / 1.44), 0.2);
-    for by in [0, 1, 7] {
-        let curve = raised(&piece, by);
-        let (feed, axis) = (motion(&curve, &feed), motion(&curve, &axis));
-        for t in [0.0, 1e-9, 0.01, 0.1] {
-            let state = feed.at_time(t, 0.001);
-            assert!((state.u * state.u / 2.0 - speed * t).abs() < 1e-12 * speed * 0.1);
-            assert!(norm(&sub(&feed.rates(&state).velocity, &[12.0, 16.0])) < 1e-13);
-            assert!(norm(&feed.rates(&state).acceleration) < 1e-6);
-            let state = axis.at_time(t, 0.001);
-            assert!((axis.point(&state)[0] - (3.0 * t + 15.0 * t * t)).abs() < 1e-14);
-            assert!(norm(&sub(&axis.rates(&state).velocity, &[3.0 + 30.0 * t, 4.0 + 40.0 * t])) < 1e-12);
-            assert!(norm(&sub(&axis.rates(&state).acceleration, &[30.0, 40.0])) < 1e-7);
-            assert!((axis.time(&state) - t).abs() < 1e-15);
-        }
-    }
-}
-
-#[test]
 fn a_start_at_rest_in_a_cusp_keeps_p_and_speeds_up() {
     // C' = u, p = 9: u = 3t, x = u²/2 at the constant acceleration 9.
     let piece = Quadratic { control: [[0.0], [0.0], [2.0]], width: 2.0 };
-    let arc = arc(PhaseLaw::AxisAcceleration, 9.0, (0.0, 2.0), (9.0, 9.0), 2.0 / 3.0);
+    let phase = phase(PhaseLaw::AxisAcceleration, 9.0, (0.0, 2.0), (9.0, 9.0), 2.0 / 3.0);
     for by in [0, 1, 7] {
         let curve = raised(&piece, by);
-        let motion = motion(&curve, &arc);
+        let motion = motion(&curve, &phase);
         for t in [0.0, 1e-8, 0.1, 0.5] {
             let state = motion.at_time(t, 0.001);
             assert!((state.u - 3.0 * t).abs() <= 1e-15);
@@ -168,42 +143,42 @@ fn a_start_at_rest_in_a_cusp_keeps_p_and_speeds_up() {
 
 #[test]
 fn nonsense_is_refused_with_a_sentence() {
-    let build = |change: &dyn Fn(&mut ProfileArc), period: f64| {
-        let (line, mut arcs) = triangle();
-        change(&mut arcs[1]);
+    let build = |change: &dyn Fn(&mut Phase), period: f64| {
+        let (line, mut phases) = triangle();
+        change(&mut phases[1]);
         let path = path_of(&line);
-        Sampler::new(path.into(), arcs.to_vec(), &[0, 2], period, Watch::default()).err()
+        Sampler::new(path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).err()
     };
     assert!(build(&|_| (), 0.001).is_none());
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12, 5e-324] {
         assert!(build(&|_| (), period).unwrap().contains("period"), "{period}");
     }
-    let changes: [&dyn Fn(&mut ProfileArc); 10] = [
-        &|arc| arc.piece = 1,
-        &|arc| arc.u1 = 11.0,
-        &|arc| arc.u0 = arc.u1,
-        &|arc| arc.duration = f64::NAN,
-        &|arc| arc.p0 = -1.0,
-        &|arc| arc.p1 = f64::NAN,
-        &|arc| arc.axis = 2,
-        &|arc| arc.value = f64::INFINITY,
-        &|arc| arc.a0 = 1.0,
-        &|arc| arc.a1 = f64::NAN,
+    let changes: [&dyn Fn(&mut Phase); 10] = [
+        &|phase| phase.piece = 1,
+        &|phase| phase.u1 = 11.0,
+        &|phase| phase.u0 = phase.u1,
+        &|phase| phase.duration = f64::NAN,
+        &|phase| phase.p0 = -1.0,
+        &|phase| phase.p1 = f64::NAN,
+        &|phase| phase.axis = 2,
+        &|phase| phase.value = f64::INFINITY,
+        &|phase| phase.a0 = 1.0,
+        &|phase| phase.a1 = f64::NAN,
     ];
     for (i, change) in changes.iter().enumerate() {
-        assert!(build(change, 0.001).unwrap().starts_with("arc 1 of the profile"), "{i}");
+        assert!(build(change, 0.001).unwrap().starts_with("phase 1 of the profile"), "{i}");
     }
 }
 
 prop_compose! {
-    /// A piece whose x does not turn, and an arc of a kind on part of it.
-    fn any_arc()(
+    /// A piece whose x does not turn, and a phase of any law on part of it.
+    fn any_phase()(
         control in prop::array::uniform3(prop::array::uniform2(-5.0..5.0)),
         slopes in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.0..5.0]),
-        width in 0.1..5.0f64, cut in prop::array::uniform2(0.0..1.0f64), kind in 0u8..8,
+        width in 0.1..5.0f64, cut in prop::array::uniform2(0.0..1.0f64), law in 0u8..7,
         speeds in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.01..100.0]),
         inner in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.0..2.0]), flip in any::<bool>(),
-    ) -> (Quadratic<2>, ProfileArc) {
+    ) -> (Quadratic<2>, Phase) {
         let slopes = if slopes[0] + slopes[1] < 0.1 { [1.0, 2.0] } else { slopes };
         let speeds: [f64; 2] = if speeds[0] + speeds[1] == 0.0 { [0.0, 10.0] } else { speeds };
         let sign = if flip { -1.0 } else { 1.0 };
@@ -217,60 +192,55 @@ prop_compose! {
         };
         let (g0, g1) = (tangent(u0), tangent(u1));
         let (x0, x1) = (g0[0].abs(), g1[0].abs());
-        let kind = PhaseLaw::from_number(kind).unwrap();
+        let law = PhaseLaw::from_number(law).unwrap();
         let way = 0.5 * (x0 + x1) * (u1 - u0);
         let v = 10.0 * speeds[0].max(0.5);
         let p = |speed: f64, g: f64| (speed / g).powi(2);
-        let mut arc = arc(kind, 0.0, (u0, u1), (v * v, v * v), (u1 - u0) / v);
-        match kind {
+        let mut phase = phase(law, 0.0, (u0, u1), (v * v, v * v), (u1 - u0) / v);
+        match law {
             PhaseLaw::AxisAcceleration => {
                 // Where x' vanishes no finite p has a speed.
                 let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6));
                 let v1 = if v0 + v1 == 0.0 { 0.01 } else { v1 };
-                arc.duration = 2.0 * way / (v0 + v1);
-                arc.value = sign * (v1 - v0) / arc.duration;
-                (arc.p0, arc.p1) = (p(v0, x0.max(1e-6)), p(v1, x1.max(1e-6)));
+                phase.duration = 2.0 * way / (v0 + v1);
+                phase.value = sign * (v1 - v0) / phase.duration;
+                (phase.p0, phase.p1) = (p(v0, x0.max(1e-6)), p(v1, x1.max(1e-6)));
             }
-            PhaseLaw::AxisVelocity => (arc.value, arc.duration) = (v * v, way / v),
-            PhaseLaw::Feed => (arc.value, arc.duration) = (v * v, length(&piece, u0, u1) / v),
-            PhaseLaw::Chord => {
-                arc.value = v;
-                let time = |u: f64| 1.0 / (v * norm(&tangent(u))).sqrt();
-                arc.duration = simpson(time, u0, u1);
-            }
+            PhaseLaw::AxisVelocity => (phase.value, phase.duration) = (v * v, way / v),
+            PhaseLaw::Feed => (phase.value, phase.duration) = (v * v, length(&piece, u0, u1) / v),
             PhaseLaw::ParameterAcceleration => {
-                (arc.p0, arc.p1) = (v * v, speeds[1] * speeds[1]);
-                arc.value = 0.5 * (arc.p1 - arc.p0) / (u1 - u0);
-                arc.duration = 2.0 * (u1 - u0) / (v + speeds[1]);
+                (phase.p0, phase.p1) = (v * v, speeds[1] * speeds[1]);
+                phase.value = 0.5 * (phase.p1 - phase.p0) / (u1 - u0);
+                phase.duration = 2.0 * (u1 - u0) / (v + speeds[1]);
             }
             PhaseLaw::SpeedLine => {
                 let line = speeds.map(|speed| (10.0 * speed.max(10.0)).powi(2));
                 let square = |u: f64| norm(&tangent(u)).powi(2);
-                (arc.p0, arc.p1) = (line[0] / square(u0), line[1] / square(u1));
+                (phase.p0, phase.p1) = (line[0] / square(u0), line[1] / square(u1));
                 let at = |u: f64| line[0] + (line[1] - line[0]) * (u - u0) / (u1 - u0);
-                arc.duration = simpson(|u| (square(u) / at(u)).sqrt(), u0, u1);
+                phase.duration = simpson(|u| (square(u) / at(u)).sqrt(), u0, u1);
             }
             PhaseLaw::PathJerk => {
                 // v is a quadratic polynomial of time with these Bernstein coefficients; from rest also without a pull.
                 let b = [speeds[0], 0.5 * inner[0] * (speeds[0] + speeds[1]), speeds[1]];
-                arc.duration = 3.0 * length(&piece, u0, u1) / (b[0] + b[1] + b[2]);
-                (arc.p0, arc.p1) = (p(b[0], norm(&g0)), p(b[2], norm(&g1)));
-                (arc.a0, arc.a1) = (2.0 * (b[1] - b[0]) / arc.duration, 2.0 * (b[2] - b[1]) / arc.duration);
-                arc.value = (arc.a1 - arc.a0) / arc.duration;
+                phase.duration = 3.0 * length(&piece, u0, u1) / (b[0] + b[1] + b[2]);
+                (phase.p0, phase.p1) = (p(b[0], norm(&g0)), p(b[2], norm(&g1)));
+                (phase.a0, phase.a1) = (2.0 * (b[1] - b[0]) / phase.duration, 2.0 * (b[2] - b[1]) / phase.duration);
+                phase.value = (phase.a1 - phase.a0) / phase.duration;
             }
             PhaseLaw::SpeedCubic => {
                 let b = [speeds[0], 10.0 * inner[0], 10.0 * inner[1], speeds[1]].map(|v| (1.0 + v).powi(2));
                 let way = length(&piece, u0, u1);
-                (arc.p0, arc.p1) = (p(b[0].sqrt(), norm(&g0)), p(b[3].sqrt(), norm(&g1)));
-                (arc.a0, arc.a1) = (1.5 * (b[1] - b[0]) / way, 1.5 * (b[3] - b[2]) / way);
+                (phase.p0, phase.p1) = (p(b[0].sqrt(), norm(&g0)), p(b[3].sqrt(), norm(&g1)));
+                (phase.a0, phase.a1) = (1.5 * (b[1] - b[0]) / way, 1.5 * (b[3] - b[2]) / way);
                 let at = |x: f64| {
                     let y = 1.0 - x;
                     y * y * (y * b[0] + 3.0 * x * b[1]) + x * x * (3.0 * y * b[2] + x * b[3])
                 };
-                arc.duration = simpson(|x| way / at(x).sqrt(), 0.0, 1.0);
+                phase.duration = simpson(|x| way / at(x).sqrt(), 0.0, 1.0);
             }
         }
-        (piece, arc)
+        (piece, phase)
     }
 }
 
@@ -294,12 +264,12 @@ fn length(piece: &Quadratic<2>, a: f64, b: f64) -> f64 {
     simpson(|u| norm(&[0, 1].map(|k| from[k] + (to[k] - from[k]) * u / piece.width)), a, b)
 }
 
-/// The arc is as smooth as differences over a thousandth of it need.
-fn tame(piece: &Quadratic<2>, arc: &ProfileArc) -> bool {
+/// The phase is as smooth as differences over a thousandth of it need.
+fn tame(piece: &Quadratic<2>, phase: &Phase) -> bool {
     let (from, to) = piece.end_tangents();
-    let change = norm(&sub(&to, &from)) * (arc.u1 - arc.u0) / piece.width;
+    let change = norm(&sub(&to, &from)) * (phase.u1 - phase.u0) / piece.width;
     (0..=50).all(|i| {
-        let u = arc.u0 + (arc.u1 - arc.u0) * i as f64 / 50.0;
+        let u = phase.u0 + (phase.u1 - phase.u0) * i as f64 / 50.0;
         (from[0] + (to[0] - from[0]) * u / piece.width).abs() > 0.1 * change + 1e-3
     })
 }
@@ -308,63 +278,63 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn place_and_time_undo_each_other((piece, arc) in any_arc(), at in 0.0..1.0f64, by in 0..4usize) {
-        let curve = raised(&piece, if arc.kind == PhaseLaw::Chord { 0 } else { by });
-        let motion = motion(&curve, &arc);
-        let t = at * arc.duration;
-        let state = motion.at_time(t, 1e-3 * arc.duration);
-        prop_assert!((arc.u0..=arc.u1).contains(&state.u));
-        prop_assert_eq!(motion.at_time(0.0, 1e-3).u, arc.u0);
-        prop_assert_eq!(motion.at_time(arc.duration, 1e-3).u, arc.u1);
+    fn place_and_time_undo_each_other((piece, phase) in any_phase(), at in 0.0..1.0f64, by in 0..4usize) {
+        let curve = raised(&piece, by);
+        let motion = motion(&curve, &phase);
+        let t = at * phase.duration;
+        let state = motion.at_time(t, 1e-3 * phase.duration);
+        prop_assert!((phase.u0..=phase.u1).contains(&state.u));
+        prop_assert_eq!(motion.at_time(0.0, 1e-3).u, phase.u0);
+        prop_assert_eq!(motion.at_time(phase.duration, 1e-3).u, phase.u1);
         prop_assert!(state.iterations <= 30 && state.error < 1e-12);
-        if tame(&piece, &arc) {
-            let again = motion.time(&motion.at(state.u));
+        if tame(&piece, &phase) {
+            let again = motion.at(state.u).pace.t;
             // A step of 1e-13 of the way costs √1e-13 of the time next to a standstill.
             let slack = if (1e-3..=1.0 - 1e-3).contains(&at) { 1e-9 } else { 1e-6 };
-            prop_assert!((again - t).abs() <= slack * arc.duration, "{again} {t}");
+            prop_assert!((again - t).abs() <= slack * phase.duration, "{again} {t}");
         }
     }
 
     #[test]
     fn the_way_of_the_governing_axis_is_its_speed_in_time(
-        (piece, arc) in any_arc(), at in 0.0..1.0f64, by in 0..4usize
+        (piece, phase) in any_phase(), at in 0.0..1.0f64, by in 0..4usize
     ) {
-        if !matches!(arc.kind, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) {
+        if !matches!(phase.law, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) {
             return Ok(());
         }
         let curve = raised(&piece, by);
-        let motion = motion(&curve, &arc);
-        let t = at * arc.duration;
-        let [v0, v1] = [arc.u0, arc.u1].map(|u| motion.rates(&motion.at(u)).velocity[0]);
-        if arc.kind == PhaseLaw::AxisAcceleration {
-            prop_assert!(v0 != 0.0 || arc.p0 == 0.0);
-            prop_assert!(arc.p0 != 0.0 || v0 == 0.0, "{v0:e} from rest");
-            prop_assert!(arc.p1 != 0.0 || v1 == 0.0, "{v1:e} at rest");
+        let motion = motion(&curve, &phase);
+        let t = at * phase.duration;
+        let [v0, v1] = [phase.u0, phase.u1].map(|u| motion.rates(&motion.at(u)).velocity[0]);
+        if phase.law == PhaseLaw::AxisAcceleration {
+            prop_assert!(v0 != 0.0 || phase.p0 == 0.0);
+            prop_assert!(phase.p0 != 0.0 || v0 == 0.0, "{v0:e} from rest");
+            prop_assert!(phase.p1 != 0.0 || v1 == 0.0, "{v1:e} at rest");
         }
-        let a = if arc.kind == PhaseLaw::AxisAcceleration { arc.value } else { 0.0 };
-        let way = motion.point(&motion.at_time(t, 1e-3))[0] - piece.point(arc.u0)[0];
+        let a = if phase.law == PhaseLaw::AxisAcceleration { phase.value } else { 0.0 };
+        let way = motion.point(&motion.at_time(t, 1e-3))[0] - piece.point(phase.u0)[0];
         prop_assert!((way - (v0 * t + 0.5 * a * t * t)).abs() <= 2e-8 * (1.0 + way.abs()), "{way}");
     }
 
     #[test]
     fn every_rate_is_the_derivative_of_the_one_before(
-        (piece, arc) in any_arc(), at in 0.1..0.9f64, by in 0..4usize
+        (piece, phase) in any_phase(), at in 0.1..0.9f64, by in 0..4usize
     ) {
-        if !tame(&piece, &arc) {
+        if !tame(&piece, &phase) {
             return Ok(());
         }
-        let curve = raised(&piece, if arc.kind == PhaseLaw::Chord { 0 } else { by });
-        let motion = motion(&curve, &arc);
-        let (t, h) = (at * arc.duration, 1e-4 * arc.duration);
+        let curve = raised(&piece, by);
+        let motion = motion(&curve, &phase);
+        let (t, h) = (at * phase.duration, 1e-4 * phase.duration);
         let [before, here, after]: [State; 3] = [t - h, t, t + h].map(|t| motion.at_time(t, h));
         let rates = [&before, &here, &after].map(|state| motion.rates(state));
         let slope = |a: [f64; 2], b: [f64; 2]| sub(&b, &a).map(|d| d / (2.0 * h));
         let close = |found: [f64; 2], expected: [f64; 2], scale: f64| {
             norm(&sub(&found, &expected)) <= 1e-3 * (norm(&expected) + scale)
         };
-        let scale = norm(&rates[1].velocity) / arc.duration;
+        let scale = norm(&rates[1].velocity) / phase.duration;
         prop_assert!(close(slope(motion.point(&before), motion.point(&after)), rates[1].velocity, 0.0));
         prop_assert!(close(slope(rates[0].velocity, rates[2].velocity), rates[1].acceleration, scale));
-        prop_assert!(close(slope(rates[0].acceleration, rates[2].acceleration), rates[1].jerk, scale / arc.duration));
+        prop_assert!(close(slope(rates[0].acceleration, rates[2].acceleration), rates[1].jerk, scale / phase.duration));
     }
 }

@@ -1,15 +1,15 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::PathData;
-use crate::motion::{flaw, ProfileArc, MAX_TIP};
+use crate::phase_motion::{flaw, Phase, MAX_TIP};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
     path: &PathData<M>,
-    arcs: &[ProfileArc],
-    arc_runs: &[usize],
+    phases: &[Phase],
+    phase_runs: &[usize],
     watch: Watch,
 ) -> Result<(), String> {
     let runs = path.dwell.len();
@@ -39,24 +39,24 @@ pub(super) fn check<const M: usize>(
     if path.dwell.iter().chain([&path.start_dwell]).any(|dwell| !(dwell.is_finite() && *dwell >= 0.0)) {
         return Err("the path has a pause that is negative or not finite".into());
     }
-    if !offsets(arc_runs, arcs.len()) {
+    if !offsets(phase_runs, phases.len()) {
         return Err("the profile does not belong to this path: their runs differ".into());
     }
     for r in 0..runs {
         let of_run = path.curve.offsets[path.runs[r]]..path.curve.offsets[path.runs[r + 1]];
         let points = &path.curve.control[of_run];
         let still = || points.iter().all(|point| *point == points[0]);
-        if arc_runs[r] == arc_runs[r + 1] && !still() {
+        if phase_runs[r] == phase_runs[r + 1] && !still() {
             let line = path.lines[path.runs[r]];
             return Err(format!(
-                "line {line}: the profile has no arcs in run {}: plan this path again",
+                "line {line}: the profile has no phases in run {}: plan this path again",
                 r + 1
             ));
         }
-        for (i, arc) in arcs[arc_runs[r]..arc_runs[r + 1]].iter().enumerate() {
-            watch.each(arcs.len()).count(i);
-            check_arc(path, r, arc).map_err(|what| {
-                format!("arc {} of the profile {what}: plan this path again", arc_runs[r] + i)
+        for (i, phase) in phases[phase_runs[r]..phase_runs[r + 1]].iter().enumerate() {
+            watch.each(phases.len()).count(i);
+            check_phase(path, r, phase).map_err(|what| {
+                format!("phase {} of the profile {what}: plan this path again", phase_runs[r] + i)
             })?;
         }
     }
@@ -72,42 +72,33 @@ fn fits_pieces(values: &[f64], offsets: &[usize], pieces: usize) -> bool {
         && values.iter().all(|value| value.is_finite())
 }
 
-fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -> Result<(), &'static str> {
-    if !(path.runs[run]..path.runs[run + 1]).contains(&(arc.piece as usize)) {
+fn check_phase<const M: usize>(path: &PathData<M>, run: usize, phase: &Phase) -> Result<(), &'static str> {
+    if !(path.runs[run]..path.runs[run + 1]).contains(&(phase.piece as usize)) {
         return Err("is on no piece of its run");
     }
-    let (piece, width) = (path.curve.piece(arc.piece as usize), path.curve.width[arc.piece as usize]);
-    if !(0.0 <= arc.u0 && arc.u0 < arc.u1 && arc.u1 <= width) {
+    let width = path.curve.width[phase.piece as usize];
+    if !(0.0 <= phase.u0 && phase.u0 < phase.u1 && phase.u1 <= width) {
         return Err("leaves its piece");
     }
-    if !(arc.duration >= 0.0 && arc.duration.is_finite()) {
+    if !(phase.duration >= 0.0 && phase.duration.is_finite()) {
         return Err("has a duration that is negative or not finite");
     }
-    let of_axis = matches!(arc.kind, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity);
-    if of_axis && arc.axis as usize >= M {
+    let of_axis = matches!(phase.law, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity);
+    if of_axis && phase.axis as usize >= M {
         return Err("is governed by an axis that the path lacks");
     }
-    if arc.kind == PhaseLaw::Chord && (path.tip_speed.is_some() || piece.is_rational() || piece.degree() > 2)
-    {
-        return Err("keeps to the chord-error limit in a way that only quadratic pieces have");
-    }
-    let infinite = [arc.p0, arc.p1].iter().filter(|p| **p == f64::INFINITY).count();
-    let most = match arc.kind {
-        // Nothing else would tell the speed.
-        PhaseLaw::SpeedLine => 1,
-        PhaseLaw::ParameterAcceleration | PhaseLaw::Chord | PhaseLaw::SpeedCubic => 0,
-        _ => 2,
-    };
-    let signed =
-        matches!(arc.kind, PhaseLaw::AxisAcceleration | PhaseLaw::ParameterAcceleration | PhaseLaw::PathJerk);
-    if !(arc.p0 >= 0.0 && arc.p1 >= 0.0 && arc.value.is_finite() && (signed || arc.value >= 0.0))
-        || infinite > most
-    {
+    let signed = matches!(
+        phase.law,
+        PhaseLaw::AxisAcceleration | PhaseLaw::ParameterAcceleration | PhaseLaw::PathJerk
+    );
+    let speeds = [phase.p0, phase.p1].iter().all(|p| *p >= 0.0 && p.is_finite());
+    if !(speeds && phase.value.is_finite() && (signed || phase.value >= 0.0)) {
         return Err("has a speed that is negative or not finite");
     }
-    let right = |a: f64| if arc.kind.is_along() { a.is_finite() } else { a == 0.0 };
-    if !(right(arc.a0) && right(arc.a1)) {
+    let right = |a: f64| if phase.law.is_along() { a.is_finite() } else { a == 0.0 };
+    if !(right(phase.a0) && right(phase.a1)) {
         return Err("has an acceleration along the path that is not finite, or not of its kind");
     }
-    flaw(piece, path.speed_of(arc), arc).map_or(Ok(()), Err)
+    let flaw = phase.law.is_along().then(|| flaw(&path.piece(phase.piece as usize), phase));
+    flaw.flatten().map_or(Ok(()), Err)
 }

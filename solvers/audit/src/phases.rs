@@ -1,13 +1,13 @@
-//! The arcs of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
+//! The phases of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
-use super::along::{Along, Pace};
-use super::curve::{inner, length, Curve, Followed};
-use super::motion::{Law, Motion, Shape};
+use super::curve::{inner, Curve, Followed};
+use super::phase_motion::{Law, PhaseMotion, Shape};
+use super::speed_by_length::{Pace, SpeedByLength};
 use super::{EPS, ROUNDINGS};
 
-/// The profile's arrays, one entry an arc; see `feedplan.profile.SpeedProfile`.
+/// The profile's arrays, one entry a phase; see `feedplan.profile.SpeedProfile`.
 #[derive(Clone, Copy)]
-pub struct Arcs<'a> {
+pub struct Phases<'a> {
     pub piece: &'a [u32],
     pub kind: &'a [u8],
     pub axis: &'a [u8],
@@ -22,29 +22,31 @@ pub struct Arcs<'a> {
     /// Acceleration along the path at both ends, in mm/s².
     pub a0: &'a [f64],
     pub a1: &'a [f64],
-    /// What the velocities of the axes count in the speed that is constant on arcs at the feed, one row a piece; empty
+    /// What the velocities of the axes count in the speed that is constant on phases at the feed, one row a piece; empty
     /// where all count as they are.
     pub share: &'a [f64],
     /// Number of pieces of the path.
     pub pieces: usize,
-    /// Arc offsets of the runs.
+    /// Phase offsets of the runs.
     pub runs: &'a [i64],
 }
 
-const AXIS_ACCELERATION: u8 = 0;
-const PARAMETER_ACCELERATION: u8 = 1;
-const FEED: u8 = 2;
-const AXIS_VELOCITY: u8 = 3;
-const CHORD: u8 = 4;
-const SPEED_LINE: u8 = 5;
-const PATH_JERK: u8 = 6;
-const SPEED_CUBIC: u8 = 7;
+/// Numbers of the laws; see `feedplan.profile.PhaseLaw`.
+pub const AXIS_ACCELERATION: u8 = 0;
+pub const PARAMETER_ACCELERATION: u8 = 1;
+pub const FEED: u8 = 2;
+pub const AXIS_VELOCITY: u8 = 3;
+pub const SPEED_LINE: u8 = 4;
+pub const PATH_JERK: u8 = 5;
+pub const SPEED_CUBIC: u8 = 6;
 
-/// Where p is infinite C' is at most this share of its size: the tool passes a cusp there.
-const CUSP: f64 = 1e-6;
+/// Whether the speed follows from the length of the path.
+pub fn is_by_length(kind: u8) -> bool {
+    matches!(kind, PATH_JERK | SPEED_CUBIC)
+}
 
-impl Arcs<'_> {
-    /// Number of arcs.
+impl Phases<'_> {
+    /// Number of phases.
     pub fn len(&self) -> usize {
         self.piece.len()
     }
@@ -54,7 +56,7 @@ impl Arcs<'_> {
         self.piece.is_empty()
     }
 
-    /// When each arc begins, and when the last one ends, in s; pauses before and between the runs included.
+    /// When each phase begins, and when the last one ends, in s; pauses before and between the runs included.
     pub fn starts(&self, path: &Followed) -> Vec<f64> {
         let mut starts = Vec::with_capacity(self.len() + 1);
         let (mut time, mut run) = (path.start_dwell, 0);
@@ -70,78 +72,49 @@ impl Arcs<'_> {
         starts
     }
 
-    /// What is wrong with the numbers of arc `i` taken alone, if anything.
-    pub fn has_bad_numbers(&self, i: usize, path: &Followed) -> bool {
-        let piece = self.piece[i] as usize;
-        if piece >= path.len() || self.kind[i] > SPEED_CUBIC {
-            return true;
-        }
+    /// Whether the numbers of phase `i`, taken alone, can be measured; on a path of so many axes or joints.
+    pub fn has_good_numbers(&self, i: usize, axes: usize) -> bool {
+        let numbers = [self.value, self.u0, self.u1, self.p0, self.p1, self.duration, self.a0, self.a1];
         let needs_axis = matches!(self.kind[i], AXIS_ACCELERATION | AXIS_VELOCITY);
-        let numbers = [self.value[i], self.u0[i], self.u1[i], self.duration[i], self.a0[i], self.a1[i]];
-        let accelerates = matches!(self.kind[i], PATH_JERK | SPEED_CUBIC);
-        (needs_axis && self.axis[i] as usize >= path.axes)
-            || numbers.iter().any(|number| !number.is_finite())
-            || self.p0[i].is_nan()
-            || self.p1[i].is_nan()
-            || self.p0[i] < 0.0
-            || self.p1[i] < 0.0
-            || self.duration[i] < 0.0
-            || (!accelerates && (self.a0[i] != 0.0 || self.a1[i] != 0.0))
-            || ((self.p0[i].is_infinite() || self.p1[i].is_infinite()) && !self.passes_cusp(i, path))
+        (self.piece[i] as usize) < self.pieces
+            && self.kind[i] <= SPEED_CUBIC
+            && (!needs_axis || (self.axis[i] as usize) < axes)
+            && numbers.iter().all(|column| column[i].is_finite())
+            && self.p0[i] >= 0.0
+            && self.p1[i] >= 0.0
+            && self.duration[i] >= 0.0
+            && (is_by_length(self.kind[i]) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
     }
 
-    /// Whether an arc with an infinite p begins or ends at a cusp, where that is right.
-    fn passes_cusp(&self, i: usize, path: &Followed) -> bool {
-        let by_speed = matches!(self.kind[i], AXIS_ACCELERATION | FEED | AXIS_VELOCITY | PATH_JERK);
-        let needs_an_end = matches!(self.kind[i], AXIS_ACCELERATION | PATH_JERK);
-        let curve = path.curve::<6>(self.piece[i] as usize);
-        let still = |u: f64, p: f64| {
-            !p.is_infinite() || length(&curve.derivative(u)) <= CUSP * length(&curve.derivative_size())
-        };
-        by_speed
-            && matches!(curve, Curve::General(..))
-            && !(needs_an_end && self.p0[i].is_infinite() && self.p1[i].is_infinite())
-            && still(self.u0[i], self.p0[i])
-            && still(self.u1[i], self.p1[i])
-    }
-
-    /// Arc `i` ready to be evaluated; its numbers must be good.
-    pub fn motion<const M: usize>(&self, i: usize, curve: &Curve<M>) -> Motion<M> {
+    /// Phase `i` ready to be evaluated; its numbers must be good.
+    pub fn motion<const M: usize>(&self, i: usize, curve: &Curve<M>) -> PhaseMotion<M> {
         let p = [self.p0[i], self.p1[i]];
         let ends = [curve.derivative(self.u0[i]), curve.derivative(self.u1[i])];
         let axis = self.axis[i] as usize;
         // From the slower end, where rounding would leave the square root of a negative number.
         let speed_sq = |end: usize| inner(&ends[end], &ends[end]) * p[end];
         let anchored_at_end = match self.kind[i] {
-            AXIS_ACCELERATION => {
-                p[0].is_infinite() || ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0]
-            }
+            AXIS_ACCELERATION => ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0],
             PARAMETER_ACCELERATION => p[1] < p[0],
-            SPEED_LINE => speed_sq(1) < speed_sq(0),
-            PATH_JERK | SPEED_CUBIC => p[0].is_infinite() || speed_sq(1) < speed_sq(0),
+            SPEED_LINE | PATH_JERK | SPEED_CUBIC => speed_sq(1) < speed_sq(0),
             _ => false,
         };
         let (tangent, p_anchor, p_far) =
             if anchored_at_end { (ends[1], p[1], p[0]) } else { (ends[0], p[0], p[1]) };
         let width = self.u1[i] - self.u0[i];
         let law = match self.kind[i] {
-            AXIS_ACCELERATION => Law::AxisAcceleration {
-                axis,
-                value: self.value[i],
-                start_sq: tangent[axis].powi(2) * p_anchor,
-            },
-            PARAMETER_ACCELERATION => {
-                Law::ParameterAcceleration { start: p_anchor, slope: 2.0 * self.value[i] }
+            AXIS_ACCELERATION => {
+                Law::Axis { axis, value: self.value[i], start_sq: tangent[axis].powi(2) * p_anchor }
             }
-            FEED => Law::Feed { speed: self.value[i].sqrt() },
-            AXIS_VELOCITY => Law::AxisVelocity { axis, speed: self.value[i].sqrt() },
-            CHORD => Law::Chord { value: self.value[i] },
-            PATH_JERK | SPEED_CUBIC => Law::Along,
-            _ => {
+            AXIS_VELOCITY => Law::Axis { axis, value: 0.0, start_sq: self.value[i] },
+            PARAMETER_ACCELERATION => Law::Parameter { start: p_anchor, slope: 2.0 * self.value[i] },
+            FEED => Law::Speed { start_sq: self.value[i], change_sq: 0.0 },
+            SPEED_LINE => {
                 let anchor = usize::from(anchored_at_end);
                 let start_sq = speed_sq(anchor);
-                Law::SpeedLine { start_sq, change_sq: speed_sq(1 - anchor) - start_sq }
+                Law::Speed { start_sq, change_sq: speed_sq(1 - anchor) - start_sq }
             }
+            _ => Law::Length,
         };
         let shape = match curve {
             Curve::Quadratic(quadratic) => Shape::Quadratic { tangent, bend: quadratic.second_derivative() },
@@ -156,8 +129,9 @@ impl Arcs<'_> {
             }
         };
         let widths = [width, curve.width()];
-        let motion = Motion::new(law, shape, widths, [p_anchor, p_far], anchored_at_end, &self.counted(i));
-        if !matches!(law, Law::Along) {
+        let share = if self.kind[i] == FEED { self.counted(i) } else { [1.0; M] };
+        let motion = PhaseMotion::new(law, shape, widths, [p_anchor, p_far], anchored_at_end, &share);
+        if !matches!(law, Law::Length) {
             return motion;
         }
         // Counted from the anchor; from the end time runs back.
@@ -166,23 +140,23 @@ impl Arcs<'_> {
             squares.reverse();
             a = [-a[1], -a[0]];
         }
-        motion.with_along(|length| match self.kind[i] {
-            PATH_JERK => Along::Jerk {
+        motion.with_speed(|length| match self.kind[i] {
+            PATH_JERK => SpeedByLength::Jerk {
                 start: Pace { v: squares[0].sqrt(), a: a[0], j: self.value[i] },
                 duration: self.duration[i],
             },
-            _ => Along::cubic(squares, a, length),
+            _ => SpeedByLength::cubic(squares, a, length),
         })
     }
 
-    /// What the axes count in the speed that is constant on arc `i`.
+    /// What the axes count in the speed that is constant on phase `i`.
     fn counted<const M: usize>(&self, i: usize) -> [f64; M] {
         let axes = self.share.len().checked_div(self.pieces).unwrap_or(0);
         let row = self.piece[i] as usize * axes;
         std::array::from_fn(|k| if k < axes { self.share[row + k] } else { 1.0 })
     }
 
-    /// The recorded acceleration along the path at an end of arc `i`, where its kind tells one.
+    /// The recorded acceleration along the path at an end of phase `i`, where its kind tells one.
     pub fn end_acceleration(&self, i: usize, at_end: bool) -> Option<f64> {
         match self.kind[i] {
             FEED if self.counted::<9>(i) == [1.0; 9] => Some(0.0),
@@ -191,7 +165,7 @@ impl Arcs<'_> {
         }
     }
 
-    /// How far the accelerations recorded at both ends of arc `i` are from its constant jerk, in mm/s², less what the part
+    /// How far the accelerations recorded at both ends of phase `i` are from its constant jerk, in mm/s², less what the part
     /// of its width does that is rounding.
     pub fn acceleration_error(&self, i: usize, width_rounding: f64) -> f64 {
         if self.kind[i] != PATH_JERK {

@@ -1,5 +1,5 @@
-//! What is integrated along an arc of a general piece: the speed |C'| of the path itself or √D of the tool tip,
-//! over the square root of a v² that is linear in u. Constant 1, it makes the length; otherwise the time.
+//! What is integrated along a phase: the length per u, |C'| of the axes or √D of the tool tip, over the root of a v² that is
+//! linear in u. With v = 1 the integral is the length, otherwise the time.
 
 use feedplan_geometry::arc_length::{Disc, Integrand};
 use feedplan_geometry::polynomial::Polynomial;
@@ -16,9 +16,14 @@ pub struct TipSpeed<'a> {
 }
 
 impl TipSpeed<'_> {
+    /// D over t = u / width.
+    pub fn square(&self) -> Polynomial<MAX_TIP> {
+        Polynomial::from_bernstein(self.coefficients.iter().copied())
+    }
+
     /// D, D' and D'' over t = u / width.
     pub fn derivatives(&self) -> [Polynomial<MAX_TIP>; 3] {
-        let square = Polynomial::from_bernstein(self.coefficients.iter().copied());
+        let square = self.square();
         let slope = square.derivative().scale(1.0 / self.width);
         [square, slope, slope.derivative().scale(1.0 / self.width)]
     }
@@ -118,7 +123,7 @@ impl Line {
 pub struct FromRest<'a, const M: usize> {
     pub source: Source<'a, M>,
     pub place: f64,
-    /// 1 from the start of an arc, −1 back from its end.
+    /// 1 from the start of a phase, −1 back from its end.
     pub sign: f64,
     pub slope: f64,
 }

@@ -1,18 +1,19 @@
-//! Jerk of joints that are not the path's axes, and how far their accelerations jump where arcs meet.
+//! Jerk of joints that are not the path's axes, and how far their accelerations jump where phases meet.
 //!
 //! With g the slope of the way along the path by u: g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³, and a joint's jerk
 //! is q' u⃛ + 3 q'' u̇ ü + q''' u̇³. How far the derivatives of q and g may be wrong is allowed for.
 
 use rayon::prelude::*;
 
-use super::along::{is_by_way, paces, Pace, PATH_JERK};
-use super::motion::ROUNDING;
 use super::path::{Bends, Piece, Work};
+use super::phase_motion::ROUNDING;
 use super::profile::JointAudit;
+use super::speed_by_length::{paces, Pace};
 use crate::curve::length;
+use crate::phases::{is_by_length, PATH_JERK};
 use crate::{Check, Seen, Tally, PASS_EXCESS};
 
-/// Steps of an arc: those of arcs up to so many servo periods long.
+/// Steps of a phase: those of phases up to so many servo periods long.
 const STEPS: [(usize, f64); 3] = [(10, 10.0), (80, 80.0), (640, f64::INFINITY)];
 
 /// Joints that leave a joint at a smaller angle than this, in rad, pass without a corner.
@@ -54,20 +55,20 @@ fn rates<const M: usize>(piece: &Piece<M>, u: f64, pace: impl Fn(f64) -> Pace, w
     Rates { direction: q1.map(|slope| slope / size), acceleration, jerk }
 }
 
-/// The jerk on arcs whose numbers are `good`, and the jumps of the acceleration where they begin.
+/// The jerk on phases whose numbers are `good`, and the jumps of the acceleration where they begin.
 pub fn audit_jerk<const M: usize>(audit: &JointAudit<M>, good: &[bool], seen: Seen) -> Tally<M> {
-    (0..audit.arcs.len())
+    (0..audit.phases.len())
         .into_par_iter()
-        .filter(|&arc| good[arc])
+        .filter(|&phase| good[phase])
         .map_init(
             || audit.path.work(),
-            |work, arc| {
+            |work, phase| {
                 let mut tally = Tally::default();
-                let piece = audit.path.piece(audit.arcs.piece[arc] as usize);
-                audit.jerks(arc, &piece, work, &mut tally);
-                audit.alone(arc, piece.line, &mut tally);
-                if arc > 0 && good[arc - 1] && !audit.is_first(arc) {
-                    audit.jumps(arc, &piece, work, &mut tally);
+                let piece = audit.path.piece(audit.phases.piece[phase] as usize);
+                audit.jerks(phase, &piece, work, &mut tally);
+                audit.alone(phase, piece.line, &mut tally);
+                if phase > 0 && good[phase - 1] && !audit.is_first(phase) {
+                    audit.jumps(phase, &piece, work, &mut tally);
                 }
                 seen(1);
                 tally
@@ -77,13 +78,13 @@ pub fn audit_jerk<const M: usize>(audit: &JointAudit<M>, good: &[bool], seen: Se
 }
 
 impl<const M: usize> JointAudit<'_, M> {
-    /// The jerk at even steps of an arc.
-    fn jerks(&self, arc: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
-        let (arcs, joints, start) = (&self.arcs, self.path.joints, self.starts[arc]);
-        let is_silent = !is_by_way(arcs.kind[arc]);
+    /// The jerk at even steps of a phase.
+    fn jerks(&self, phase: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
+        let (phases, joints, start) = (&self.phases, self.path.joints, self.starts[phase]);
+        let is_silent = !is_by_length(phases.kind[phase]);
         for k in 0..joints {
             let limit = self.limits.jerk[k];
-            // Nothing limits the jerk on arcs of other kinds.
+            // Nothing limits the jerk on phases of other kinds.
             let unlimited = is_silent && limit.is_finite();
             let value = if unlimited { f64::INFINITY } else { 0.0 };
             tally.offer(Check::Jerk, k, value, limit, start, piece.line);
@@ -91,12 +92,12 @@ impl<const M: usize> JointAudit<'_, M> {
         if is_silent {
             return;
         }
-        let periods = arcs.duration[arc] / self.limits.period;
+        let periods = phases.duration[phase] / self.limits.period;
         let Some((steps, _)) = STEPS.into_iter().find(|&(_, most)| periods < most) else { return };
-        let (u0, u1) = (arcs.u0[arc], arcs.u1[arc]);
+        let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
         let share = |i: usize| i as f64 / steps as f64;
         let u: Vec<f64> = (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
-        for (u, pace) in u.iter().zip(paces(piece, arcs, arc, &u)) {
+        for (u, pace) in u.iter().zip(paces(piece, phases, phase, &u)) {
             let (jerk, error) = rates(piece, *u, |_| pace, work).jerk;
             tally.samples += 1;
             for k in 0..joints {
@@ -113,37 +114,37 @@ impl<const M: usize> JointAudit<'_, M> {
         PASS_EXCESS * least * time.max(self.limits.period)
     }
 
-    /// The recorded accelerations of an arc against its jerk, and at rest against 0.
-    fn alone(&self, arc: usize, line: i32, tally: &mut Tally<M>) {
-        let (arcs, time) = (&self.arcs, self.starts[arc]);
-        let (a0, a1) = (arcs.a0[arc], arcs.a1[arc]);
-        let change = arcs.value[arc] * arcs.duration[arc];
+    /// The recorded accelerations of a phase against its jerk, and at rest against 0.
+    fn alone(&self, phase: usize, line: i32, tally: &mut Tally<M>) {
+        let (phases, time) = (&self.phases, self.starts[phase]);
+        let (a0, a1) = (phases.a0[phase], phases.a1[phase]);
+        let change = phases.value[phase] * phases.duration[phase];
         let mut off = (a1 - a0 - change).abs() - ROUNDING * (a0.abs() + a1.abs() + change.abs());
-        if arcs.kind[arc] != PATH_JERK {
+        if phases.kind[phase] != PATH_JERK {
             off = 0.0;
         }
         let [start_speed, end_speed] = self.limits.end_speeds;
-        let begins = self.is_first(arc) && !(arc == 0 && start_speed > 0.0);
-        let ends = self.is_first(arc + 1) && !(arc + 1 == arcs.len() && end_speed > 0.0);
+        let begins = self.is_first(phase) && !(phase == 0 && start_speed > 0.0);
+        let ends = self.is_first(phase + 1) && !(phase + 1 == phases.len() && end_speed > 0.0);
         let rests = [(begins, a0), (ends, a1)].map(|(here, a)| if here { a.abs() } else { 0.0 });
-        // An error that builds up over the arc is that much jerk.
-        let slack = [self.negligible_pull(arcs.duration[arc]), self.negligible_pull(0.0)];
+        // An error that builds up over the phase is that much jerk.
+        let slack = [self.negligible_pull(phases.duration[phase]), self.negligible_pull(0.0)];
         for (value, slack) in [(off, slack[0]), (rests[0], slack[1]), (rests[1], slack[1])] {
             tally.offer(Check::AccelerationContinuity, 0, value, slack, time, line);
         }
     }
 
-    /// From the arc before: no jump along the path, and of a joint only where the curvature jumps. At rest between two
+    /// From the phase before: no jump along the path, and of a joint only where the curvature jumps. At rest between two
     /// pieces no joint's acceleration jumps: it goes on where the path turns back along the line that it came on.
-    fn jumps(&self, arc: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
-        let arcs = &self.arcs;
-        if !is_by_way(arcs.kind[arc]) || !is_by_way(arcs.kind[arc - 1]) {
+    fn jumps(&self, phase: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
+        let phases = &self.phases;
+        if !is_by_length(phases.kind[phase]) || !is_by_length(phases.kind[phase - 1]) {
             return;
         }
-        let (time, line) = (self.starts[arc], piece.line);
-        let (from, to) = (arcs.a1[arc - 1], arcs.a0[arc]);
-        let number = arcs.piece[arc - 1] as usize;
-        let rests = number != piece.number && arcs.p1[arc - 1] == 0.0 && arcs.p0[arc] == 0.0;
+        let (time, line) = (self.starts[phase], piece.line);
+        let (from, to) = (phases.a1[phase - 1], phases.a0[phase]);
+        let number = phases.piece[phase - 1] as usize;
+        let rests = number != piece.number && phases.p1[phase - 1] == 0.0 && phases.p0[phase] == 0.0;
         if !rests {
             let off = (to - from).abs() - ROUNDING * (to.abs() + from.abs());
             tally.offer(Check::AccelerationContinuity, 0, off, self.negligible_pull(0.0), time, line);
@@ -153,15 +154,15 @@ impl<const M: usize> JointAudit<'_, M> {
         }
         let before: Piece<M> = self.path.piece(number);
         let pace = |p: f64, a: f64| move |g: f64| Pace { v: g * p.sqrt(), a, j: 0.0, time: 0.0 };
-        let into = rates(&before, arcs.u1[arc - 1], pace(arcs.p1[arc - 1], from), work);
-        let out = rates(piece, arcs.u0[arc], pace(arcs.p0[arc], to), work);
+        let into = rates(&before, phases.u1[phase - 1], pace(phases.p1[phase - 1], from), work);
+        let out = rates(piece, phases.u0[phase], pace(phases.p0[phase], to), work);
         let turn = length::<M>(&std::array::from_fn(|k| out.direction[k] - into.direction[k]));
         for k in 0..self.path.joints {
             let doubt = into.acceleration.1[k] + out.acceleration.1[k];
             let step = (out.acceleration.0[k] - into.acceleration.0[k]).abs() - doubt;
             if rests {
                 let negligible = PASS_EXCESS * self.limits.jerk[k] * self.limits.period;
-                tally.offer(Check::AccelerationContinuity, k, step, negligible, time, line);
+                tally.offer(Check::AccelerationContinuity, 0, step, negligible, time, line);
                 continue;
             }
             let step = if turn <= SMOOTH { step } else { 0.0 };

@@ -1,10 +1,10 @@
-//! The motion along the path on arcs of limited jerk, from the length of the way from the start of each arc.
+//! The motion along the path on phases of limited jerk, from the length of the way from the start of each phase.
 //!
 //! At constant jerk the time of a length is found by Newton's method within a bracket that is halved; where v² is a cubic
 //! polynomial of the length the time is integrated.
 
 use super::path::Piece;
-use crate::arcs::Arcs;
+use crate::phases::{Phases, PATH_JERK};
 use crate::EPS;
 
 /// Nodes and weights of Gauss's rule with 8 places on [−1, 1], by halves.
@@ -35,15 +35,7 @@ pub fn gauss_halved(a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
 const ROUNDS: usize = 100;
 const SETTLED: f64 = 4.0 * EPS;
 
-pub const PATH_JERK: u8 = 6;
-pub const SPEED_CUBIC: u8 = 7;
-
-/// Whether the speed of an arc follows from the length of the way.
-pub fn is_by_way(kind: u8) -> bool {
-    matches!(kind, PATH_JERK | SPEED_CUBIC)
-}
-
-/// Speed along the path, its change, that one's change; the time since the arc's start.
+/// Speed along the path, its change, that one's change; the time since the phase's start.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
     pub v: f64,
@@ -52,19 +44,19 @@ pub struct Pace {
     pub time: f64,
 }
 
-/// The motion at places of an arc from end to end.
-pub fn paces<const M: usize>(piece: &Piece<M>, arcs: &Arcs, arc: usize, u: &[f64]) -> Vec<Pace> {
+/// The motion at places of a phase from end to end.
+pub fn paces<const M: usize>(piece: &Piece<M>, phases: &Phases, phase: usize, u: &[f64]) -> Vec<Pace> {
     let mut way = 0.0;
     let mut ways = vec![0.0];
     for pair in u.windows(2) {
         way += gauss_halved(pair[0], pair[1], |u| piece.way_slope(u));
         ways.push(way);
     }
-    let v0 = piece.way_slope(arcs.u0[arc]) * arcs.p0[arc].sqrt();
-    let v1 = piece.way_slope(arcs.u1[arc]) * arcs.p1[arc].sqrt();
-    let (v, a) = ([v0, v1], [arcs.a0[arc], arcs.a1[arc]]);
-    if arcs.kind[arc] == PATH_JERK {
-        constant_jerk(&ways, v, a, arcs.value[arc], arcs.duration[arc])
+    let v0 = piece.way_slope(phases.u0[phase]) * phases.p0[phase].sqrt();
+    let v1 = piece.way_slope(phases.u1[phase]) * phases.p1[phase].sqrt();
+    let (v, a) = ([v0, v1], [phases.a0[phase], phases.a1[phase]]);
+    if phases.kind[phase] == PATH_JERK {
+        constant_jerk(&ways, v, a, phases.value[phase], phases.duration[phase])
     } else {
         cubic(&ways, v, a)
     }
@@ -97,7 +89,7 @@ fn constant_jerk(way: &[f64], v: [f64; 2], a: [f64; 2], j: f64, duration: f64) -
                     break;
                 }
             }
-            // A way beyond the arc's own at its mean speed.
+            // A way beyond the phase's own at its mean speed.
             if wanted >= whole {
                 t = duration * wanted / whole;
             }

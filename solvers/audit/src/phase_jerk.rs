@@ -1,20 +1,20 @@
-//! Audits what a method claims that limits jerk: the jerk of every axis along the arcs, and that the acceleration does
-//! not jump where arcs meet.
+//! Audits the jerk of every axis along the phases, and the jumps of the acceleration where phases meet, for methods that
+//! limit jerk.
 //!
 //! With u̇ = v/|C'| and ü = (a − T·C'' u̇²)/|C'|, T the direction, the acceleration is A = C' ü + C'' u̇² and the jerk
 //! C' u⃛ + 3 C'' u̇ ü + C''' u̇³. Its part along T is j less what the turning direction takes of A: j − Ṫ·A, which tells u⃛.
-//! C and its derivatives come from the control points, v, a and j from what the arc's kind makes of its columns.
+//! C and its derivatives come from the control points, v, a and j from what the phase's kind makes of its columns.
 //!
 //! Where the path's curvature jumps A does so too, however smooth v is. A third difference of setpoints that lies half-way
 //! over such a step shows 3/4 of it over the period as a jerk: with more than the limit of that alone, setpoints break it.
 
-use super::along::Pace;
-use super::arcs::Arcs;
 use super::curve::{distance, inner, length, Curve, Followed};
-use super::motion::Motion;
+use super::phase_motion::PhaseMotion;
+use super::phases::Phases;
+use super::speed_by_length::Pace;
 use super::{Check, Limits, Tally, EPS, PASS_EXCESS, ROUNDINGS};
 
-/// Places of an arc, and those of a long one: one a servo period.
+/// Places of a phase, and those of a long one: one a servo period.
 const PLACES: usize = 10;
 const MOST_PLACES: usize = 1000;
 
@@ -31,7 +31,7 @@ const STILL: f64 = 1e-6;
 #[derive(Clone, Copy)]
 pub struct Jerks<'a, const M: usize> {
     pub path: &'a Followed<'a>,
-    pub arcs: &'a Arcs<'a>,
+    pub phases: &'a Phases<'a>,
     pub limits: &'a Limits<M>,
     pub starts: &'a [f64],
 }
@@ -43,25 +43,32 @@ struct Rounded<const M: usize> {
 }
 
 impl<const M: usize> Jerks<'_, M> {
-    /// The jerk along arc `i`, whose numbers are good, and its recorded accelerations.
-    pub fn arc(&self, i: usize, motion: &Motion<M>, curve: &Curve<M>, line: i32, tally: &mut Tally<M>) {
-        let (arcs, limits) = (self.arcs, self.limits);
-        let (start, duration) = (self.starts[i], arcs.duration[i]);
-        let error = arcs.acceleration_error(i, motion.width_rounding());
-        // An error that builds up over the arc is that much jerk.
+    /// The jerk along phase `i`, whose numbers are good, and its recorded accelerations.
+    pub fn phase(
+        &self,
+        i: usize,
+        motion: &PhaseMotion<M>,
+        curve: &Curve<M>,
+        line: i32,
+        tally: &mut Tally<M>,
+    ) {
+        let (phases, limits) = (self.phases, self.limits);
+        let (start, duration) = (self.starts[i], phases.duration[i]);
+        let error = phases.acceleration_error(i, motion.width_rounding());
+        // An error that builds up over the phase is that much jerk.
         let negligible = self.negligible(duration);
         tally.offer(Check::AccelerationContinuity, 0, error, negligible, start, line);
         let places = PLACES + ((duration / limits.period).min((MOST_PLACES - PLACES) as f64) as usize);
         for place in 0..=places {
             let y = place as f64 / places as f64;
             let Some(pace) = motion.pace(y) else {
-                // Nothing limits the jerk on an arc of another kind.
+                // Nothing limits the jerk on a phase of another kind.
                 for k in (0..limits.axes).filter(|&k| limits.jerk[k].is_finite()) {
                     tally.offer(Check::Jerk, k, f64::INFINITY, limits.jerk[k], start, line);
                 }
                 return;
             };
-            let u = motion.parameter(y, [arcs.u0[i], arcs.u1[i]]);
+            let u = motion.parameter(y, [phases.u0[i], phases.u1[i]]);
             let Some([_, jerk]) = rates(curve, u, pace) else { continue };
             tally.samples += 1;
             let passed = motion.time_from_anchor(y);
@@ -75,19 +82,20 @@ impl<const M: usize> Jerks<'_, M> {
 
     /// The acceleration at the start or the end of a run at rest.
     pub fn rest(&self, i: usize, at_end: bool, line: i32, tally: &mut Tally<M>) {
-        let a = self.arcs.end_acceleration(i, at_end).map_or(0.0, f64::abs);
-        let time = self.starts[i] + if at_end { self.arcs.duration[i] } else { 0.0 };
+        let a = self.phases.end_acceleration(i, at_end).map_or(0.0, f64::abs);
+        let time = self.starts[i] + if at_end { self.phases.duration[i] } else { 0.0 };
         tally.offer(Check::AccelerationContinuity, 0, a, self.negligible(0.0), time, line);
     }
 
-    /// The step of the acceleration from arc `i` to arc `j`, the next one in its run.
+    /// The step of the acceleration from phase `i` to phase `j`, the next one in its run.
     pub fn joint(&self, i: usize, j: usize, line: i32, tally: &mut Tally<M>) {
-        let (arcs, time) = (self.arcs, self.starts[j]);
-        let (Some(before), Some(after)) = (arcs.end_acceleration(i, true), arcs.end_acceleration(j, false))
+        let (phases, time) = (self.phases, self.starts[j]);
+        let (Some(before), Some(after)) =
+            (phases.end_acceleration(i, true), phases.end_acceleration(j, false))
         else {
-            return; // said of the arc itself
+            return; // said of the phase itself
         };
-        if arcs.p1[i] == 0.0 && arcs.p0[j] == 0.0 {
+        if phases.p1[i] == 0.0 && phases.p0[j] == 0.0 {
             self.at_rest([i, j], [before, after], line, tally);
             return;
         }
@@ -101,14 +109,15 @@ impl<const M: usize> Jerks<'_, M> {
         }
     }
 
-    /// The step of the acceleration where the tool rests between two arcs. It goes on only where the path turns back along
+    /// The step of the acceleration where the tool rests between two phases. It goes on only where the path turns back along
     /// the line that it came on.
     fn at_rest(&self, [i, j]: [usize; 2], along: [f64; 2], line: i32, tally: &mut Tally<M>) {
-        let (arcs, time) = (self.arcs, self.starts[j]);
-        let ends = [(i, arcs.u1[i]), (j, arcs.u0[j])];
+        let (phases, time) = (self.phases, self.starts[j]);
+        let ends = [(i, phases.u1[i]), (j, phases.u0[j])];
         let axes = [0, 1].map(|side| {
-            let (arc, u) = ends[side];
-            let (tangent, a) = (self.path.curve::<M>(arcs.piece[arc] as usize).derivative(u), along[side]);
+            let (phase, u) = ends[side];
+            let (tangent, a) =
+                (self.path.curve::<M>(phases.piece[phase] as usize).derivative(u), along[side]);
             let size = length(&tangent);
             tangent.map(|x| if a == 0.0 { 0.0 } else { x / size * a })
         });
@@ -117,20 +126,20 @@ impl<const M: usize> Jerks<'_, M> {
             let rounding = ROUNDINGS * EPS * (axes[1][k].abs() + axes[0][k].abs());
             let step = if step.is_nan() { f64::INFINITY } else { step - rounding };
             let negligible = PASS_EXCESS * self.limits.jerk[k] * self.limits.period;
-            tally.offer(Check::AccelerationContinuity, k, step, negligible, time, line);
+            tally.offer(Check::AccelerationContinuity, 0, step, negligible, time, line);
         }
     }
 
-    /// By how much the acceleration of each axis jumps from arc `i` to arc `j`, less what may be rounding. None within a
+    /// By how much the acceleration of each axis jumps from phase `i` to phase `j`, less what may be rounding. None within a
     /// piece, at corners, where the velocities jump, and where the path has no direction.
     fn step(&self, i: usize, j: usize) -> Option<[f64; M]> {
-        let arcs = self.arcs;
-        let pieces = [i, j].map(|arc| arcs.piece[arc] as usize);
+        let phases = self.phases;
+        let pieces = [i, j].map(|phase| phases.piece[phase] as usize);
         if pieces[0] == pieces[1] {
             return None;
         }
         let curves = pieces.map(|piece| self.path.curve::<M>(piece));
-        let u = [arcs.u1[i], arcs.u0[j]];
+        let u = [phases.u1[i], phases.u0[j]];
         let directions = [0, 1].map(|side| {
             let tangent = curves[side].derivative(u[side]);
             let size = length(&tangent);
@@ -142,9 +151,10 @@ impl<const M: usize> Jerks<'_, M> {
             return None;
         }
         let side = |side: usize| {
-            let (arc, at_end, p) = if side == 0 { (i, true, arcs.p1[i]) } else { (j, false, arcs.p0[j]) };
+            let (phase, at_end, p) =
+                if side == 0 { (i, true, phases.p1[i]) } else { (j, false, phases.p0[j]) };
             let v = length(&curves[side].derivative(u[side])) * p.sqrt();
-            let pace = Pace { v, a: arcs.end_acceleration(arc, at_end)?, j: 0.0 };
+            let pace = Pace { v, a: phases.end_acceleration(phase, at_end)?, j: 0.0 };
             rates(&curves[side], u[side], pace).map(|[acceleration, _]| acceleration)
         };
         let (before, after) = (side(0)?, side(1)?);

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::curve::{distance, length, Followed};
 use super::moves::Programmed;
-use super::place::{Place, Search};
+use super::nearest::{Place, Search};
+use super::profile_clock::{ProfileClock, Reader};
 use super::setpoints::Row;
-use super::timed::{Reader, Timed};
 use super::{tell, Limits, Seen, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// Setpoints a thread takes at a time.
@@ -28,13 +28,13 @@ const STEP_SHARE: f64 = 1e-6;
 pub struct Plan<'a> {
     /// At least one piece.
     pub path: Followed<'a>,
-    pub profile: Option<Timed<'a>>,
+    pub profile: Option<ProfileClock<'a>>,
     pub program: Option<Programmed<'a>>,
 }
 
 /// Where a setpoint is.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot {
+pub struct Nearest {
     pub place: Place,
     /// Greatest coordinate of the piece, in mm.
     pub magnitude: f64,
@@ -45,7 +45,7 @@ pub struct Spot {
     pub allowed: f64,
 }
 
-impl Default for Spot {
+impl Default for Nearest {
     fn default() -> Self {
         Self {
             place: Place { piece: 0, u: 0.0 },
@@ -68,16 +68,16 @@ impl Plan<'_> {
         self.path.end(self.path.len() - 1)
     }
 
-    /// The same plan with the clock of the setpoints.
-    pub fn with_clock<'b>(&'b self, clock: &'b [f64]) -> Plan<'b> {
-        Plan { profile: self.profile.map(|profile| Timed { clock, ..profile }), ..*self }
+    /// The same plan with the starts of the runs on the clock of the setpoints.
+    pub fn with_clock<'b>(&'b self, run_starts: &'b [f64]) -> Plan<'b> {
+        Plan { profile: self.profile.map(|profile| ProfileClock { run_starts, ..profile }), ..*self }
     }
 
     /// Adds to the clock the starts of the runs that the rows reach. A run starts when the pause before it is
     /// over or, where the setpoints stand still on the stop for it, at the next of them.
     pub fn extend_clock<const M: usize>(&self, limits: &Limits<M>, rows: &[Row<M>], clock: &mut Vec<f64>) {
         let Some(profile) = &self.profile else { return };
-        while clock.len() + 1 < profile.arcs.runs.len() {
+        while clock.len() + 1 < profile.phases.runs.len() {
             let (due, stop) = match clock.len().checked_sub(1) {
                 None => (self.path.start_dwell, self.start::<M>()),
                 Some(run) => {
@@ -108,7 +108,7 @@ impl Plan<'_> {
     }
 
     /// Finds the places of the rows from `old` on.
-    pub fn find_spots<const M: usize>(
+    pub fn find_nearest<const M: usize>(
         &self,
         limits: &Limits<M>,
         rows: &mut [Row<M>],
@@ -126,12 +126,12 @@ impl Plan<'_> {
                 let (before, rest) = rows.split_at_mut(i);
                 let first = if number == 0 { known.last() } else { None };
                 let (previous, row) = (before.last().or(first), &mut rest[0]);
-                row.spot = match previous {
-                    Some(last) if astray > MOST_ASTRAY => last.spot,
+                row.nearest = match previous {
+                    Some(last) if astray > MOST_ASTRAY => last.nearest,
                     _ => finder.find(previous, row),
                 };
-                astray = if row.spot.is_good() { 0 } else { astray + 1 };
-                row.line = self.path.line[row.spot.place.piece];
+                astray = if row.nearest.is_good() { 0 } else { astray + 1 };
+                row.line = self.path.line[row.nearest.place.piece];
             }
         });
     }
@@ -152,20 +152,20 @@ impl<'a, const M: usize> Finder<'a, M> {
         Self { plan, limits, profile, reach: 2.0 * limits.period * length(&limits.velocity.greater()) }
     }
 
-    fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Spot {
+    fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest {
         let (path, limits) = (&self.plan.path, self.limits);
         // From the place before; where that is not known or not to be trusted, from where the profile was then.
         let known = previous.filter(|before| {
             let near = (row.t - before.t).abs() <= 2.0 * limits.period;
-            self.profile.is_none() || (before.spot.is_good() && near)
+            self.profile.is_none() || (before.nearest.is_good() && near)
         });
         let from = match (known, &self.plan.profile) {
-            (Some(row), _) => row.spot.place,
+            (Some(row), _) => row.nearest.place,
             (None, Some(profile)) => profile.place_before(path, row.t - limits.period),
             (None, None) => Place { piece: 0, u: 0.0 },
         };
         if !(row.t.is_finite() && row.q.iter().all(|q| q.is_finite()) && self.reach.is_finite()) {
-            return Spot { place: from, off: f64::INFINITY, ..Spot::default() };
+            return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
         let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
         let most = path.curve::<M>(from.piece).magnitude();
@@ -180,7 +180,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         let mut search = Search { path, reach: self.reach, close, judge, allowed };
         let found = search.next_place(from, &row.q);
         let late = if found.error.is_finite() { found.error } else { 0.0 };
-        Spot { place: found.place, magnitude, off: found.distance - rounding, late, allowed }
+        Nearest { place: found.place, magnitude, off: found.distance - rounding, late, allowed }
     }
 }
 
@@ -190,7 +190,7 @@ pub fn is_step(from: f64, to: f64, period: f64) -> bool {
     to > from && to - from <= 2.0 * period
 }
 
-impl Spot {
+impl Nearest {
     /// Whether the setpoint is on the path, where the profile is at its time.
     pub fn is_good(&self) -> bool {
         self.off <= PLACE_TOLERANCE && self.late <= self.allowed

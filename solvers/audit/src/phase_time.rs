@@ -1,11 +1,11 @@
-//! The time of an arc, or of part of it, by numerical integration.
+//! The time of a phase, or of part of it, by numerical integration.
 //!
-//! Times are ∫ du/√p in the variable y in [0, 1] in which √p would be linear if p were: du/√p is then finite at
-//! a standstill, and constant where p is linear in u.
+//! Times are ∫ du/√p in the variable y in [0, 1] in which √p is linear where p is linear in u: du/√p is then finite at rest,
+//! and constant where p is linear in u. Source of the rule: Kronrod 1965.
 
 use fearless_simd::{f64x4, Simd, SimdBase, SimdInto};
 
-use super::motion::{Law, Motion, State, STEPPED_OVER};
+use super::phase_motion::{Law, PhaseMotion, State, STEPPED_OVER};
 use super::{EPS, ROUNDINGS};
 
 /// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last; the weights of two rules inside it, Gauss's
@@ -16,8 +16,8 @@ const WEIGHTS: [f64; 4] =
 const INNER_WEIGHTS: [f64; 2] = [5.0 / 9.0, 8.0 / 9.0];
 const OUTER_WEIGHTS: [f64; 2] = [0.361_326_288_494_254_1, 1.277_347_423_011_491_7];
 
-/// Gauss's rule may be right by chance: then the other one tells. Of what it is off so much counts: where a function is so
-/// smooth that both are small it is about as much as Gauss's rule is off.
+/// Gauss's rule can agree with Kronrod's by chance, so the error of the other rule counts as well, by this share: on smooth
+/// functions it is then about as large as that of Gauss's rule.
 const CHANCE: f64 = 3e-3;
 
 /// Where Gauss's rule is off by no more than this part, Kronrod's is good to about the square of that where the function
@@ -27,7 +27,7 @@ pub(super) const RULES_AGREE: f64 = 3e-8;
 /// A boundary layer that takes less than this share of an interval's time is left out.
 const THIN: f64 = 1e-12;
 
-/// Halvings of an interval before it counts as one that cannot be integrated; right arcs need some forty.
+/// Halvings of an interval before it counts as one that cannot be integrated; right phases need some forty.
 pub(super) const MOST_HALVINGS: u32 = 400;
 
 /// The integral of f from a to b by Kronrod's rule, and how far the others are from it.
@@ -58,14 +58,14 @@ fn by_rules(pairs: [f64; 3], centre: f64, half: f64) -> [f64; 2] {
     [half * fine, half * miss.max(CHANCE * rough)]
 }
 
-impl<const M: usize> Motion<M> {
-    /// dt/dy at `y` inside the arc, up to `time_scale`.
+impl<const M: usize> PhaseMotion<M> {
+    /// dt/dy at `y` inside the phase, up to `time_scale`.
     #[inline(always)]
     fn integrand(&self, y: f64) -> f64 {
         let d = self.distance(y);
         match self.law {
             // The same as below with one axis evaluated and one division saved.
-            Law::AxisAcceleration { axis, value, start_sq } if !self.is_general() => {
+            Law::Axis { axis, value, start_sq } if !self.is_general() => {
                 let tangent = self.tangent[axis] + d * self.bend[axis];
                 let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent);
                 self.linear(y) * tangent.abs() / speed_sq.sqrt()
@@ -171,7 +171,7 @@ impl<const M: usize> Motion<M> {
         self.time_scale * half * sum
     }
 
-    /// Axis accelerations near `y` as a difference quotient over a thousandth of the arc, or less where p changes
+    /// Axis accelerations near `y` as a difference quotient over a thousandth of the phase, or less where p changes
     /// fast, in mm/s², and how much of each may be rounding.
     pub fn acceleration_near(&self, y: f64) -> ([f64; M], [f64; M]) {
         let d = self.distance(y);
@@ -194,13 +194,20 @@ impl<const M: usize> Motion<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arcs::Arcs;
     use crate::curve::{inner, Curve, Quadratic};
+    use crate::phases::Phases;
     use crate::polygon::Polygon;
 
-    /// One arc on one piece.
-    fn one_arc(kind: u8, axis: u8, value: f64, u: [f64; 2], p: [f64; 2], curve: &Curve<2>) -> Motion<2> {
-        Arcs {
+    /// One phase on one piece.
+    fn one_phase(
+        kind: u8,
+        axis: u8,
+        value: f64,
+        u: [f64; 2],
+        p: [f64; 2],
+        curve: &Curve<2>,
+    ) -> PhaseMotion<2> {
+        Phases {
             piece: &[0],
             kind: &[kind],
             axis: &[axis],
@@ -227,7 +234,7 @@ mod tests {
         quadratic(&[[0.0, 0.0], [4.0, 3.0], [8.0, 6.0]], 10.0)
     }
 
-    fn total(motion: &Motion<2>) -> f64 {
+    fn total(motion: &PhaseMotion<2>) -> f64 {
         let mut sum = 0.0;
         motion.walk(&motion.state(0.0), &motion.state(1.0), &mut |_, _, time| sum += time);
         sum
@@ -281,10 +288,10 @@ mod tests {
     #[test]
     fn from_rest_along_a_line_takes_the_schoolbook_time() {
         // X at 8 mm/s² over 8 mm: t = √(2 · 8 / 8).
-        let motion = one_arc(0, 0, 8.0, [0.0, 10.0], [0.0, 200.0], &line());
+        let motion = one_phase(0, 0, 8.0, [0.0, 10.0], [0.0, 200.0], &line());
         assert!((total(&motion) - 2.0_f64.sqrt()).abs() < 1e-14);
         assert!((motion.state(1.0).velocity[0] - 128.0_f64.sqrt()).abs() < 1e-13);
-        let braking = one_arc(0, 0, -8.0, [0.0, 10.0], [200.0, 0.0], &line());
+        let braking = one_phase(0, 0, -8.0, [0.0, 10.0], [200.0, 0.0], &line());
         assert!(braking.anchored_at_end);
         assert!((total(&braking) - 2.0_f64.sqrt()).abs() < 1e-14);
     }
@@ -296,19 +303,19 @@ mod tests {
         let (g0, g1) = (curve.derivative(0.0)[0], curve.derivative(2.0)[0]);
         let (p0, value) = (9.0, 3.0);
         let p1 = (g0 * g0 * p0 + 2.0 * value * 1.01) / (g1 * g1);
-        let motion = one_arc(0, 0, value, [0.0, 2.0], [p0, p1], &curve);
+        let motion = one_phase(0, 0, value, [0.0, 2.0], [p0, p1], &curve);
         let exact = (g1 * p1.sqrt() - g0 * p0.sqrt()) / value;
         assert!((total(&motion) / exact - 1.0).abs() < 1e-10);
     }
 
     #[test]
     fn next_to_a_turn_of_its_axis_on_a_conic_the_acceleration_is_that_of_the_place() {
-        // Y turns 6e-4 mm before the arc begins; the acceleration of X there by exact arithmetic.
+        // Y turns 6e-4 mm before the phase begins; the acceleration of X there by exact arithmetic.
         let points = [[3.33400833, -245.33330009], [4.66993226, -245.33369929], [5.18118385, -246.56792565]];
         let weights = [1.0, 0.831_556_127_752_042_9, 1.0];
         let curve = Curve::General(Box::new(Polygon::new(points.into_iter(), &weights)), 2.22179155091747);
         let p = [1000.311668347934, 1001.67845];
-        let motion = one_arc(0, 1, -500.0, [0.0, 1.47142088], p, &curve);
+        let motion = one_phase(0, 1, -500.0, [0.0, 1.47142088], p, &curve);
         let y = motion.y_at(0.000787988);
         let (acceleration, rounding) = motion.acceleration_near(y);
         assert!((acceleration[0] + 40.3678).abs() < 0.05, "{acceleration:?} ± {rounding:?}");
@@ -317,7 +324,7 @@ mod tests {
 
     #[test]
     fn part_of_an_arc_takes_the_time_of_that_part() {
-        let motion = one_arc(0, 0, 8.0, [0.0, 10.0], [0.0, 200.0], &line());
+        let motion = one_phase(0, 0, 8.0, [0.0, 10.0], [0.0, 200.0], &line());
         let y = motion.y_at(2.5);
         assert!((motion.time_from_anchor(y) - 0.5 * 2.0_f64.sqrt()).abs() < 1e-14);
         assert_eq!(motion.y_at(0.0), 0.0);
@@ -328,7 +335,7 @@ mod tests {
     fn a_slide_at_constant_speed_takes_length_over_speed() {
         let curve = quadratic(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
         let d = |u| inner(&curve.derivative(u), &curve.derivative(u));
-        let motion = one_arc(2, 255, 9.0, [0.0, 2.0], [9.0 / d(0.0), 9.0 / d(2.0)], &curve);
+        let motion = one_phase(2, 255, 9.0, [0.0, 2.0], [9.0 / d(0.0), 9.0 / d(2.0)], &curve);
         let arc_length = 2.0_f64.sqrt() + 1.0_f64.asinh();
         assert!((total(&motion) - arc_length / 3.0).abs() < 1e-11);
     }

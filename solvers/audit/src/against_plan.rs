@@ -2,10 +2,10 @@
 
 use super::curve::{distance, from_to, inner, length, Segment};
 use super::deviation::{settled, window};
-use super::follow::{is_step, Plan};
 use super::moves::Neighbours;
+use super::profile_clock::Reader;
 use super::setpoints::Row;
-use super::timed::Reader;
+use super::tracking::{is_step, Plan};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
@@ -34,11 +34,11 @@ impl<'a, const M: usize> Comparison<'a, M> {
     }
 
     /// What one setpoint shows: its distance from path and program, and what it records.
-    pub fn spot(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
-        let (spot, time, line) = (&row.spot, row.t, row.line);
-        tally.offer(Check::Place, 0, spot.off, PLACE_TOLERANCE, time, line);
-        tally.offer(Check::Place, 0, spot.late, spot.allowed, time, line);
-        let (path, piece) = (&self.plan.path, spot.place.piece);
+    pub fn nearest(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
+        let (nearest, time, line) = (&row.nearest, row.t, row.line);
+        tally.offer(Check::Place, 0, nearest.off, PLACE_TOLERANCE, time, line);
+        tally.offer(Check::Place, 0, nearest.late, nearest.allowed, time, line);
+        let (path, piece) = (&self.plan.path, nearest.place.piece);
         if let Some(program) = &self.plan.program {
             if self.piece != Some(piece) {
                 self.near.replace(program, window(path, piece, program.len()));
@@ -48,20 +48,20 @@ impl<'a, const M: usize> Comparison<'a, M> {
             let away = self.near.distance(&row.q, settled(tally) * limit + rounding);
             tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
         }
-        if spot.is_good() {
+        if nearest.is_good() {
             self.recorded(row, rounding, tally);
         }
     }
 
     /// Recorded velocity and acceleration against the profile's.
     fn recorded(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
-        let (Some(profile), limits, spot) = (&mut self.profile, self.limits, &row.spot) else { return };
-        let here = profile.go_to(spot.place);
+        let (Some(profile), limits, nearest) = (&mut self.profile, self.limits, &row.nearest) else { return };
+        let here = profile.go_to(nearest.place);
         if let Some(recorded) = row.velocity {
             let velocity = profile.motion.velocity(here.y);
-            let away = rounding + spot.off.max(0.0) + spot.late;
-            let rest = self.plan.path.width[spot.place.piece] - spot.place.u;
-            let at_joint = spot.place.u.min(rest) <= PLACE_TOLERANCE;
+            let away = rounding + nearest.off.max(0.0) + nearest.late;
+            let rest = self.plan.path.width[nearest.place.piece] - nearest.place.u;
+            let at_joint = nearest.place.u.min(rest) <= PLACE_TOLERANCE;
             for k in 0..M {
                 // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
                 let unknown = 2.0 * (limits.acceleration.greatest(k) * away).sqrt();
@@ -93,7 +93,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         if !is_step(before.t, row.t, limits.period) {
             return;
         }
-        let (from, to) = (before.spot.place, row.spot.place);
+        let (from, to) = (before.nearest.place, row.nearest.place);
         let (time, line) = (row.t, row.line);
         let chord = Segment::new(&before.q, &row.q);
         let (mut ways, mut least_times, mut error_sq) = ([0.0; FEEDS], [0.0; FEEDS], 0.0_f64);
@@ -123,7 +123,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
             tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
         }
         if limits.chord_tolerance.is_finite() {
-            let certain = error_sq.sqrt() - rounding - before.spot.off.max(row.spot.off).max(0.0);
+            let certain = error_sq.sqrt() - rounding - before.nearest.off.max(row.nearest.off).max(0.0);
             let mut limit = limits.chord_tolerance;
             if certain > limit {
                 limit += self.chord_beyond_circle(before, row, step);
@@ -139,7 +139,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
     /// acceleration along the path adds T²/8 · a sin θ; all of it where the path runs back.
     fn chord_beyond_circle(&self, before: &Row<M>, row: &Row<M>, step: f64) -> f64 {
         let (path, limits) = (&self.plan.path, self.limits);
-        let (from, to) = (before.spot.place, row.spot.place);
+        let (from, to) = (before.nearest.place, row.nearest.place);
         let way = from_to(&before.q, &row.q);
         let way_length = length(&way);
         let mut most = 0.0_f64;
@@ -181,7 +181,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
     /// The pieces that begin between two rows, those included that the places there cannot be told from.
     fn begun(&self, [first, last]: [&Row<M>; 2]) -> std::ops::RangeInclusive<usize> {
         let path = &self.plan.path;
-        let (from, to) = (first.spot.place, last.spot.place);
+        let (from, to) = (first.nearest.place, last.nearest.place);
         let at_start = from.u <= PLACE_TOLERANCE;
         let at_end = path.width[to.piece] - to.u <= PLACE_TOLERANCE;
         let begin = if at_start { from.piece.max(1) } else { from.piece + 1 };

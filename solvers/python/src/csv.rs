@@ -1,4 +1,4 @@
-//! Bindings of the number formatter.
+//! Setpoints as comma-separated text, for Python.
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::work::run;
-use feedplan_setpoints::text;
+use feedplan_setpoints::csv;
 
 /// Rows of comma-separated text: `values` (n, k) and the integers `last` (n,) that close them.
 #[pyfunction]
@@ -20,7 +20,7 @@ fn csv_rows<'py>(
         return Err(PyValueError::new_err("every row needs values and one integer"));
     }
     let (values, last) = (values.as_slice()?, last.as_slice()?);
-    let text = run(py, None, |_| text::rows(values, width, last))?;
+    let text = run(py, None, |_| csv::rows(values, width, last))?;
     Ok(PyBytes::new(py, &text))
 }
 

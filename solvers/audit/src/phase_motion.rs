@@ -1,33 +1,32 @@
-//! What one arc of a speed profile claims: p(u) from its definition.
+//! The motion on one phase of a speed profile by its law p = N/D (`law`): velocities, and how well they are known.
 //!
-//! p = (du/dt)² on an arc follows from what the arc holds constant (`feedplan.profile.ArcKind`). Distances `d` are
-//! counted from the arc's *anchor*. On an arc of constant axis acceleration that is the end where the axis is
-//! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing. So it
-//! is where p is smaller on an arc of constant parameter acceleration.
+//! Distances `d` are counted from the phase's *anchor*. Where an axis accelerates that is the end where the axis is slower:
+//! from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses no digits. In the other laws
+//! it is the end where p, or the speed, is smaller.
 
 mod law;
 
-pub use law::{Law, Pole, Shape};
+pub use law::{Law, Pole};
 
 use fearless_simd::{dispatch, Level};
 
-use super::along::{Along, Pace};
 use super::curve::{from_to, inner, length};
-use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE};
+use super::phase_time::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE};
 use super::polygon::Polygon;
+use super::speed_by_length::{Pace, SpeedByLength};
 use super::EPS;
 
-/// Slopes of tangents are taken over this part of the arc.
+/// Slopes of tangents are taken over this part of the phase.
 const BESIDE: f64 = 1e-6;
-/// Within this part of an arc of its anchor the slope of a tangent is that at the anchor.
+/// Within this part of a phase of its anchor the slope of a tangent is that at the anchor.
 const NEXT_TO: f64 = 1e-3;
 
 /// No rule has a node nearer to the ends of its interval than this part of it.
 pub(super) const STEPPED_OVER: f64 = 0.02;
 
-/// One arc, ready to be evaluated at any distance from its anchor.
+/// One phase, ready to be evaluated at any distance from its anchor.
 #[derive(Clone, Debug)]
-pub struct Motion<const M: usize> {
+pub struct PhaseMotion<const M: usize> {
     /// C' at the anchor, and C'' where it is the same everywhere.
     pub(super) tangent: [f64; M],
     pub(super) bend: [f64; M],
@@ -36,31 +35,31 @@ pub struct Motion<const M: usize> {
     pub(super) law: Law,
     /// +1 where u grows from the anchor, −1 where it falls.
     pub(super) direction: f64,
-    /// Length of the arc in u.
+    /// Length of the phase in u.
     pub width: f64,
-    /// How many times as long its piece is. One rounding of an end of the arc is this many of its length.
+    /// How many times as long its piece is. One rounding of an end of the phase is this many of its length.
     grain: f64,
     /// Recorded √p at the anchor and at the other end.
     pub root_anchor: f64,
     pub root_far: f64,
-    /// The same where they are finite: what the integration variable is made for.
+    /// The same, or 1 where both are 0: what the integration variable is made for.
     near: f64,
     far: f64,
     /// The distance at y is y (first_order + second_order y), and dt/dy the integrand times `time_scale`.
     first_order: f64,
     second_order: f64,
     pub(super) time_scale: f64,
-    /// Whether the anchor is the end of the arc.
+    /// Whether the anchor is the end of the phase.
     pub anchored_at_end: bool,
     pub(super) pole: Option<Pole>,
     pub(super) layer: Option<Layer>,
     /// The speed by the length of the path from the anchor.
-    along: Option<Box<Measured>>,
+    speed: Option<Box<Measured>>,
     /// What the axes count in the speed that is constant at the feed.
     share: [f64; M],
 }
 
-/// Next to a slow anchor √p turns from its slope there to that of the whole arc.
+/// Next to a slow anchor √p turns from its slope there to that of the whole phase.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layer {
     /// About how far it reaches, in y.
@@ -71,7 +70,7 @@ pub(super) struct Layer {
 
 #[derive(Clone, Debug)]
 struct Measured {
-    along: Along,
+    speed: SpeedByLength,
     /// Distances from the anchor, and lengths up to there, between which the rule is good.
     lengths: Vec<[f64; 2]>,
 }
@@ -85,16 +84,32 @@ struct General<const M: usize> {
 }
 
 impl<const M: usize> General<M> {
-    /// Where the axis at its limit turns next to the anchor of an arc of this width (negative: backward), if it does.
+    /// Where the axis at its limit turns next to the anchor of a phase of this width (negative: backward), if it does.
     fn pole(&self, law: &Law, tangent: &[f64; M], p_anchor: f64, width: f64) -> Option<Pole> {
-        let Law::AxisAcceleration { .. } = law else { return None };
+        let Law::Axis { .. } = law else { return None };
         let beside = self.part.local(BESIDE).slope;
         let bend = std::array::from_fn(|k| (beside[k] / width - tangent[k]) / (BESIDE * width));
         law.pole(tangent, &bend, p_anchor).filter(|pole| pole.at.abs() < NEXT_TO * width.abs())
     }
 }
 
-/// The motion at one place of an arc.
+/// The piece under a phase.
+#[derive(Clone, Debug)]
+pub enum Shape<const M: usize> {
+    /// Degree 2: C' at the anchor, and C''.
+    Quadratic { tangent: [f64; M], bend: [f64; M] },
+    /// Any other: itself, with t at the anchor and at the other end; the part of it between them, from the anchor; and
+    /// what the rounding of C' is relative to.
+    General {
+        whole: Box<Polygon<M>>,
+        ends: [f64; 2],
+        part: Box<Polygon<M>>,
+        tangent: [f64; M],
+        size: [f64; M],
+    },
+}
+
+/// The motion at one place of a phase.
 #[derive(Clone, Copy, Debug)]
 pub struct State<const M: usize> {
     /// Integration variable, 0 at the anchor and 1 at the other end.
@@ -109,8 +124,8 @@ pub struct State<const M: usize> {
     pub magnitude: [f64; M],
 }
 
-impl<const M: usize> Motion<M> {
-    /// `widths` are those of the arc and of its piece; `p` the recorded values at the anchor and at the other end; `share` is
+impl<const M: usize> PhaseMotion<M> {
+    /// `widths` are those of the phase and of its piece; `p` the recorded values at the anchor and at the other end; `share` is
     /// what the axes count in a feed.
     pub fn new(
         law: Law,
@@ -129,9 +144,11 @@ impl<const M: usize> Motion<M> {
             }
         };
         let [root_anchor, root_far] = p.map(f64::sqrt);
-        let [near, far] = substitution([root_anchor, root_far]);
+        // Where both are 0 the ramps at both ends are too short to be phases, and the law alone tells the speed.
+        let rests = root_anchor + root_far == 0.0;
+        let [near, far] = if rests { [1.0; 2] } else { [root_anchor, root_far] };
         let part = width / (near + far);
-        let share = if matches!(law, Law::Feed { .. }) { *share } else { [1.0; M] };
+        let share = if matches!(law, Law::Speed { .. }) { *share } else { [1.0; M] };
         let counted = |of: &[f64; M]| std::array::from_fn(|k| share[k] * of[k]);
         Self {
             tangent,
@@ -154,16 +171,16 @@ impl<const M: usize> Motion<M> {
             second_order: direction * part * (far - near),
             time_scale: 2.0 * part,
             anchored_at_end,
-            along: None,
+            speed: None,
             share,
         }
     }
 
-    /// The same with the speed that `along` makes of the whole length.
-    pub fn with_along(mut self, along: impl FnOnce(f64) -> Along) -> Self {
+    /// The same with the speed that `speed` makes of the whole length.
+    pub fn with_speed(mut self, speed: impl FnOnce(f64) -> SpeedByLength) -> Self {
         let mut lengths = vec![[0.0; 2]];
         self.measure(0.0, self.width, &mut { MOST_HALVINGS }, &mut lengths);
-        self.along = Some(Box::new(Measured { along: along(lengths[lengths.len() - 1][1]), lengths }));
+        self.speed = Some(Box::new(Measured { speed: speed(lengths[lengths.len() - 1][1]), lengths }));
         self
     }
 
@@ -200,28 +217,28 @@ impl<const M: usize> Motion<M> {
     }
 
     /// The speed by the length, and the length from the anchor to the signed distance `d`.
-    fn along_at(&self, d: f64) -> Option<(&Along, f64)> {
-        let measured = self.along.as_ref()?;
+    fn speed_at(&self, d: f64) -> Option<(&SpeedByLength, f64)> {
+        let measured = self.speed.as_ref()?;
         let (d, lengths) = (d.abs(), &measured.lengths);
         let [from, way] = lengths[lengths.partition_point(|row| row[0] <= d).max(1) - 1];
         let rest = if d > from { self.length_between(from, d)[0] } else { 0.0 };
-        Some((&measured.along, way + rest))
+        Some((&measured.speed, way + rest))
     }
 
     /// Time from `y0` to `y1` where the speed follows from the length, in s.
     pub(super) fn time_by_way(&self, y0: f64, y1: f64) -> Option<f64> {
-        let (along, from) = self.along_at(self.distance(y0))?;
-        let (_, to) = self.along_at(self.distance(y1))?;
-        Some(along.time_between(from, to))
+        let (speed, from) = self.speed_at(self.distance(y0))?;
+        let (_, to) = self.speed_at(self.distance(y1))?;
+        Some(speed.time_between(from, to))
     }
 
-    /// The motion along the path at `y`, in the order of time, where the arc's kind says something of its jerk.
+    /// The motion along the path at `y`, in the order of time, where the phase's kind says something of its jerk.
     pub fn pace(&self, y: f64) -> Option<Pace> {
-        if let (Law::Feed { speed }, true) = (self.law, self.share == [1.0; M]) {
-            return Some(Pace { v: speed, a: 0.0, j: 0.0 });
+        if let (Law::Speed { start_sq, change_sq: 0.0 }, true) = (self.law, self.share == [1.0; M]) {
+            return Some(Pace { v: start_sq.sqrt(), a: 0.0, j: 0.0 });
         }
-        let (along, way) = self.along_at(self.distance(y))?;
-        let pace = along.pace(way);
+        let (speed, way) = self.speed_at(self.distance(y))?;
+        let pace = speed.pace(way);
         Some(Pace { a: self.direction * pace.a, ..pace })
     }
 
@@ -263,7 +280,7 @@ impl<const M: usize> Motion<M> {
     #[inline(always)]
     pub(super) fn root_p(&self, d: f64, tangent: &[f64; M]) -> f64 {
         match self.law {
-            Law::AxisAcceleration { axis, value, start_sq } => {
+            Law::Axis { axis, value, start_sq } => {
                 // 2 (q_k − q_k(anchor)) = d (q'_k(anchor) + q'_k), the trapezoid.
                 let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent[axis]);
                 speed_sq.sqrt() / tangent[axis].abs()
@@ -276,16 +293,13 @@ impl<const M: usize> Motion<M> {
     #[inline(always)]
     fn root_p_by_speed(&self, d: f64, tangent: &[f64; M]) -> f64 {
         match self.law {
-            Law::AxisAcceleration { .. } => f64::NAN,
-            Law::ParameterAcceleration { start, slope } => (start + slope * d).sqrt(),
-            Law::Feed { speed } => speed / length(&self.counted(tangent)),
-            Law::AxisVelocity { axis, speed } => speed / tangent[axis].abs(),
-            Law::Chord { value } => (value * length(tangent)).sqrt(),
-            Law::SpeedLine { start_sq, change_sq } => {
-                (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(tangent)
+            Law::Axis { .. } => f64::NAN,
+            Law::Parameter { start, slope } => (start + slope * d).sqrt(),
+            Law::Speed { start_sq, change_sq } => {
+                (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(&self.counted(tangent))
             }
             // At rest p is 0 also where C' vanishes: from there the length grows faster than C'.
-            Law::Along => match self.speed_by_way(d) {
+            Law::Length => match self.speed_by_way(d) {
                 0.0 => 0.0,
                 speed => speed / length(tangent),
             },
@@ -294,7 +308,7 @@ impl<const M: usize> Motion<M> {
 
     #[inline(never)]
     fn speed_by_way(&self, d: f64) -> f64 {
-        self.along_at(d).map_or(f64::NAN, |(along, way)| along.pace(way).v)
+        self.speed_at(d).map_or(f64::NAN, |(speed, way)| speed.pace(way).v)
     }
 
     /// C' and √p at the signed distance `d` on a piece of any degree.
@@ -304,7 +318,7 @@ impl<const M: usize> Motion<M> {
         let scale = self.direction / self.width;
         let tangent = local.slope.map(|slope| scale * slope);
         let root_p = match self.law {
-            Law::AxisAcceleration { axis, value, start_sq } => {
+            Law::Axis { axis, value, start_sq } => {
                 (start_sq + 2.0 * value * local.way[axis]).sqrt() / tangent[axis].abs()
             }
             _ => self.root_p_by_speed(d, &tangent),
@@ -330,23 +344,6 @@ impl<const M: usize> Motion<M> {
         self.at(d).1
     }
 
-    /// Axis velocities where C' is 0 and p infinite: along the direction of the piece there, at the law's speed.
-    fn velocity_at_cusp(&self, general: &General<M>, y: f64) -> [f64; M] {
-        let direction = if y < 0.5 { general.part.direction() } else { general.part.end_direction() };
-        let direction = direction.map(|e| self.direction * e);
-        let speed = match self.law {
-            Law::AxisAcceleration { axis, value, start_sq } => {
-                let way = general.part.local(y.round()).way[axis];
-                (start_sq + 2.0 * value * way).sqrt() / direction[axis].abs()
-            }
-            Law::Feed { speed } => speed / length(&self.counted(&direction)),
-            Law::AxisVelocity { axis, speed } => speed / direction[axis].abs(),
-            Law::Along => self.speed_by_way(self.distance(y)),
-            _ => f64::NAN,
-        };
-        direction.map(|e| e * speed)
-    }
-
     /// Distance from the anchor, C' and √p at `y`.
     #[inline(always)]
     fn place(&self, y: f64) -> (f64, [f64; M], f64) {
@@ -355,28 +352,20 @@ impl<const M: usize> Motion<M> {
         (d, tangent, if self.keeps_recorded(y) { self.root_anchor } else { root_p })
     }
 
-    /// At the anchor of an accelerating arc the recorded p stands for itself, also where C'_k is 0.
+    /// At the anchor of an accelerating phase the recorded p stands for itself, also where C'_k is 0.
     #[inline(always)]
     fn keeps_recorded(&self, y: f64) -> bool {
-        y == 0.0 && matches!(self.law, Law::AxisAcceleration { .. })
+        y == 0.0 && matches!(self.law, Law::Axis { .. })
     }
 
     /// Axis velocities at `y` in mm/s.
     #[inline]
     pub fn velocity(&self, y: f64) -> [f64; M] {
         let (_, tangent, root_p) = self.place(y);
-        self.velocity_of(y, &tangent, root_p)
+        tangent.map(|g| g * root_p)
     }
 
-    #[inline(always)]
-    fn velocity_of(&self, y: f64, tangent: &[f64; M], root_p: f64) -> [f64; M] {
-        match &self.general {
-            Some(general) if self.is_cusp(y) => self.velocity_at_cusp(general, y),
-            _ => tangent.map(|g| g * root_p),
-        }
-    }
-
-    /// About how far from `y` the arc's axis turns round, or the path where the speed along it is given: p changes fast
+    /// About how far from `y` the phase's axis turns round, or the path where the speed along it is given: p changes fast
     /// there, on a piece that has no pole. By the tangent and its slope.
     pub(super) fn way_to_turn(&self, y: f64) -> f64 {
         if self.general.is_none() {
@@ -387,48 +376,34 @@ impl<const M: usize> Motion<M> {
         let (tangent, next) = (self.at(here).0, self.at(there).0);
         let change = from_to(&tangent, &next);
         let share = match self.law {
-            Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. } => {
-                tangent[axis] / change[axis]
-            }
+            Law::Axis { axis, .. } => tangent[axis] / change[axis],
             _ => length(&tangent) / length(&change),
         };
         (share * (there - here)).abs()
-    }
-
-    /// Whether `y` is an end where the recorded p is infinite.
-    fn is_cusp(&self, y: f64) -> bool {
-        (y == 0.0 && self.root_anchor.is_infinite()) || (y == 1.0 && self.root_far.is_infinite())
     }
 
     /// The motion at `y`.
     #[inline]
     pub fn state(&self, y: f64) -> State<M> {
         let (d, tangent, root_p) = self.place(y);
-        let velocity = self.velocity_of(y, &tangent, root_p);
+        let velocity = tangent.map(|g| g * root_p);
         let terms: [f64; M] = match &self.general {
             None => std::array::from_fn(|k| self.tangent[k].abs() + (d * self.bend[k]).abs()),
-            Some(_) if self.is_cusp(y) => {
-                return State { y, tangent, root_p, velocity, magnitude: velocity.map(f64::abs) }
-            }
             Some(general) => general.size,
         };
         // How much the rounding of C' is enlarged in p, and that of the way in the square of a speed that grows with it.
         let enlarged = match self.law {
-            Law::AxisAcceleration { axis, start_sq, .. } if !self.keeps_recorded(y) => {
+            Law::Axis { axis, start_sq, .. } if !self.keeps_recorded(y) => {
                 let gained = (1.0 - start_sq / velocity[axis].powi(2)).max(0.0);
                 terms[axis] / tangent[axis].abs() + 0.5 * gained * self.grain
             }
-            Law::AxisVelocity { axis, .. } => terms[axis] / tangent[axis].abs(),
-            Law::Feed { .. } => length(&self.counted(&terms)) / length(&self.counted(&tangent)),
-            Law::Chord { .. } => length(&terms) / length(&tangent),
-            Law::SpeedLine { start_sq, .. } => {
-                let gained = (1.0 - start_sq / inner(&velocity, &velocity)).max(0.0);
-                length(&terms) / length(&tangent) + 0.5 * gained * self.grain
+            Law::Speed { start_sq, .. } => {
+                let counted = self.counted(&velocity);
+                let gained = (1.0 - start_sq / inner(&counted, &counted)).max(0.0);
+                length(&self.counted(&terms)) / length(&self.counted(&tangent)) + 0.5 * gained * self.grain
             }
-            Law::Along => length(&terms) / length(&tangent) + self.felt(d) * self.grain,
-            Law::ParameterAcceleration { start, .. } => {
-                1.0 + 0.5 * (1.0 - start / root_p.powi(2)).max(0.0) * self.grain
-            }
+            Law::Length => length(&terms) / length(&tangent) + self.felt(d) * self.grain,
+            Law::Parameter { start, .. } => 1.0 + 0.5 * (1.0 - start / root_p.powi(2)).max(0.0) * self.grain,
             _ => 1.0,
         };
         let magnitude = std::array::from_fn(|k| {
@@ -437,7 +412,7 @@ impl<const M: usize> Motion<M> {
         State { y, tangent, root_p, velocity, magnitude }
     }
 
-    /// The local parameter of the piece at `y` on an arc from `u0` to `u1`.
+    /// The local parameter of the piece at `y` on a phase from `u0` to `u1`.
     pub fn parameter(&self, y: f64, [u0, u1]: [f64; 2]) -> f64 {
         let d = self.distance(y);
         (if self.anchored_at_end { u1 + d } else { u0 + d }).clamp(u0, u1)
@@ -445,8 +420,8 @@ impl<const M: usize> Motion<M> {
 
     /// How much the rounding of the length is enlarged in the speed that follows from it.
     fn felt(&self, d: f64) -> f64 {
-        self.along_at(d).map_or(0.0, |(along, way)| {
-            let Pace { v, a, .. } = along.pace(way);
+        self.speed_at(d).map_or(0.0, |(speed, way)| {
+            let Pace { v, a, .. } = speed.pace(way);
             if way > 0.0 {
                 a.abs() / v * (way / v)
             } else {
@@ -455,17 +430,21 @@ impl<const M: usize> Motion<M> {
         })
     }
 
-    /// Whether the arc's own axis is the one that its definition holds at constant acceleration.
+    /// The axis whose acceleration the law holds constant.
     pub fn held_axis(&self) -> Option<usize> {
         match self.law {
-            Law::AxisAcceleration { axis, .. } => Some(axis),
+            Law::Axis { axis, .. } => Some(axis),
             _ => None,
         }
     }
 
-    /// Whether the accelerations can have a maximum inside the arc: on slides along a velocity limit.
+    /// Whether the accelerations can have a maximum inside the phase: on slides along a velocity limit.
     pub fn is_slide(&self) -> bool {
-        !matches!(self.law, Law::AxisAcceleration { .. } | Law::ParameterAcceleration { .. })
+        match self.law {
+            Law::Axis { value, .. } => value == 0.0,
+            Law::Parameter { .. } => false,
+            Law::Speed { .. } | Law::Length => true,
+        }
     }
 
     /// Curvature of the path in 1/mm at a state; 0 where the path has no direction.
@@ -481,37 +460,22 @@ impl<const M: usize> Motion<M> {
         }
     }
 
-    /// What one rounding of an end of the arc is of its width.
+    /// What one rounding of an end of the phase is of its width.
     pub fn width_rounding(&self) -> f64 {
         EPS * self.grain
     }
 }
 
 impl Layer {
-    /// On an arc of constant axis acceleration that the rules could step over it, with √p at both ends.
+    /// On a phase of constant axis acceleration that the rules could step over it, with √p at both ends.
     fn new<const M: usize>(law: &Law, tangent: &[f64; M], [near, far]: [f64; 2], width: f64) -> Option<Self> {
-        let Law::AxisAcceleration { axis, value, .. } = *law else { return None };
+        let Law::Axis { axis, value, .. } = *law else { return None };
         if near <= 0.0 || near >= STEPPED_OVER * far {
             return None;
         }
         // p' at the anchor beside its mean.
         let steeper = 2.0 * value.abs() * width / (tangent[axis].abs() * far * far);
         Some(Self { thickness: near / far, strength: (1.0 - 1.0 / steeper.sqrt()).abs() })
-    }
-}
-
-/// What √p at both ends the integration variable is made for: where one is infinite the speed, not p, is smooth. Where both
-/// are 0 the ramps at both ends are too short to be arcs, and the law alone tells the speed.
-fn substitution(roots: [f64; 2]) -> [f64; 2] {
-    let [near, far] = roots;
-    if near == 0.0 && far == 0.0 {
-        return [1.0, 1.0];
-    }
-    match (near.is_infinite(), far.is_infinite()) {
-        (false, false) => [near, far],
-        (true, false) => [if far > 0.0 { far } else { 1.0 }, far],
-        (false, true) => [near, if near > 0.0 { near } else { 1.0 }],
-        (true, true) => [1.0, 1.0],
     }
 }
 
@@ -545,8 +509,8 @@ mod tests {
             size: [3.0, 0.0],
         };
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
-        let motion = Motion::new(Law::Along, shape, [1.0; 2], [0.0, 1.0], false, &[1.0; 2])
-            .with_along(|_| Along::Jerk { start, duration: 1.0 });
+        let motion = PhaseMotion::new(Law::Length, shape, [1.0; 2], [0.0, 1.0], false, &[1.0; 2])
+            .with_speed(|_| SpeedByLength::Jerk { start, duration: 1.0 });
         assert_eq!(motion.velocity(0.0), [0.0; 2]);
         assert!((motion.velocity(1.0)[0] - 3.0).abs() < 1e-12);
     }

@@ -1,37 +1,32 @@
-//! How the joints move on arcs of a profile, from what each arc holds constant and the kinematics' positions.
+//! How the joints move on phases of a profile, from what each phase holds constant and the kinematics' positions.
 //!
-//! On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and a way Δq_k
+//! On a phase of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and a way Δq_k
 //! takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the way over it; where p is linear
 //! in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by Gauss's rule; where jerk is limited, speed
 //! and time follow from the length of the way along the path.
 
-use super::along::{gauss, gauss_halved, is_by_way, paces};
 use super::path::{Piece, Place};
-use crate::arcs::Arcs;
+use super::speed_by_length::{gauss, gauss_halved, paces};
+use crate::phases::{
+    is_by_length, Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE,
+};
 use crate::{EPS, ROUNDINGS};
-
-const AXIS_ACCELERATION: u8 = 0;
-const PARAMETER_ACCELERATION: u8 = 1;
-const FEED: u8 = 2;
-const AXIS_VELOCITY: u8 = 3;
-const CHORD: u8 = 4;
-const SPEED_LINE: u8 = 5;
 
 /// Rounding of a speed or time that a few operations make.
 pub const ROUNDING: f64 = 2.0 * ROUNDINGS * EPS;
 
-/// So much of a speed may be uncertain before it is taken from the recorded ends of the arc.
+/// So much of a speed may be uncertain before it is taken from the recorded ends of the phase.
 const HIDDEN: f64 = 1e-3;
 
-/// The motion at a place of an arc.
+/// The motion at a place of a phase.
 #[derive(Clone, Copy, Debug)]
 pub struct State<const M: usize> {
-    /// Way of the joints from the start of the arc.
+    /// Way of the joints from the start of the phase.
     pub way: [f64; M],
     pub root_p: f64,
     /// Share of √p that may be wrong.
     relative: f64,
-    /// Speed of the arc's own joint, and how wrong it may be.
+    /// Speed of the phase's own joint, and how wrong it may be.
     speed: f64,
     speed_error: f64,
     pub velocity: [f64; M],
@@ -41,17 +36,17 @@ pub struct State<const M: usize> {
     pub time_error: f64,
 }
 
-/// The joints on an arc, whose numbers must be good, at places from end to end; the first `timed` steps have times.
+/// The joints on a phase, whose numbers must be good, at places from end to end; the first `timed` steps have times.
 pub fn motion<const M: usize>(
     piece: &Piece<M>,
-    arcs: &Arcs,
-    arc: usize,
+    phases: &Phases,
+    phase: usize,
     places: &[Place<M>],
     timed: usize,
 ) -> Vec<State<M>> {
-    let (kind, value, last) = (arcs.kind[arc], arcs.value[arc], places.len() - 1);
-    let p = [arcs.p0[arc], arcs.p1[arc]];
-    let own = Some(arcs.axis[arc] as usize).filter(|&axis| axis < piece.joints()).unwrap_or(0);
+    let (kind, value, last) = (phases.kind[phase], phases.value[phase], places.len() - 1);
+    let p = [phases.p0[phase], phases.p1[phase]];
+    let own = Some(phases.axis[phase] as usize).filter(|&axis| axis < piece.joints()).unwrap_or(0);
     let mut states: Vec<State<M>> = places.iter().map(|_| State::STILL).collect();
     for i in 1..states.len() {
         let step = piece.between(&places[i - 1].position, &places[i].position, None);
@@ -59,7 +54,7 @@ pub fn motion<const M: usize>(
     }
     let own_slope = |i: usize| places[i].slope[own].abs();
     let unknown = places.iter().map(|place| place.unknown[own]).fold(0.0, f64::max);
-    // The speed of the arc's own joint, from the slower end where it accelerates.
+    // The speed of the phase's own joint, from the slower end where it accelerates.
     let ends = [own_slope(0).powi(2) * p[0], own_slope(last).powi(2) * p[1]];
     let from_end = !ends[0].is_finite() || ends[1] < ends[0];
     let (slower, slower_p) = if from_end { (last, p[1]) } else { (0, p[0]) };
@@ -73,9 +68,9 @@ pub fn motion<const M: usize>(
     } else {
         0.0
     };
-    let by_way = is_by_way(kind);
+    let by_way = is_by_length(kind);
     let u: Vec<f64> = places.iter().map(|place| place.u).collect();
-    let paces = if by_way { paces(piece, arcs, arc, &u) } else { Vec::new() };
+    let paces = if by_way { paces(piece, phases, phase, &u) } else { Vec::new() };
     let (u0, u1) = (u[0], u[last]);
     let feed_sq = [places[0].feed_slope.powi(2) * p[0], places[last].feed_slope.powi(2) * p[1]];
     let line = |u: f64| (feed_sq[0] + (feed_sq[1] - feed_sq[0]) * ((u - u0) / (u1 - u0))).sqrt();
@@ -100,11 +95,10 @@ pub fn motion<const M: usize>(
             }
             PARAMETER_ACCELERATION => ((p_slow + 2.0 * value * (place.u - u_slow)).sqrt(), ROUNDING),
             FEED => (value.sqrt() / place.feed_slope, ROUNDING),
-            CHORD => ((value * place.feed_slope).sqrt(), ROUNDING),
             SPEED_LINE => (line(place.u) / place.feed_slope, ROUNDING),
             _ => (paces[i].v / place.way_slope, ROUNDING),
         };
-        // Where rounding hides how the arc's own joint moves, its recorded ends tell: p changes little there.
+        // Where rounding hides how the phase's own joint moves, its recorded ends tell: p changes little there.
         let known = 0.5 * (p[1] - p[0]).abs() / p[0].max(p[1]) + ROUNDING;
         let is_known = relative <= HIDDEN;
         if !is_known && known < HIDDEN {
@@ -127,7 +121,6 @@ pub fn motion<const M: usize>(
     }
     let feed_line = |u: f64| piece.feed_slope(u) / line(u);
     let feed_rate = |u: f64| piece.feed_slope(u) / value.sqrt();
-    let chord_rate = |u: f64| 1.0 / (value * piece.feed_slope(u)).sqrt();
     for i in 1..=timed {
         let (a, b) = (&states[i - 1], &states[i]);
         let (from, to) = (places[i - 1].u, places[i].u);
@@ -139,7 +132,6 @@ pub fn motion<const M: usize>(
         let (mut time, mut error) = match kind {
             PARAMETER_ACCELERATION => (2.0 * step / (a.root_p + b.root_p), rounding),
             FEED => integrated(from, to, rounding, feed_rate),
-            CHORD => integrated(from, to, rounding, chord_rate),
             SPEED_LINE => integrated(from, to, rounding, feed_line),
             _ => {
                 let way = (b.way[own] - a.way[own]).abs();
@@ -187,7 +179,7 @@ fn integrated(a: f64, b: f64, rounding: f64, mut rate: impl FnMut(f64) -> f64) -
     (fine, (fine - coarse).abs() / fine + rounding)
 }
 
-/// The time of a step by the way of the arc's own joint, which may have a constant acceleration, and the share of it that may
+/// The time of a step by the way of the phase's own joint, which may have a constant acceleration, and the share of it that may
 /// be wrong.
 fn by_joint<const M: usize>(
     [a, b]: [&State<M>; 2],
@@ -207,7 +199,7 @@ fn by_joint<const M: usize>(
             (time, error) = (by_change, change_error);
         }
     }
-    // On arcs so short that no joint's way can be told from rounding: by the parameter.
+    // On phases so short that no joint's way can be told from rounding: by the parameter.
     let sides = a.root_p + b.root_p;
     let place_error = rounding + (b.root_p - a.root_p).abs() / sides + 0.5 * (a.relative + b.relative);
     let is_known = error <= HIDDEN;

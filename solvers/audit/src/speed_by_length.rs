@@ -1,9 +1,9 @@
-//! The speed of an arc of limited jerk as a function of the length of the path from its anchor.
+//! The speed of a phase of limited jerk as a function of the length of the path from its anchor.
 //!
 //! At constant jerk the time of a length is found by halving; where v² is a cubic polynomial of the length it is
 //! integrated.
 
-use super::integral::{kronrod, MOST_HALVINGS, RULES_AGREE};
+use super::phase_time::{kronrod, MOST_HALVINGS, RULES_AGREE};
 
 /// Halvings of a bracket of the time until it is as narrow as its numbers.
 const MOST_STEPS: u32 = 1100;
@@ -16,16 +16,16 @@ pub struct Pace {
     pub j: f64,
 }
 
-/// The speed along an arc, counted from its anchor: where that is the end, time runs back.
+/// The speed along a phase, counted from its anchor: where that is the end, time runs back.
 #[derive(Clone, Copy, Debug)]
-pub enum Along {
+pub enum SpeedByLength {
     /// The state at the anchor.
     Jerk { start: Pace, duration: f64 },
     /// v² by powers of the share of the length.
     Cubic { c: [f64; 4], length: f64 },
 }
 
-impl Along {
+impl SpeedByLength {
     /// From v² and a at the anchor and at the other end.
     pub fn cubic(speed_sq: [f64; 2], a: [f64; 2], length: f64) -> Self {
         let [from, to] = speed_sq;
@@ -60,7 +60,7 @@ impl Along {
         }
     }
 
-    /// Time at constant jerk from the anchor to a length; beyond the arc's own at its mean speed.
+    /// Time at constant jerk from the anchor to a length; beyond the phase's own at its mean speed.
     fn time(&self, way: f64) -> f64 {
         let Self::Jerk { start, duration } = *self else { return f64::NAN };
         let whole = start.way(duration);
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn from_rest_at_constant_jerk_the_length_grows_with_the_cube_of_the_time() {
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
-        let along = Along::Jerk { start, duration: 2.0 };
+        let along = SpeedByLength::Jerk { start, duration: 2.0 };
         for t in [1e-9, 1e-3, 0.5, 1.9, 2.0] {
             let t: f64 = t;
             assert!((along.time_between(0.0, t.powi(3)) / t - 1.0).abs() < 1e-15, "{t}");
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn a_square_linear_in_the_length_is_constant_acceleration() {
         // v² = 25 + 60 s over 5 mm: v = 5 + 30 t.
-        let along = Along::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
+        let along = SpeedByLength::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
         for t in [0.01, 0.2, 0.4] {
             let way = 5.0 * t + 15.0 * t * t;
             assert!((along.time_between(0.0, way) - t).abs() < 1e-12);

@@ -1,0 +1,264 @@
+//! Where a speed profile is at which time, on the clock of the setpoints, and what it does there.
+//!
+//! The clock starts every run anew: setpoints may wait at a stop for their next period.
+
+use super::curve::{length, Followed};
+use super::nearest::Place;
+use super::phase_motion::PhaseMotion;
+use super::phases::Phases;
+use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
+
+/// A switch of the acceleration this share of a period away counts as at the setpoint.
+const SWITCH_SHARE: f64 = 1e-4;
+
+/// Switches on each side that are looked at; right profiles have a few at most in so short a time.
+const MOST_SWITCHES: usize = 64;
+
+/// A profile of good numbers on the clock of the setpoints.
+#[derive(Clone, Copy)]
+pub struct ProfileClock<'a> {
+    pub phases: Phases<'a>,
+    /// When every phase begins and the last one ends, pauses included; see `Phases::starts`.
+    pub starts: &'a [f64],
+    /// When every run begins, as far as the setpoints have shown: a stream may wait at a stop for its next period.
+    pub run_starts: &'a [f64],
+}
+
+/// Reads a profile along the setpoints; keeps the phase it is on, since the next place is mostly on it too.
+pub struct Reader<'a, const M: usize> {
+    clock: ProfileClock<'a>,
+    path: Followed<'a>,
+    pub phase: usize,
+    pub run: usize,
+    pub motion: PhaseMotion<M>,
+}
+
+/// A place on the reader's phase: its local parameter, and the same as the phase's integration variable.
+#[derive(Clone, Copy)]
+pub struct Passage {
+    u: f64,
+    pub y: f64,
+}
+
+impl ProfileClock<'_> {
+    pub fn phases_of(&self, run: usize) -> std::ops::Range<usize> {
+        self.phases.runs[run] as usize..self.phases.runs[run + 1] as usize
+    }
+
+    /// Time in motion of a run, in s.
+    pub fn motion_time(&self, run: usize) -> f64 {
+        self.phases_of(run).last().map_or(0.0, |last| {
+            self.starts[last] + self.phases.duration[last] - self.starts[self.phases_of(run).start]
+        })
+    }
+
+    /// What has to be added to the profile's times in a run; without a clock for it, the run is never reached.
+    pub fn shift(&self, run: usize) -> f64 {
+        self.run_starts.get(run).map_or(f64::INFINITY, |start| start - self.starts[self.phases_of(run).start])
+    }
+
+    /// The start of the phase that `time` falls into.
+    pub fn place_before(&self, path: &Followed, time: f64) -> Place {
+        let run = self.run_starts.partition_point(|&start| start <= time).saturating_sub(1);
+        let phases = self.phases_of(run);
+        if phases.is_empty() {
+            return Place { piece: (path.runs[run] as usize).min(path.len() - 1), u: 0.0 };
+        }
+        let time = time - self.shift(run);
+        let passed = self.starts[phases.clone()].partition_point(|&start| start <= time);
+        let phase = phases.start + passed.saturating_sub(1);
+        Place { piece: self.phases.piece[phase] as usize, u: self.phases.u0[phase] }
+    }
+}
+
+impl<'a, const M: usize> Reader<'a, M> {
+    /// On the first phase; there must be one, and a run of the path for it.
+    pub fn new(clock: &ProfileClock<'a>, path: &Followed<'a>) -> Self {
+        let motion = clock.phases.motion(0, &path.curve(clock.phases.piece[0] as usize));
+        let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, motion };
+        reader.enter(0);
+        reader
+    }
+
+    fn enter(&mut self, phase: usize) {
+        let phases = &self.clock.phases;
+        self.phase = phase;
+        self.run = phases.runs.partition_point(|&first| first <= phase as i64) - 1;
+        self.motion = phases.motion(phase, &self.path.curve(phases.piece[phase] as usize));
+    }
+
+    /// Goes to the phase that holds a place, the earlier one of two that meet there. A place on a motionless piece
+    /// is the start of what comes next.
+    pub fn go_to(&mut self, place: Place) -> Passage {
+        if !self.holds(self.phase, place) {
+            let next = (self.phase + 1).min(self.clock.phases.len() - 1);
+            let phase = if self.holds(next, place) { next } else { self.find(place) };
+            self.enter(phase);
+        }
+        let (phases, phase) = (&self.clock.phases, self.phase);
+        let u = if phases.piece[phase] as usize == place.piece { place.u } else { phases.u0[phase] };
+        let from_anchor =
+            if self.motion.anchored_at_end { phases.u1[phase] - u } else { u - phases.u0[phase] };
+        Passage { u, y: self.motion.y_at(from_anchor) }
+    }
+
+    fn holds(&self, phase: usize, place: Place) -> bool {
+        let phases = &self.clock.phases;
+        phases.piece[phase] as usize == place.piece
+            && phases.u0[phase] < place.u
+            && place.u <= phases.u1[phase]
+    }
+
+    fn find(&self, place: Place) -> usize {
+        let phases = &self.clock.phases;
+        let first =
+            phases.piece.partition_point(|&piece| (piece as usize) < place.piece).min(phases.len() - 1);
+        let count = phases.piece[first..].partition_point(|&piece| piece as usize == place.piece);
+        let passed = phases.u1[first..first + count].partition_point(|&end| end < place.u);
+        first + passed.min(count.saturating_sub(1))
+    }
+
+    /// When the profile arrives at a place of the reader's phase and when it leaves, in s: at stops it pauses, and the
+    /// setpoints may wait for their next period.
+    fn times(&self, here: Passage, period: f64) -> [f64; 2] {
+        let (clock, phase, run) = (&self.clock, self.phase, self.run);
+        let phases = &clock.phases;
+        let start = clock.starts[phase] + clock.shift(run);
+        let end = start + phases.duration[phase];
+        let from_anchor = self.motion.time_from_anchor(here.y);
+        let time = if self.motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
+        let (mut from, mut until) = (time, time);
+        if here.u <= phases.u0[phase] && phase == clock.phases_of(run).start {
+            from = match run {
+                0 => 0.0,
+                _ => clock.run_starts.get(run - 1).map_or(time, |start| start + clock.motion_time(run - 1)),
+            };
+        }
+        if here.u >= phases.u1[phase] && phase + 1 == clock.phases_of(run).end {
+            until = clock.run_starts.get(run + 1).copied().unwrap_or(end + self.path.dwell[run] + period);
+        }
+        [from, until]
+    }
+
+    /// At most how far the profile gets between `time` and being at `place`, in mm, less what may be rounding.
+    pub fn late(&mut self, place: Place, time: f64, limits: &Limits<M>) -> f64 {
+        let here = self.go_to(place);
+        let [from, until] = self.times(here, limits.period);
+        let wait = (from - time).max(time - until).max(0.0);
+        // Summing the durations of all phases before has rounded once for each.
+        let rounding = EPS * time.abs() * (self.phase as f64 + ROUNDINGS);
+        if wait <= rounding {
+            return 0.0;
+        }
+        let speed = length(&self.motion.velocity(here.y));
+        let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration.greater()));
+        let most = reach(wait) - reach(rounding);
+        // A profile that creeps through a turn gets nowhere near as far.
+        if most > PLACE_TOLERANCE {
+            most.min(self.way_from(place, time).unwrap_or(most))
+        } else {
+            most
+        }
+    }
+
+    /// At most the way along the path between a place and the profile's own place at `time`, in mm, on the piece of the
+    /// place or one beside it.
+    fn way_from(&self, place: Place, time: f64) -> Option<f64> {
+        let there = self.place_at(time)?;
+        let (first, last) =
+            if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
+        let curve = self.path.curve::<M>(first.piece);
+        match last.piece - first.piece {
+            0 => Some(curve.way_at_most(first.u, last.u)),
+            1 => {
+                let next = self.path.curve::<M>(last.piece);
+                Some(curve.way_at_most(first.u, curve.width()) + next.way_at_most(0.0, last.u))
+            }
+            _ => None,
+        }
+    }
+
+    /// Where the profile is at `time`, in the reader's run.
+    fn place_at(&self, time: f64) -> Option<Place> {
+        let (phase, motion, y) = self.motion_at(time)?;
+        let phases = &self.clock.phases;
+        let piece = phases.piece[phase] as usize;
+        Some(Place { piece, u: motion.parameter(y, [phases.u0[phase], phases.u1[phase]]) })
+    }
+
+    /// The phase that `time` falls into, in the reader's run, and where on it the profile is then.
+    fn motion_at(&self, time: f64) -> Option<(usize, PhaseMotion<M>, f64)> {
+        let (clock, run) = (&self.clock, self.clock.phases_of(self.run));
+        let time = time - clock.shift(self.run);
+        let passed = clock.starts[run.clone()].partition_point(|&start| start <= time);
+        let phase = run.start + passed.checked_sub(1)?;
+        let since = time - clock.starts[phase];
+        let (phases, duration) = (&clock.phases, clock.phases.duration[phase]);
+        // Of a profile of rubbish nothing is known.
+        if !(since <= duration && phases.u0[phase] < phases.u1[phase]) {
+            return None;
+        }
+        let motion = phases.motion::<M>(phase, &self.path.curve(phases.piece[phase] as usize));
+        let wanted = if motion.anchored_at_end { duration - since } else { since };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..f64::MANTISSA_DIGITS {
+            let middle = 0.5 * (low + high);
+            if motion.time_from_anchor(middle) < wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some((phase, motion, 0.5 * (low + high)))
+    }
+
+    /// The acceleration of each axis at `time`, in the reader's run: where the tool creeps back from a turn, the place of
+    /// a setpoint does not tell the ways to and from it apart.
+    pub fn acceleration_at(&self, time: f64) -> Option<[f64; M]> {
+        self.motion_at(time).map(|(_, motion, y)| motion.acceleration_near(y).0)
+    }
+
+    /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's phase.
+    pub fn accelerations(&self, here: Passage, time: f64, period: f64) -> [[f64; 2]; M] {
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
+        let mut include = |(value, rounding): ([f64; M], [f64; M])| {
+            for k in 0..M {
+                range[k] = [range[k][0].min(value[k] - rounding[k]), range[k][1].max(value[k] + rounding[k])];
+            }
+        };
+        include(self.motion.acceleration_near(here.y));
+        let switch = SWITCH_SHARE * period;
+        let (phases, starts) = (&self.clock.phases, self.clock.starts);
+        let mut neighbour = |phase: usize, at_end: bool| {
+            let motion = phases.motion::<M>(phase, &self.path.curve(phases.piece[phase] as usize));
+            let y = if at_end != motion.anchored_at_end { 1.0 } else { 0.0 };
+            include(motion.acceleration_near(y));
+        };
+        let time = time - self.clock.shift(self.run);
+        let run = self.clock.phases_of(self.run);
+        let mut first = self.phase;
+        while first > run.start.max(self.phase.saturating_sub(MOST_SWITCHES)) && time - starts[first] < switch
+        {
+            first -= 1;
+            neighbour(first, true);
+        }
+        let mut last = self.phase;
+        while last + 1 < run.end.min(self.phase + MOST_SWITCHES) && starts[last + 1] - time < switch {
+            last += 1;
+            neighbour(last, false);
+        }
+        // At a stop the tool may stand, or already start the next run.
+        let at_start = time - starts[run.start] < switch;
+        let at_end = starts[run.end - 1] + phases.duration[run.end - 1] - time < switch;
+        if at_start && run.start > 0 {
+            neighbour(run.start - 1, true);
+        }
+        if at_end && run.end < phases.len() {
+            neighbour(run.end, false);
+        }
+        if at_start || at_end {
+            include(([0.0; M], [0.0; M]));
+        }
+        range
+    }
+}

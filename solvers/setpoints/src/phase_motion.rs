@@ -1,0 +1,404 @@
+//! The motion on one phase of a speed profile: position, velocity, acceleration and jerk of every axis at a time or at a
+//! place, from the phase's law.
+//!
+//! All laws are one: a measure m of the path has a speed v = dm/dt that is known, so p = u̇² = v²/m'(u)² with ' = d/du.
+//!
+//! | law | measure m | v |
+//! |---|---|---|
+//! | axis acceleration, axis velocity | way of axis k | linear in time |
+//! | parameter acceleration | u | linear in time |
+//! | feed | length that the feed counts | constant |
+//! | speed line | length that the feed counts | v² linear in u |
+//! | path jerk | length of the path | quadratic in time |
+//! | speed cubic | length of the path | v² cubic in m |
+//!
+//! `clock` has v and the part of m that is done at a time, `axis_way` and `lengths` find the place from that part. With
+//! a = v̇, j = ä and g = m': g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³. Then velocity is q' u̇, acceleration
+//! q' ü + q'' u̇², and jerk q' u⃛ + 3 q'' u̇ ü + q''' u̇³.
+//!
+//! These quotients are 0/0 at rest where m' vanishes, which is always at an end of the phase. Nearer to it than rounding
+//! allows they are taken at a place a little farther off, and continued from there.
+
+mod axis_way;
+mod clock;
+mod lengths;
+mod rate;
+
+use std::rc::Rc;
+
+use axis_way::AxisWay;
+use clock::{Clock, Cubic, Even, Jerk, Pace, SpeedLine};
+use feedplan_geometry::inverse_length::Located;
+use feedplan_geometry::quadratic::{dot, norm};
+use feedplan_geometry::spline::bezier::derivatives;
+use feedplan_geometry::spline::speed::Coefficients;
+use feedplan_planner::phase_law::PhaseLaw;
+pub use lengths::{Counts, PiecePath};
+pub use rate::{TipSpeed, MAX_TIP};
+
+/// A step's length is met within this part of the step. 1e-6 would do for the length; four digits more keep the second
+/// differences of the positions quiet, which divide by the period squared.
+const STEP_ERROR: f64 = 1e-10;
+/// The same where the jerk is limited, for the third differences.
+const JERK_STEP_ERROR: f64 = 1e-13;
+
+/// How far from an end, in parts of the phase, the quotients are taken where an axis turns there. Continued from there ü is
+/// off by the square of this part; ü and u⃛ lose as many digits as the part and its square have.
+const OFF_TURN: f64 = 3e-5;
+/// The same where C' vanishes; the length grows with the square of the part at least.
+const OFF_CUSP: f64 = 1e-3;
+/// C' vanishes at an end where |C'|² is below this part of that in the middle of the phase.
+const SLOW: f64 = 1e-8;
+/// Tangents of a straight line differ from it by at most this part of the longest one (rounding).
+const OFF_LINE: f64 = 1e-14;
+
+/// One phase of a profile: `value` is the constant of its law, u0 < u1 local parameters, p at both ends, and where the jerk
+/// is limited the acceleration along the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Phase {
+    pub piece: u32,
+    pub law: PhaseLaw,
+    pub axis: u8,
+    pub value: f64,
+    pub u0: f64,
+    pub u1: f64,
+    pub p0: f64,
+    pub p1: f64,
+    pub duration: f64,
+    pub a0: f64,
+    pub a1: f64,
+}
+
+/// Velocity, acceleration and jerk of every axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates<const M: usize> {
+    pub velocity: [f64; M],
+    pub acceleration: [f64; M],
+    pub jerk: [f64; M],
+}
+
+/// A place on the phase, and the motion of its measure there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct State {
+    pub u: f64,
+    pub pace: Pace,
+    /// Rounds that an inversion took, 0 for closed forms.
+    pub iterations: u32,
+    /// Bound of its error in parts of the phase's whole measure.
+    pub error: f64,
+}
+
+/// What the speed of a phase is about.
+enum Measure {
+    Parameter,
+    Axis(Box<AxisWay>),
+    /// The lengths up to the start of the phase and on it.
+    Length {
+        before: f64,
+        total: f64,
+    },
+}
+
+/// A phase with all that its evaluation needs.
+pub struct PhaseMotion<'a, const M: usize> {
+    path: Rc<PiecePath<'a, M>>,
+    phase: Phase,
+    measure: Measure,
+    clock: Clock,
+    /// The quotients are taken between these places.
+    safe: [f64; 2],
+    /// The direction of travel, where the phase is straight and begins or ends where the quotients are 0/0.
+    straight: Option<[f64; M]>,
+}
+
+impl<'a, const M: usize> PhaseMotion<'a, M> {
+    /// Prepares a phase on its piece.
+    pub fn new(path: Rc<PiecePath<'a, M>>, phase: &Phase) -> Self {
+        let (u0, u1) = (phase.u0, phase.u1);
+        let width = u1 - u0;
+        let mean_pace = || (Measure::Parameter, Clock::Even(Even::constant(width / phase.duration)));
+        let by_length = |clock: &dyn Fn(f64) -> Clock| {
+            let (before, after) = (path.length(phase.law, u0), path.length(phase.law, u1));
+            (Measure::Length { before, total: after - before }, clock(after - before))
+        };
+        let speeds = || path.end_speeds(phase);
+        let (measure, clock) = match phase.law {
+            PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity => match AxisWay::new(path.piece(), phase) {
+                Some((way, even)) => (Measure::Axis(Box::new(way)), Clock::Even(even)),
+                // As short as a rounding error: the axis shows no motion, the duration tells the pace.
+                None => mean_pace(),
+            },
+            PhaseLaw::ParameterAcceleration if phase.p0 + phase.p1 > 0.0 => {
+                let even = Even { v: [phase.p0.sqrt(), phase.p1.sqrt()], a: phase.value };
+                (Measure::Parameter, Clock::Even(even))
+            }
+            PhaseLaw::ParameterAcceleration => mean_pace(),
+            PhaseLaw::Feed => by_length(&|_| Clock::Even(Even::constant(phase.value.sqrt()))),
+            PhaseLaw::SpeedLine => {
+                let line = SpeedLine::new(&path, phase, speeds());
+                (Measure::Parameter, Clock::Line(Box::new(line)))
+            }
+            PhaseLaw::PathJerk => by_length(&|_| Clock::Jerk(Jerk::new(phase, speeds()))),
+            PhaseLaw::SpeedCubic => {
+                by_length(&|length| Clock::Cubic(Box::new(Cubic::new(phase, speeds(), length))))
+            }
+        };
+        let mut motion = Self { path, phase: *phase, measure, clock, safe: [u0, u1], straight: None };
+        let off = motion.off_ends();
+        if off != [0.0; 2] {
+            motion.safe = [u0 + off[0], u1 - off[1]];
+            motion.straight = motion.direction();
+        }
+        motion
+    }
+
+    /// How far from the ends the quotients have to be taken.
+    fn off_ends(&self) -> [f64; 2] {
+        let Phase { law, u0, u1, .. } = self.phase;
+        let of_length = || {
+            let middle = self.path.square(law, 0.5 * (u0 + u1));
+            [u0, u1]
+                .map(|u| if self.path.square(law, u) <= SLOW * middle { OFF_CUSP * (u1 - u0) } else { 0.0 })
+        };
+        match (&self.measure, &self.clock) {
+            (Measure::Axis(way), _) => way.turns.map(|turns| if turns { OFF_TURN * (u1 - u0) } else { 0.0 }),
+            (Measure::Parameter, Clock::Even(_)) => [0.0; 2],
+            _ => of_length(),
+        }
+    }
+
+    /// The direction of all tangents on the phase, if they have one but for rounding and the measure is a share of the way
+    /// in that direction.
+    fn direction(&self) -> Option<[f64; M]> {
+        if self.path.is_tip(self.phase.law) && !matches!(self.measure, Measure::Axis(_)) {
+            return None;
+        }
+        let piece = self.path.piece();
+        let [from, to] = [self.phase.u0, self.phase.u1].map(|u| derivatives(piece, u)[0]);
+        let way: [f64; M] = std::array::from_fn(|k| to[k] - from[k]);
+        let direction = way.map(|x| x / norm(&way));
+        let coefficients = Coefficients::new(piece);
+        let rows = coefficients.hodograph();
+        let longest = rows.iter().map(norm).fold(0.0, f64::max);
+        let straight = rows.iter().all(|row| {
+            let along = dot(row, &direction);
+            (0..M).all(|k| (row[k] - along * direction[k]).abs() <= OFF_LINE * longest)
+        });
+        straight.then_some(direction)
+    }
+
+    /// The place `t` seconds after the start of the phase. `period` is the step whose length is to be met.
+    pub fn at_time(&self, t: f64, period: f64) -> State {
+        let phase = &self.phase;
+        // 0/0 on a phase without duration.
+        let (done, left) = (t / phase.duration, (phase.duration - t) / phase.duration);
+        if t <= 0.0 || done.is_nan() {
+            return self.at(phase.u0);
+        }
+        if left <= 0.0 {
+            return self.at(phase.u1);
+        }
+        let step = period / phase.duration;
+        let (part, clock_work) = match &self.clock {
+            Clock::Even(even) => (even.part(self.from_start(done), done, left), Located::default()),
+            Clock::Jerk(jerk) => (jerk.part(done, left), Located::default()),
+            Clock::Cubic(cubic) => cubic.part(done, JERK_STEP_ERROR * step),
+            Clock::Line(line) => {
+                let found = line.place(&self.path, done, left, STEP_ERROR * step);
+                return State { pace: self.pace_of_line(line, found.u, t), ..state_of(found) };
+            }
+        };
+        let found = self.place(part, step);
+        let pace = match &self.clock {
+            Clock::Even(even) => even.pace(done, left, t),
+            Clock::Jerk(jerk) => jerk.pace(done, left),
+            Clock::Cubic(cubic) => cubic.pace(clock_work.u, t),
+            Clock::Line(_) => unreachable!("a speed line has returned"),
+        };
+        State {
+            pace,
+            iterations: found.iterations.max(clock_work.iterations),
+            error: found.miss + clock_work.miss,
+            ..state_of(found)
+        }
+    }
+
+    /// Whether the part of the measure is counted from the start of the phase: always from the side where it grows slower.
+    fn from_start(&self, done: f64) -> bool {
+        match &self.measure {
+            Measure::Axis(way) => way.from_start,
+            _ => done <= 0.5,
+        }
+    }
+
+    /// Where a part of the measure is done.
+    fn place(&self, part: Part, step: f64) -> Located {
+        let Phase { law, u0, u1, .. } = self.phase;
+        match &self.measure {
+            Measure::Parameter => {
+                let way = (u1 - u0) * part.share;
+                let u = if part.from_start { u0 + way } else { u1 - way };
+                Located { u: u.clamp(u0, u1), ..Located::default() }
+            }
+            Measure::Axis(way) => way.place(&self.phase, part),
+            Measure::Length { before, total } => {
+                let error = if law.is_along() { JERK_STEP_ERROR } else { STEP_ERROR };
+                let way = if part.from_start { total * part.share } else { total * (1.0 - part.share) };
+                let found = self.path.locate(law, before + way, error * total * step);
+                Located { u: found.u.clamp(u0, u1), miss: found.miss / total, ..found }
+            }
+        }
+    }
+
+    /// The part of the measure at u, from the end that is nearer.
+    fn part(&self, u: f64) -> Part {
+        let Phase { law, u0, u1, .. } = self.phase;
+        match &self.measure {
+            Measure::Axis(way) => way.part(&self.phase, u),
+            Measure::Length { before, total } => {
+                let share = (self.path.length(law, u) - before) / total;
+                Part { from_start: true, share: share.clamp(0.0, 1.0) }.from_nearer_end()
+            }
+            Measure::Parameter if u - u0 <= u1 - u => Part { from_start: true, share: (u - u0) / (u1 - u0) },
+            Measure::Parameter => Part { from_start: false, share: (u1 - u) / (u1 - u0) },
+        }
+    }
+
+    /// The place with parameter u.
+    pub fn at(&self, u: f64) -> State {
+        let duration = self.phase.duration;
+        let pace = match &self.clock {
+            Clock::Even(even) => even.at_part(self.part(u), duration),
+            Clock::Jerk(jerk) => jerk.at_part(self.part(u)),
+            Clock::Cubic(cubic) => cubic.at_part(self.part(u), duration),
+            Clock::Line(line) => self.pace_of_line(line, u, duration * line.done(&self.path, u)),
+        };
+        State { u, pace, ..State::default() }
+    }
+
+    /// v, a and j where v² is linear in u.
+    fn pace_of_line(&self, line: &SpeedLine, u: f64, t: f64) -> Pace {
+        let at = u.clamp(self.safe[0], self.safe[1]);
+        let [g, dg, _] = self.path.slopes(self.phase.law, at, &derivatives(self.path.piece(), at));
+        line.pace(u, at, g, dg, t)
+    }
+
+    /// Position, and velocity, acceleration and jerk at a place.
+    pub fn sample(&self, state: &State) -> ([f64; M], Rates<M>) {
+        let q = derivatives(self.path.piece(), state.u);
+        let Pace { v, a, j, .. } = state.pace;
+        if let Some(direction) = &self.straight {
+            // All axes move in proportion.
+            let share = match &self.measure {
+                Measure::Axis(way) => way.sign * direction[way.k],
+                _ => self.path.share_of(self.phase.law, direction),
+            };
+            let along = |size: f64| direction.map(|x| x * size / share);
+            let mut rates = Rates { velocity: along(v), acceleration: along(a), jerk: along(j) };
+            self.set_own(&mut rates, &state.pace);
+            return (q[0], rates);
+        }
+        let at = state.u.clamp(self.safe[0], self.safe[1]);
+        let turns = at != state.u && matches!(self.measure, Measure::Axis(_));
+        let there = if at == state.u { q } else { derivatives(self.path.piece(), at) };
+        let near = if turns { self.at(at).pace } else { state.pace };
+        let [g, dg, ddg] = match &self.measure {
+            Measure::Parameter if !matches!(self.clock, Clock::Line(_)) => [1.0, 0.0, 0.0],
+            Measure::Axis(way) => [1, 2, 3].map(|order: usize| way.sign * there[order][way.k]),
+            _ => self.path.slopes(self.phase.law, at, &there),
+        };
+        let du = near.v / g;
+        let ddu = (near.a - dg * du * du) / g;
+        let dddu = (near.j - du * (3.0 * dg * ddu + ddg * du * du)) / g;
+        let mut rates = if turns {
+            // p is continued by its derivatives 2 ü and 2 u⃛/u̇, and the place itself has the other ones.
+            let (off, ds) = (state.u - at, dddu / du);
+            let root = (du * du + off * (2.0 * ddu + off * ds)).max(0.0).sqrt();
+            rates_of(&q, root, ddu + off * ds, root * ds)
+        } else {
+            rates_of(&there, du, ddu, dddu)
+        };
+        self.set_own(&mut rates, &state.pace);
+        (q[0], rates)
+    }
+
+    /// The axis that the law is about moves exactly by it.
+    fn set_own(&self, rates: &mut Rates<M>, pace: &Pace) {
+        if let Measure::Axis(way) = &self.measure {
+            rates.velocity[way.k] = way.sign * pace.v;
+            rates.acceleration[way.k] = way.sign * pace.a;
+            rates.jerk[way.k] = 0.0;
+        }
+    }
+
+    /// C at a place.
+    pub fn point(&self, state: &State) -> [f64; M] {
+        self.sample(state).0
+    }
+
+    /// Velocity, acceleration and jerk at a place.
+    pub fn rates(&self, state: &State) -> Rates<M> {
+        self.sample(state).1
+    }
+
+    /// Both ends of the phase.
+    pub fn span(&self) -> (f64, f64) {
+        (self.phase.u0, self.phase.u1)
+    }
+
+    /// How closely a step's length is to be met, in parts of the step.
+    pub fn step_error(&self) -> f64 {
+        if self.phase.law.is_along() {
+            JERK_STEP_ERROR
+        } else {
+            STEP_ERROR
+        }
+    }
+
+    /// The piece of the phase with its table of lengths.
+    pub fn path(&self) -> &PiecePath<'a, M> {
+        &self.path
+    }
+}
+
+/// A share of the whole measure of a phase, counted from its start or from its end.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    from_start: bool,
+    share: f64,
+}
+
+impl Part {
+    fn from_nearer_end(self) -> Self {
+        if self.share <= 0.5 {
+            self
+        } else {
+            Self { from_start: !self.from_start, share: 1.0 - self.share }
+        }
+    }
+}
+
+fn state_of(found: Located) -> State {
+    State { u: found.u, iterations: found.iterations, error: found.miss, ..State::default() }
+}
+
+/// Velocity, acceleration and jerk from q and its derivatives by u, and those of u by time.
+#[inline(always)]
+fn rates_of<const M: usize>(q: &[[f64; M]; 4], du: f64, ddu: f64, dddu: f64) -> Rates<M> {
+    let p = du * du;
+    Rates {
+        velocity: q[1].map(|q| q * du),
+        acceleration: std::array::from_fn(|l| q[1][l] * ddu + q[2][l] * p),
+        jerk: std::array::from_fn(|l| q[1][l] * dddu + du * (3.0 * q[2][l] * ddu + q[3][l] * p)),
+    }
+}
+
+/// Why nothing can follow a phase whose numbers are finite.
+pub fn flaw<const M: usize>(path: &PiecePath<M>, phase: &Phase) -> Option<&'static str> {
+    let length = || path.rough_length(phase);
+    match phase.law {
+        PhaseLaw::PathJerk => Jerk::new(phase, path.end_speeds(phase)).flaw(),
+        PhaseLaw::SpeedCubic => Cubic::flaw(phase, path.end_speeds(phase), length()),
+        _ => None,
+    }
+}

@@ -1,0 +1,372 @@
+//! Speed along the measure of a phase, and the part of the measure that is done, at a time.
+//!
+//! Parts are counted from the end of the phase that is nearer in time, so that nothing is lost next to rest.
+
+use super::lengths::{fill, PiecePath};
+use super::rate::{FromRest, Line};
+use super::{Part, Phase, SLOW};
+use feedplan_geometry::arc_length::{quadrature, Disc, Integrand, Node, Table};
+use feedplan_geometry::inverse_length::{self, Located};
+use feedplan_geometry::spline::speed::greatest_ratio;
+use feedplan_planner::phase_law::PhaseLaw;
+
+/// A speed below 0 is rounding where it is this part of what speed and acceleration at the ends make of it.
+const BACKWARDS: f64 = 1e-9;
+/// Halvings of the bracket and steps of Newton's method end before this.
+const MAX_ROUNDS: u32 = 200;
+
+/// Time from the start of the phase, and speed, acceleration and jerk along its measure.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pace {
+    pub t: f64,
+    pub v: f64,
+    pub a: f64,
+    pub j: f64,
+}
+
+/// v along the measure by time.
+pub enum Clock {
+    Even(Even),
+    Jerk(Jerk),
+    Cubic(Box<Cubic>),
+    Line(Box<SpeedLine>),
+}
+
+/// v linear in time, from one end to the other: v² is linear in the measure.
+pub struct Even {
+    pub v: [f64; 2],
+    pub a: f64,
+}
+
+impl Even {
+    pub fn constant(v: f64) -> Self {
+        Self { v: [v; 2], a: 0.0 }
+    }
+
+    /// The part of the measure when these parts of the duration are done and left, counted from an end.
+    pub fn part(&self, from_start: bool, done: f64, left: f64) -> Part {
+        let [v0, v1] = self.v;
+        let v = v0 * left + v1 * done;
+        let share = if from_start { done * (v0 + v) } else { left * (v1 + v) };
+        Part { from_start, share: (share / (v0 + v1)).clamp(0.0, 1.0) }
+    }
+
+    pub fn pace(&self, done: f64, left: f64, t: f64) -> Pace {
+        Pace { t, v: self.v[0] * left + self.v[1] * done, a: self.a, j: 0.0 }
+    }
+
+    pub fn at_part(&self, part: Part, duration: f64) -> Pace {
+        let side = usize::from(!part.from_start);
+        let (near, far) = (self.v[side], self.v[1 - side]);
+        let v = (near * near + part.share * (far - near) * (far + near)).max(0.0).sqrt();
+        let passed = part.share * (near + far) / (near + v);
+        // 0/0 at rest, which is only at an end.
+        let passed = if passed.is_nan() { 0.0 } else { passed.clamp(0.0, 1.0) };
+        Pace { t: duration * if side == 0 { passed } else { 1.0 - passed }, v, a: self.a, j: 0.0 }
+    }
+}
+
+/// v, a and j at one end, counted away from it: time runs back from the end of a phase.
+#[derive(Clone, Copy)]
+struct End {
+    v: f64,
+    a: f64,
+    j: f64,
+}
+
+impl End {
+    fn way(&self, t: f64) -> f64 {
+        t * (self.v + t * (0.5 * self.a + t * self.j / 6.0))
+    }
+
+    fn speed(&self, t: f64) -> f64 {
+        self.v + t * (self.a + t * 0.5 * self.j)
+    }
+
+    /// The time up to `most` after which a way is done, on which the motion does not turn back.
+    fn time(&self, way: f64, most: f64) -> f64 {
+        // Where all terms are positive this is beyond the time, and Newton's method comes down to it.
+        let alone = |term: f64, time: f64| if term > 0.0 { time } else { f64::INFINITY };
+        let guess = alone(self.v, way / self.v)
+            .min(alone(self.a, (2.0 * way / self.a).sqrt()))
+            .min(alone(self.j, (6.0 * way / self.j).cbrt()));
+        let (mut low, mut high, mut t) = (0.0, most, guess.min(most));
+        for _ in 0..MAX_ROUNDS {
+            let miss = self.way(t) - way;
+            if miss > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            let next = t - miss / self.speed(t);
+            let next = if low <= next && next <= high { next } else { 0.5 * (low + high) };
+            if next == t || low >= high {
+                break;
+            }
+            t = next;
+        }
+        t
+    }
+}
+
+/// Constant jerk along the path: v, a and the way are polynomials of time.
+pub struct Jerk {
+    ends: [End; 2],
+    duration: f64,
+    /// Ways of the two halves of the duration.
+    ways: [f64; 2],
+}
+
+impl Jerk {
+    pub fn new(phase: &Phase, speeds: [f64; 2]) -> Self {
+        let (t, j) = (phase.duration, phase.value);
+        let ends = [End { v: speeds[0], a: phase.a0, j }, End { v: speeds[1], a: -phase.a1, j }];
+        Self { ends, duration: t, ways: ends.map(|end| end.way(0.5 * t)) }
+    }
+
+    /// The end that is nearer in time, and the time from there.
+    fn nearer(&self, done: f64, left: f64) -> (usize, f64) {
+        if done <= 0.5 {
+            (0, done * self.duration)
+        } else {
+            (1, left * self.duration)
+        }
+    }
+
+    pub fn part(&self, done: f64, left: f64) -> Part {
+        let (end, t) = self.nearer(done, left);
+        Part { from_start: end == 0, share: self.ends[end].way(t) / (self.ways[0] + self.ways[1]) }
+    }
+
+    pub fn pace(&self, done: f64, left: f64) -> Pace {
+        let (end, t) = self.nearer(done, left);
+        self.counted_from(end, t)
+    }
+
+    fn counted_from(&self, end: usize, t: f64) -> Pace {
+        let End { a, j, .. } = self.ends[end];
+        let v = self.ends[end].speed(t);
+        if end == 0 {
+            Pace { t, v, a: a + j * t, j }
+        } else {
+            Pace { t: self.duration - t, v, a: -(a + j * t), j }
+        }
+    }
+
+    pub fn at_part(&self, part: Part) -> Pace {
+        let total = self.ways[0] + self.ways[1];
+        let way = total * if part.from_start { part.share } else { 1.0 - part.share };
+        if way <= self.ways[0] {
+            self.counted_from(0, self.ends[0].time(way, 0.5 * self.duration))
+        } else {
+            let way = total * if part.from_start { 1.0 - part.share } else { part.share };
+            self.counted_from(1, self.ends[1].time(way, 0.5 * self.duration))
+        }
+    }
+
+    /// Why nothing can follow it.
+    pub fn flaw(&self) -> Option<&'static str> {
+        let (t, start) = (self.duration, &self.ends[0]);
+        if t <= 0.0 {
+            return Some("moves at constant jerk for no time");
+        }
+        let slowest = (-start.a / start.j).clamp(0.0, t);
+        let slowest = if slowest.is_nan() { 0.0 } else { slowest };
+        let scale = start.v.abs() + self.ends[1].v.abs() + t * (start.a.abs() + self.ends[1].a.abs());
+        let forward =
+            [start.speed(slowest), start.v, self.ends[1].v].iter().all(|&v| v >= -BACKWARDS * scale);
+        (!(forward && self.ways[0] + self.ways[1] > 0.0)).then_some("moves backwards")
+    }
+}
+
+/// v² a cubic polynomial of the length, never 0; the time is a table over the share of the length.
+pub struct Cubic {
+    speed_sq: CubicTime,
+    times: Vec<Node>,
+    time_error: f64,
+}
+
+impl Cubic {
+    pub fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Self {
+        let speed_sq = CubicTime::new(phase, speeds, length);
+        let mut times = vec![];
+        let time_error = fill(speed_sq, (0.0, 1.0), &mut times);
+        Self { speed_sq, times, time_error }
+    }
+
+    /// Why nothing can follow a phase.
+    pub fn flaw(phase: &Phase, speeds: [f64; 2], length: f64) -> Option<&'static str> {
+        let moves = CubicTime::new(phase, speeds, length).is_positive();
+        (!moves).then_some("loses all its speed on the way")
+    }
+
+    fn table(&self) -> Table<'_, CubicTime> {
+        Table { f: self.speed_sq, nodes: &self.times }
+    }
+
+    /// The part of the length when a part of the duration is done, within an error in parts of the duration.
+    pub fn part(&self, done: f64, error: f64) -> (Part, Located) {
+        let table = self.table();
+        let total = table.total();
+        let tolerance = (error * total).max(table.rounding());
+        let mut located = inverse_length::locate(&table, done * total, tolerance);
+        located.miss = (located.miss + self.time_error) / total;
+        (Part { from_start: true, share: located.u }, located)
+    }
+
+    /// The motion at the share x of the length, t seconds after the start.
+    pub fn pace(&self, x: f64, t: f64) -> Pace {
+        let CubicTime { length, .. } = self.speed_sq;
+        let [w, slope, bend] = self.speed_sq.derivatives(x);
+        let v = w.sqrt();
+        Pace { t, v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }
+    }
+
+    pub fn at_part(&self, part: Part, duration: f64) -> Pace {
+        let x = if part.from_start { part.share } else { 1.0 - part.share };
+        let table = self.table();
+        self.pace(x, duration * table.integral(x) / table.total())
+    }
+}
+
+/// v² over the part x of the way in powers of x; the time is the integral of length/v.
+#[derive(Clone, Copy, Debug)]
+struct CubicTime {
+    c: [f64; 4],
+    length: f64,
+}
+
+impl CubicTime {
+    fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Self {
+        let [w0, w1] = speeds.map(|v| v * v);
+        let (slope0, slope1) = (2.0 * phase.a0 * length, 2.0 * phase.a1 * length);
+        let rise = w1 - w0;
+        Self { c: [w0, slope0, 3.0 * rise - 2.0 * slope0 - slope1, slope0 + slope1 - 2.0 * rise], length }
+    }
+
+    fn derivatives(&self, x: f64) -> [f64; 3] {
+        let [c0, c1, c2, c3] = self.c;
+        [c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3), 2.0 * c2 + 6.0 * x * c3]
+    }
+
+    /// Whether v² is above 0 all the way.
+    fn is_positive(&self) -> bool {
+        let [_, c1, c2, c3] = self.c;
+        // Where 3 c3 x² + 2 c2 x + c1 vanishes, without cancellation.
+        let root = (c2 * c2 - 3.0 * c1 * c3).max(0.0).sqrt();
+        let q = -(c2 + root.copysign(c2));
+        [0.0, 1.0, q / (3.0 * c3), c1 / q]
+            .iter()
+            .filter(|x| (0.0..=1.0).contains(*x))
+            .all(|&x| self.derivatives(x)[0] > 0.0)
+    }
+}
+
+impl Integrand for CubicTime {
+    #[inline(always)]
+    fn at(&self, x: f64) -> f64 {
+        self.length / self.derivatives(x)[0].sqrt()
+    }
+
+    // v² loses at most half of its value in the middle within the disc.
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        let half = 0.5 * (b - a);
+        let [w, slope, bend] = self.derivatives(0.5 * (a + b));
+        let tail = [half * slope, 0.5 * half * half * bend, half.powi(3) * self.c[3]].map(f64::abs);
+        let ratio = greatest_ratio(|rho| rho * (tail[0] + rho * (tail[1] + rho * tail[2])) <= 0.5 * w);
+        Disc { radius: (ratio - 1.0) * half, bound: self.length * (2.0 / w).sqrt() }
+    }
+
+    fn foot(&self) -> f64 {
+        f64::NAN
+    }
+
+    // Asked for only where x runs out of digits.
+    fn foot_error(&self, width: f64) -> f64 {
+        quadrature(self, 0.0, 1.0) * width
+    }
+}
+
+/// v² linear in u; the time is a table over u, or over the root of the way of u from rest.
+pub struct SpeedLine {
+    law: PhaseLaw,
+    line: Line,
+    /// The end at rest on a path with a direction there, and the sign of u away from it.
+    rest: Option<(f64, f64)>,
+    times: Vec<Node>,
+    time_error: f64,
+}
+
+impl SpeedLine {
+    pub fn new<const M: usize>(path: &PiecePath<M>, phase: &Phase, speeds: [f64; 2]) -> Self {
+        let [from, to] = speeds.map(|v| v * v);
+        let (u0, u1) = (phase.u0, phase.u1);
+        let line = Line { start: from, slope: (to - from) / (u1 - u0), u0 };
+        let moves = |u: f64| path.square(phase.law, u) > SLOW * path.square(phase.law, 0.5 * (u0 + u1));
+        let rest = match (phase.p0 == 0.0, phase.p1 == 0.0) {
+            (true, false) if moves(u0) => Some((u0, 1.0)),
+            (false, true) if moves(u1) => Some((u1, -1.0)),
+            _ => None,
+        };
+        let mut made = Self { law: phase.law, line, rest, times: vec![], time_error: 0.0 };
+        let mut times = vec![];
+        made.time_error = match made.from_rest(path) {
+            Some(f) => fill(f, (0.0, (u1 - u0).sqrt()), &mut times),
+            None => fill(path.rate(phase.law, line), (u0, u1), &mut times),
+        };
+        Self { times, ..made }
+    }
+
+    fn from_rest<'a, const M: usize>(&self, path: &'a PiecePath<M>) -> Option<FromRest<'a, M>> {
+        self.rest.map(|(place, sign)| FromRest {
+            source: path.rate(self.law, self.line).source,
+            place,
+            sign,
+            slope: self.line.slope.abs(),
+        })
+    }
+
+    /// The place when these parts of the duration are done and left, within an error in parts of the duration.
+    pub fn place<const M: usize>(&self, path: &PiecePath<M>, done: f64, left: f64, error: f64) -> Located {
+        match self.from_rest(path) {
+            Some(f) => {
+                let found = self.invert(f, if f.sign > 0.0 { done } else { left }, error);
+                Located { u: f.u(found.u), ..found }
+            }
+            None => self.invert(path.rate(self.law, self.line), done, error),
+        }
+    }
+
+    fn invert<F: Integrand>(&self, f: F, part: f64, error: f64) -> Located {
+        let table = Table { f, nodes: &self.times };
+        let total = table.total();
+        let found = inverse_length::locate(&table, part * total, (error * total).max(table.rounding()));
+        Located { miss: (found.miss + self.time_error) / total, ..found }
+    }
+
+    /// The part of the duration that has passed at u.
+    pub fn done<const M: usize>(&self, path: &PiecePath<M>, u: f64) -> f64 {
+        match self.from_rest(path) {
+            Some(f) => {
+                let table = Table { f, nodes: &self.times };
+                let done = table.integral((u - f.place).abs().sqrt()) / table.total();
+                if f.sign > 0.0 {
+                    done
+                } else {
+                    1.0 - done
+                }
+            }
+            None => {
+                let table = Table { f: path.rate(self.law, self.line), nodes: &self.times };
+                table.integral(u) / table.total()
+            }
+        }
+    }
+
+    /// The motion at u; a and j at the place `at`, whose length per u is g, with the slope dg.
+    pub fn pace(&self, u: f64, at: f64, g: f64, dg: f64, t: f64) -> Pace {
+        // a = v dv/ds with ds = g du.
+        let a = 0.5 * self.line.slope / g;
+        Pace { t, v: self.line.at(u).sqrt(), a, j: -a * dg / g * self.line.at(at).sqrt() / g }
+    }
+}

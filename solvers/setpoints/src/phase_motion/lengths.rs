@@ -1,0 +1,218 @@
+//! The lengths of one piece that laws are about, as tables shared by all phases on it: of the axes, of what the feed counts,
+//! and of the whole path. The place at a length comes from `feedplan_geometry::inverse_length`.
+
+use std::cell::OnceCell;
+
+use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
+use super::{Phase, SLOW};
+use feedplan_geometry::arc_length::{quadrature, tabulate, Integrand, Node, Table};
+use feedplan_geometry::inverse_length::{self, Located};
+use feedplan_geometry::newton;
+use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::quadratic::{dot, norm};
+use feedplan_geometry::spline::bezier::derivatives;
+use feedplan_geometry::spline::speed::{Coefficients, Speed};
+use feedplan_geometry::spline::Piece;
+use feedplan_geometry::tolerance;
+use feedplan_planner::phase_law::PhaseLaw;
+
+/// Tables of lengths are built for this part of the phase's piece; a phase may be a small part of it.
+const ERROR: f64 = 0.125 * tolerance::TABLE;
+
+/// Whose length a law is about.
+#[derive(Clone, Copy, Debug)]
+pub enum Counts<'a, const M: usize> {
+    /// All axes of the piece.
+    Axes,
+    /// Each axis times its share.
+    Shares([f64; M]),
+    /// The tool tip, whose joints the piece moves.
+    Tip(TipSpeed<'a>),
+}
+
+/// A piece with its lengths, which are tabulated when they are first asked for.
+pub struct PiecePath<'a, const M: usize> {
+    piece: Piece<'a, M>,
+    feed: Counts<'a, M>,
+    way: Counts<'a, M>,
+    /// The end of the piece where C' vanishes; not a number where it does not.
+    foot: f64,
+    /// Of the axes, of the feed, of the way.
+    tables: [OnceCell<Lengths<M>>; 3],
+}
+
+const AXES: usize = 0;
+
+impl<'a, const M: usize> PiecePath<'a, M> {
+    /// What counts at the feed, and in laws about the way along the path. On a speed line shares do not count.
+    pub fn new(piece: Piece<'a, M>, feed: Counts<'a, M>, way: Counts<'a, M>) -> Self {
+        let square = |u: f64| {
+            let q = derivatives(&piece, u)[1];
+            dot(&q, &q)
+        };
+        let least = SLOW * square(0.5 * piece.width);
+        let foot = [0.0, piece.width].into_iter().find(|&u| square(u) <= least).unwrap_or(f64::NAN);
+        Self { piece, feed, way, foot, tables: Default::default() }
+    }
+
+    pub(super) fn piece(&self) -> &Piece<'a, M> {
+        &self.piece
+    }
+
+    fn counts(&self, law: PhaseLaw) -> (usize, &Counts<'a, M>) {
+        match (law, &self.feed, &self.way) {
+            (PhaseLaw::PathJerk | PhaseLaw::SpeedCubic, _, way @ Counts::Tip(_)) => (2, way),
+            (PhaseLaw::Feed, feed @ (Counts::Tip(_) | Counts::Shares(_)), _) => (1, feed),
+            (PhaseLaw::SpeedLine, feed @ Counts::Tip(_), _) => (1, feed),
+            _ => (AXES, &Counts::Axes),
+        }
+    }
+
+    pub(super) fn is_tip(&self, law: PhaseLaw) -> bool {
+        matches!(self.counts(law).1, Counts::Tip(_))
+    }
+
+    fn lengths(&self, number: usize, counts: &Counts<'a, M>) -> &Lengths<M> {
+        self.tables[number].get_or_init(|| Lengths::new(&self.piece, counts, self.foot))
+    }
+
+    /// The length that a law is about.
+    fn of(&self, law: PhaseLaw) -> &Lengths<M> {
+        let (number, counts) = self.counts(law);
+        self.lengths(number, counts)
+    }
+
+    /// The length from the start of the piece to u.
+    pub(super) fn length(&self, law: PhaseLaw, u: f64) -> f64 {
+        self.of(law).table().integral(u)
+    }
+
+    /// The place at a length, with the proven error of the table in its miss.
+    pub(super) fn locate(&self, law: PhaseLaw, length: f64, tolerance: f64) -> Located {
+        let lengths = self.of(law);
+        let table = lengths.table();
+        let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()));
+        Located { miss: found.miss + lengths.error, ..found }
+    }
+
+    /// The length of a phase from one quadrature.
+    pub(super) fn rough_length(&self, phase: &Phase) -> f64 {
+        let (_, counts) = self.counts(phase.law);
+        let speeds = Speeds::new(&self.piece, counts);
+        quadrature(&speeds.rate(self.foot, Line::ONE), phase.u0, phase.u1)
+    }
+
+    /// The time per u of a speed line.
+    pub(super) fn rate(&self, law: PhaseLaw, line: Line) -> Rate<'_, M> {
+        self.of(law).speeds.rate(self.foot, line)
+    }
+
+    /// Square of the length per u.
+    pub(super) fn square(&self, law: PhaseLaw, u: f64) -> f64 {
+        let g = self.slopes(law, u, &derivatives(&self.piece, u))[0];
+        g * g
+    }
+
+    /// The length per u, and its first two derivatives, where q and its derivatives are known.
+    pub(super) fn slopes(&self, law: PhaseLaw, u: f64, q: &[[f64; M]; 4]) -> [f64; 3] {
+        let of_axes = |q: [[f64; M]; 4]| {
+            let bend = 2.0 * (dot(&q[2], &q[2]) + dot(&q[1], &q[3]));
+            [dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]), bend]
+        };
+        let [square, slope, bend] = match self.counts(law).1 {
+            Counts::Axes => of_axes(*q),
+            Counts::Shares(share) => of_axes(q.map(|q| times(share, &q))),
+            Counts::Tip(tip) => tip.derivatives().map(|d| d.value(u / self.piece.width)),
+        };
+        // A square that touches 0 may be a rounding error below it.
+        let g = square.max(0.0).sqrt();
+        let dg = 0.5 * slope / g;
+        [g, dg, (0.5 * bend - dg * dg) / g]
+    }
+
+    /// What a law counts of a way in a direction of length 1.
+    pub(super) fn share_of(&self, law: PhaseLaw, direction: &[f64; M]) -> f64 {
+        match self.counts(law).1 {
+            Counts::Shares(share) => norm(&times(share, direction)),
+            _ => 1.0,
+        }
+    }
+
+    /// The speeds that p makes of the length per u at both ends of a phase.
+    pub(super) fn end_speeds(&self, phase: &Phase) -> [f64; 2] {
+        [(phase.u0, phase.p0), (phase.u1, phase.p1)].map(|(u, p)| (self.square(phase.law, u) * p).sqrt())
+    }
+
+    /// The place a length of the axes ahead of u, within `tolerance` mm, by Newton–Raphson.
+    pub fn advance(&self, u: f64, step: f64, tolerance: f64) -> Located {
+        let table = self.lengths(AXES, &Counts::Axes).table();
+        newton::advance(&table, (u, table.integral(u)), step, tolerance).0
+    }
+
+    /// No length of the axes is found more closely than this, and the proven error of its table.
+    pub fn length_errors(&self) -> [f64; 2] {
+        let lengths = self.lengths(AXES, &Counts::Axes);
+        [lengths.table().rounding(), lengths.error]
+    }
+}
+
+fn times<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+    std::array::from_fn(|k| a[k] * b[k])
+}
+
+/// The length per u of a piece, ready to be integrated.
+enum Speeds<const M: usize> {
+    Axes { coefficients: Coefficients<M>, width: f64 },
+    Tip { square: Box<Polynomial<MAX_TIP>>, width: f64 },
+}
+
+impl<const M: usize> Speeds<M> {
+    fn new(piece: &Piece<M>, counts: &Counts<M>) -> Self {
+        let width = piece.width;
+        let coefficients = Coefficients::new(piece);
+        match counts {
+            Counts::Axes => Self::Axes { coefficients, width },
+            Counts::Shares(share) => Self::Axes { coefficients: coefficients.scaled(share), width },
+            Counts::Tip(tip) => Self::Tip { square: Box::new(tip.square()), width },
+        }
+    }
+
+    /// Over the root of v².
+    fn rate(&self, foot: f64, line: Line) -> Rate<'_, M> {
+        let source = match self {
+            Self::Tip { square, width } => Source::Tip(Tip { square, width: *width }),
+            Self::Axes { coefficients, width } => {
+                let speed = Speed::new(coefficients.hodograph(), coefficients.denominator(), *width);
+                Source::Own(if foot.is_nan() { speed.without_foot() } else { speed.with_foot(foot) })
+            }
+        };
+        Rate { source, line, foot }
+    }
+}
+
+/// A table of a length with its proven error.
+struct Lengths<const M: usize> {
+    speeds: Speeds<M>,
+    foot: f64,
+    nodes: Vec<Node>,
+    error: f64,
+}
+
+impl<const M: usize> Lengths<M> {
+    fn new(piece: &Piece<M>, counts: &Counts<M>, foot: f64) -> Self {
+        let speeds = Speeds::new(piece, counts);
+        let mut nodes = vec![];
+        let error = fill(speeds.rate(foot, Line::ONE), (0.0, piece.width), &mut nodes);
+        Self { speeds, foot, nodes, error }
+    }
+
+    fn table(&self) -> Table<'_, Rate<'_, M>> {
+        Table { f: self.speeds.rate(self.foot, Line::ONE), nodes: &self.nodes }
+    }
+}
+
+/// Tabulates f from one end to another; its proven error.
+pub(super) fn fill<F: Integrand>(f: F, ends: (f64, f64), nodes: &mut Vec<Node>) -> f64 {
+    let estimate = quadrature(&f, ends.0, ends.1);
+    tabulate(f, ends.0, ends.1, ERROR * estimate, nodes)
+}
