@@ -46,8 +46,8 @@ class SpeedProfile(OfNative[Profile]):
 
     Per phase: `piece` (index into the path), `kind` (PhaseLaw), `axis` (the axis that the phase's constant
     belongs to, 255 for none), `value` (see PhaseLaw), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
-    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) phase offsets of the path's runs. `slowed` (m,) pieces
-    on which the plan stops because rounding hides the way on, slower than it need be; once for each stop.
+    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) phase offsets of the path's runs. `slowed` (m,)
+    pieces on which the plan stops because rounding hides the way on, slower than it need be; once a stop.
     Where the problem has a `tip_speed`, |C'|² of FEED and SPEED_LINE is that; q are the joints.
     Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
     axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits

@@ -214,7 +214,8 @@ def setpoints(
     on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere, the length at a
     time in closed form where the jerk along the path is constant. `newton`: steps
     of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
-    rational. `progress` is told how far the laying out is; `events` are those of the plan (`feedplan.event_places`).
+    rational. `progress` is told how far the laying out is; `events` are those of the plan
+    (`feedplan.event_places`).
     Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
     setpoints than `max_setpoints`.
     """

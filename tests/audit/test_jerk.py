@@ -297,11 +297,11 @@ def test_the_jerk_of_joints_is_that_of_their_setpoints(joints: Any) -> None:
     result = audit(problem, profile, machine, None, stream, jerk=True)
     assert result.failures == ()
     for k, name in enumerate(problem.axes):
-        # Some ten places of an arc are measured: peaks between them are above by some thousandths.
+        # Setpoints of this period miss the peaks by up to a thousandth.
         assert result.check("jerk", name).worst == pytest.approx(most[k], rel=1e-2, abs=1e-3)
-    assert audit(replace(problem, max_jerk=most + 1.0), profile, machine, None, None, jerk=True).ok
+    assert audit(replace(problem, max_jerk=1.001 * most + 1.0), profile, machine, None, None, jerk=True).ok
     k = int(np.argmax(most))
-    tight = most + 1.0
+    tight = 1.001 * most + 1.0
     tight[k] *= 0.98
     result = audit(replace(problem, max_jerk=tight), profile, machine, None, None, jerk=True)
     assert {(check.name, check.axis) for check in result.broken} == {("jerk", problem.axes[k])}

@@ -1,6 +1,6 @@
 //! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
 
-use super::curve::{distance, from_to, inner, length, Segment};
+use super::curve::{distance, from_to, inner, length, Curves, Segment};
 use super::deviation::{settled, window};
 use super::moves::Neighbours;
 use super::profile_clock::Reader;
@@ -22,6 +22,7 @@ pub struct Comparison<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
+    curves: Curves<'a, M>,
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
@@ -30,7 +31,8 @@ pub struct Comparison<'a, const M: usize> {
 impl<'a, const M: usize> Comparison<'a, M> {
     pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
-        Self { plan, limits, profile, near: Neighbours::default(), piece: None }
+        let curves = Curves::new(plan.path.pieces);
+        Self { plan, limits, profile, curves, near: Neighbours::default(), piece: None }
     }
 
     /// What one setpoint shows: its distance from path and program, and what it records.
@@ -58,7 +60,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let (Some(profile), limits, nearest) = (&mut self.profile, self.limits, &row.nearest) else { return };
         let here = profile.go_to(nearest.place);
         if let Some(recorded) = row.velocity {
-            let velocity = profile.motion.velocity(here.y);
+            let velocity = profile.velocity(&here);
             let away = rounding + nearest.off.max(0.0) + nearest.late;
             let rest = self.plan.path.width[nearest.place.piece] - nearest.place.u;
             let at_joint = nearest.place.u.min(rest) <= PLACE_TOLERANCE;
@@ -72,7 +74,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
             }
         }
         if let Some(recorded) = row.acceleration {
-            let range = profile.accelerations(here, row.t, limits.period);
+            let range = profile.accelerations(&here, row.t, limits.period);
             let mut off: [f64; M] =
                 std::array::from_fn(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));
             if (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration.least(k)) {
@@ -88,7 +90,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
     }
 
     /// What the step between two setpoints shows: its speed, and the path between them.
-    pub fn step(&self, before: &Row<M>, row: &Row<M>, step: f64, rounding: f64, tally: &mut Tally<M>) {
+    pub fn step(&mut self, before: &Row<M>, row: &Row<M>, step: f64, rounding: f64, tally: &mut Tally<M>) {
         let (path, limits) = (&self.plan.path, self.limits);
         if !is_step(before.t, row.t, limits.period) {
             return;
@@ -99,7 +101,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let (mut ways, mut least_times, mut error_sq) = ([0.0; FEEDS], [0.0; FEEDS], 0.0_f64);
         let mut last = before.q;
         for piece in from.piece..=to.piece {
-            let curve = path.curve::<M>(piece);
+            let curve = self.curves.get(piece);
             let start = if piece == from.piece { from.u } else { 0.0 };
             let end = if piece == to.piece { to.u } else { curve.width() };
             let next = if piece == to.piece { row.q } else { curve.at(end) };
@@ -137,14 +139,14 @@ impl<'a, const M: usize> Comparison<'a, M> {
     /// That limit keeps the acceleration across the path at 8 δ/T², and so the distance from the chord, T²/8 times
     /// the greatest acceleration across the chord, at δ. Where the path turns against the chord by θ, the
     /// acceleration along the path adds T²/8 · a sin θ; all of it where the path runs back.
-    fn chord_beyond_circle(&self, before: &Row<M>, row: &Row<M>, step: f64) -> f64 {
-        let (path, limits) = (&self.plan.path, self.limits);
+    fn chord_beyond_circle(&mut self, before: &Row<M>, row: &Row<M>, step: f64) -> f64 {
+        let limits = self.limits;
         let (from, to) = (before.nearest.place, row.nearest.place);
         let way = from_to(&before.q, &row.q);
         let way_length = length(&way);
         let mut most = 0.0_f64;
         for piece in from.piece..=to.piece {
-            let curve = path.curve::<M>(piece);
+            let curve = self.curves.get(piece);
             let start = if piece == from.piece { from.u } else { 0.0 };
             let end = if piece == to.piece { to.u } else { curve.width() };
             for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
@@ -160,15 +162,15 @@ impl<'a, const M: usize> Comparison<'a, M> {
     }
 
     /// Corners of the path in two steps, those included that the places at their ends cannot be told from.
-    pub fn corners(&self, rows: [&Row<M>; 3]) -> f64 {
-        let (path, period) = (&self.plan.path, self.limits.period);
+    pub fn corners(&mut self, rows: [&Row<M>; 3]) -> f64 {
+        let period = self.limits.period;
         if rows.windows(2).any(|pair| !is_step(pair[0].t, pair[1].t, period)) {
             return 0.0;
         }
         let mut corners = 0.0;
         for piece in self.begun([rows[0], rows[2]]) {
-            let before = path.curve::<M>(piece - 1);
-            let after = path.curve::<M>(piece);
+            let before = self.curves.get(piece - 1);
+            let after = self.curves.get(piece);
             let (into, out) = (before.derivative(before.width()), after.derivative(0.0));
             let (a, b) = (length(&into), length(&out));
             if distance(&into.map(|x| x / a), &out.map(|x| x / b)) > SMOOTH {

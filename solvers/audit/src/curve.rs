@@ -3,7 +3,11 @@
 //!
 //! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
 
+use std::rc::Rc;
+
+use super::hodographs::Hodographs;
 use super::polygon::Polygon;
+
 use super::FEEDS;
 
 /// Pieces joined end to end; see `feedplan.curves.composite.CompositeCurve`.
@@ -116,7 +120,7 @@ impl Pieces<'_> {
         let rows = self.rows(i);
         let weights = if self.weights.is_empty() { &[][..] } else { &self.weights[rows.clone()] };
         let points = rows.map(|row| self.point(row));
-        Curve::General(Box::new(Polygon::new(points, weights)), self.width[i])
+        Curve::general(Polygon::new(points, weights), self.width[i])
     }
 
     /// At least how far `q` is from piece `i`: from the box around its control points.
@@ -132,20 +136,63 @@ impl Pieces<'_> {
     }
 }
 
+/// Pieces made ready one after the other: the last two are kept.
+pub struct Curves<'a, const M: usize> {
+    pieces: Pieces<'a>,
+    kept: [Option<(usize, Rc<Curve<M>>)>; 2],
+}
+
+impl<'a, const M: usize> Curves<'a, M> {
+    pub fn new(pieces: Pieces<'a>) -> Self {
+        Self { pieces, kept: [None, None] }
+    }
+
+    pub fn get(&mut self, i: usize) -> Rc<Curve<M>> {
+        for (number, curve) in self.kept.iter().flatten() {
+            if *number == i {
+                return curve.clone();
+            }
+        }
+        let curve = Rc::new(self.pieces.curve(i));
+        self.kept = [Some((i, curve.clone())), self.kept[0].take()];
+        curve
+    }
+}
+
 /// A piece, over u in [0, width].
 #[derive(Clone, Debug)]
 pub enum Curve<const M: usize> {
     Quadratic(Quadratic<M>),
-    General(Box<Polygon<M>>, f64),
+    General(Box<General<M>>),
+}
+
+/// A piece of another degree, or with weights.
+#[derive(Clone, Debug)]
+pub struct General<const M: usize> {
+    pub polygon: Polygon<M>,
+    hodographs: Hodographs<M>,
+    width: f64,
+}
+
+impl<const M: usize> General<M> {
+    /// u as parts of the width from both ends.
+    fn parts(&self, u: f64) -> (f64, f64) {
+        (u / self.width, (self.width - u) / self.width)
+    }
 }
 
 impl<const M: usize> Curve<M> {
+    pub fn general(polygon: Polygon<M>, width: f64) -> Self {
+        let hodographs = Hodographs::new(&polygon);
+        Curve::General(Box::new(General { polygon, hodographs, width }))
+    }
+
     /// Length of the parameter interval, in mm.
     #[inline]
     pub fn width(&self) -> f64 {
         match self {
             Curve::Quadratic(curve) => curve.width,
-            Curve::General(_, width) => *width,
+            Curve::General(general) => general.width,
         }
     }
 
@@ -154,7 +201,10 @@ impl<const M: usize> Curve<M> {
     pub fn at(&self, u: f64) -> [f64; M] {
         match self {
             Curve::Quadratic(curve) => curve.at(u),
-            Curve::General(polygon, width) => polygon.at(u / width),
+            Curve::General(general) => {
+                let (t, rest) = general.parts(u);
+                general.hodographs.at(t, rest)
+            }
         }
     }
 
@@ -164,7 +214,9 @@ impl<const M: usize> Curve<M> {
             Curve::Quadratic(curve) => {
                 0.5 * (to - from) * (length(&curve.derivative(from)) + length(&curve.derivative(to)))
             }
-            Curve::General(polygon, width) => polygon.part(from / width, (to - from) / width).way(),
+            Curve::General(general) => {
+                general.polygon.part(from / general.width, (to - from) / general.width).way()
+            }
         }
     }
 
@@ -173,25 +225,56 @@ impl<const M: usize> Curve<M> {
     pub fn derivative(&self, u: f64) -> [f64; M] {
         match self {
             Curve::Quadratic(curve) => curve.derivative(u),
-            Curve::General(polygon, width) => polygon.local(u / width).slope.map(|slope| slope / width),
+            Curve::General(_) => self.place(u)[1],
         }
     }
 
-    /// The first three derivatives at u, and what the rounding of each is relative to.
-    pub fn derivatives(&self, u: f64) -> [([f64; M], [f64; M]); 3] {
+    /// C(u) and C'(u).
+    #[inline]
+    pub fn place(&self, u: f64) -> [[f64; M]; 2] {
+        match self {
+            Curve::Quadratic(curve) => [curve.at(u), curve.derivative(u)],
+            Curve::General(general) => {
+                let (t, rest) = general.parts(u);
+                let [point, slope] = general.hodographs.derivatives(t, rest);
+                [point, vector_of(|k| slope[k] / general.width)]
+            }
+        }
+    }
+
+    /// The first three derivatives at u.
+    #[inline]
+    pub fn derivatives(&self, u: f64) -> [[f64; M]; 3] {
+        match self {
+            Curve::Quadratic(curve) => [curve.derivative(u), curve.second_derivative(), [0.0; M]],
+            Curve::General(general) => {
+                let (t, rest) = general.parts(u);
+                let [_, first, second, third] = general.hodographs.derivatives(t, rest);
+                by_width([first, second, third], general.width)
+            }
+        }
+    }
+
+    /// What the rounding of the first three derivatives is relative to.
+    #[inline]
+    pub fn derivative_sizes(&self) -> [[f64; M]; 3] {
         match self {
             Curve::Quadratic(curve) => {
                 let size = self.derivative_size();
-                let bend = curve.second_derivative();
-                let none = ([0.0; M], [0.0; M]);
-                [(curve.derivative(u), size), (bend, size.map(|size| size / curve.width)), none]
+                [size, size.map(|size| size / curve.width), [0.0; M]]
             }
-            Curve::General(polygon, width) => {
-                let mut scale = 1.0;
-                polygon.derivatives(u / width).map(|(value, size)| {
-                    scale /= width;
-                    (value.map(|x| scale * x), size.map(|x| scale * x))
-                })
+            Curve::General(general) => by_width(*general.hodographs.sizes(), general.width),
+        }
+    }
+
+    /// The greatest lengths of the second to the fourth derivative; infinite on pieces with weights.
+    pub fn bounds(&self) -> [f64; 3] {
+        match self {
+            Curve::Quadratic(curve) => [length(&curve.second_derivative()), 0.0, 0.0],
+            Curve::General(general) => {
+                let square = general.width * general.width;
+                let [second, third, fourth] = general.hodographs.bounds();
+                [second / square, third / (square * general.width), fourth / (square * square)]
             }
         }
     }
@@ -202,7 +285,7 @@ impl<const M: usize> Curve<M> {
             Curve::Quadratic(curve) => {
                 std::array::from_fn(|k| 2.0 / curve.width * (curve.first[k].abs() + curve.second[k].abs()))
             }
-            Curve::General(polygon, width) => polygon.slope_size().map(|size| size / width),
+            Curve::General(general) => general.hodographs.sizes()[0].map(|size| size / general.width),
         }
     }
 
@@ -210,7 +293,7 @@ impl<const M: usize> Curve<M> {
     pub fn derivative_scale(&self) -> f64 {
         match self {
             Curve::Quadratic(curve) => 2.0 / curve.width,
-            Curve::General(polygon, width) => polygon.slope_scale() / width,
+            Curve::General(general) => general.polygon.slope_scale() / general.width,
         }
     }
 
@@ -218,7 +301,7 @@ impl<const M: usize> Curve<M> {
     pub fn is_motionless(&self) -> bool {
         match self {
             Curve::Quadratic(curve) => curve.is_motionless(),
-            Curve::General(polygon, _) => polygon.is_motionless(),
+            Curve::General(general) => general.polygon.is_motionless(),
         }
     }
 
@@ -227,7 +310,7 @@ impl<const M: usize> Curve<M> {
     pub fn magnitude(&self) -> f64 {
         match self {
             Curve::Quadratic(curve) => curve.magnitude(),
-            Curve::General(polygon, _) => polygon.magnitude(),
+            Curve::General(general) => general.polygon.magnitude(),
         }
     }
 
@@ -235,7 +318,7 @@ impl<const M: usize> Curve<M> {
     pub fn turns(&self) -> usize {
         match self {
             Curve::Quadratic(_) => 1,
-            Curve::General(polygon, _) => polygon.degree(),
+            Curve::General(general) => general.polygon.degree(),
         }
     }
 
@@ -243,9 +326,22 @@ impl<const M: usize> Curve<M> {
     pub fn extremes(&self, axis: usize) -> [f64; 2] {
         match self {
             Curve::Quadratic(curve) => [curve.turn(axis); 2],
-            Curve::General(polygon, _) => polygon.extremes(axis),
+            Curve::General(general) => general.polygon.extremes(axis),
         }
     }
+}
+
+/// Derivatives by t to those by u.
+#[inline(always)]
+fn by_width<const M: usize>(mut derivatives: [[f64; M]; 3], width: f64) -> [[f64; M]; 3] {
+    let mut scale = 1.0;
+    for derivative in &mut derivatives {
+        scale /= width;
+        for x in derivative {
+            *x *= scale;
+        }
+    }
+    derivatives
 }
 
 /// C(t) = start + t (2 first + t (second − first)) with t = u / width.
@@ -332,6 +428,16 @@ pub fn vector<const M: usize>(table: &[f64], axes: usize, i: usize) -> [f64; M] 
     }
 }
 
+/// A vector from its numbers by axis. `array::from_fn` and `map` are not inlined in large functions.
+#[inline(always)]
+pub fn vector_of<const M: usize>(number: impl Fn(usize) -> f64) -> [f64; M] {
+    let mut vector = [0.0; M];
+    for k in 0..M {
+        vector[k] = number(k);
+    }
+    vector
+}
+
 /// Length of a vector.
 #[inline(always)]
 pub fn length<const M: usize>(a: &[f64; M]) -> f64 {
@@ -351,7 +457,7 @@ pub fn inner<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
 /// From `a` to `b`.
 #[inline(always)]
 pub fn from_to<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
-    std::array::from_fn(|k| b[k] - a[k])
+    vector_of(|k| b[k] - a[k])
 }
 
 /// Distance of two points.

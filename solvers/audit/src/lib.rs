@@ -4,17 +4,20 @@
 //! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `curve`, `polygon`, `nearest`; the program: `moves`, `deviation`. The profile: `phases`, `phase_motion`,
-//! `phase_time`, `speed_by_length`, `phase_jerk`, `profile`. Setpoints: `setpoints`, `differences`; with their plan
+//! The path: `curve`, `polygon`, `hodographs`, `nearest`; the program: `moves`, `deviation`. The profile: `phases`, `phase_motion`,
+//! `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `profile`. Setpoints: `setpoints`, `differences`; with their plan
 //! `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`.
 
 pub mod against_plan;
 pub mod curve;
 pub mod deviation;
 pub mod differences;
+pub mod hodographs;
 pub mod joints;
 pub mod moves;
 pub mod nearest;
+mod peak;
+pub mod phase_by_length;
 pub mod phase_jerk;
 pub mod phase_motion;
 pub mod phase_time;

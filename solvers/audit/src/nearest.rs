@@ -123,8 +123,8 @@ pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) 
                 }
             }
         }
-        Curve::General(polygon, _) => {
-            let (t, falls_on) = polygon.first_minimum(q, t0);
+        Curve::General(general) => {
+            let (t, falls_on) = general.polygon.first_minimum(q, t0);
             if t > t0 {
                 (u, falls) = (t * width, falls_on);
             }
@@ -156,8 +156,8 @@ pub fn all_minima<const M: usize>(
             }
             found(width);
         }
-        Curve::General(polygon, _) => {
-            polygon.all_minima(q, t0, &mut |t| found(if t > t0 { t * width } else { from }));
+        Curve::General(general) => {
+            general.polygon.all_minima(q, t0, &mut |t| found(if t > t0 { t * width } else { from }));
         }
     }
 }

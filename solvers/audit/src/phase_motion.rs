@@ -8,12 +8,8 @@ mod law;
 
 pub use law::{Law, Pole};
 
-use fearless_simd::{dispatch, Level};
-
 use super::curve::{from_to, inner, length};
-use super::phase_time::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE};
 use super::polygon::Polygon;
-use super::speed_by_length::{Pace, SpeedByLength};
 use super::EPS;
 
 /// Slopes of tangents are taken over this part of the phase.
@@ -53,8 +49,6 @@ pub struct PhaseMotion<const M: usize> {
     pub anchored_at_end: bool,
     pub(super) pole: Option<Pole>,
     pub(super) layer: Option<Layer>,
-    /// The speed by the length of the path from the anchor.
-    speed: Option<Box<Measured>>,
     /// What the axes count in the speed that is constant at the feed.
     share: [f64; M],
 }
@@ -66,13 +60,6 @@ pub(super) struct Layer {
     pub thickness: f64,
     /// Share of √p that changes in it.
     pub strength: f64,
-}
-
-#[derive(Clone, Debug)]
-struct Measured {
-    speed: SpeedByLength,
-    /// Distances from the anchor, and lengths up to there, between which the rule is good.
-    lengths: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Debug)]
@@ -171,75 +158,8 @@ impl<const M: usize> PhaseMotion<M> {
             second_order: direction * part * (far - near),
             time_scale: 2.0 * part,
             anchored_at_end,
-            speed: None,
             share,
         }
-    }
-
-    /// The same with the speed that `speed` makes of the whole length.
-    pub fn with_speed(mut self, speed: impl FnOnce(f64) -> SpeedByLength) -> Self {
-        let mut lengths = vec![[0.0; 2]];
-        self.measure(0.0, self.width, &mut { MOST_HALVINGS }, &mut lengths);
-        self.speed = Some(Box::new(Measured { speed: speed(lengths[lengths.len() - 1][1]), lengths }));
-        self
-    }
-
-    /// Adds the lengths of parts between two distances from the anchor.
-    fn measure(&self, from: f64, to: f64, halvings: &mut u32, lengths: &mut Vec<[f64; 2]>) {
-        let [fine, doubt] = self.length_between(from, to);
-        let middle = 0.5 * (from + to);
-        let good = doubt.abs() <= RULES_AGREE * fine;
-        if good || *halvings == 0 || !(from < middle && middle < to) {
-            lengths.push([to, lengths[lengths.len() - 1][1] + fine]);
-            return;
-        }
-        *halvings -= 1;
-        self.measure(from, middle, halvings, lengths);
-        self.measure(middle, to, halvings, lengths);
-    }
-
-    /// The length between two distances from the anchor, and its doubt.
-    fn length_between(&self, from: f64, to: f64) -> [f64; 2] {
-        match &self.general {
-            None => {
-                let tangent = |d: f64| -> [f64; M] {
-                    std::array::from_fn(|k| self.tangent[k] + self.direction * d * self.bend[k])
-                };
-                kronrod(|d| length(&tangent(d)), from, to)
-            }
-            Some(general) => {
-                let (from, to) = (from / self.width, (to / self.width).min(1.0));
-                dispatch!(Level::new(), simd => {
-                    kronrod_lanes(simd, #[inline(always)] |t| general.part.speeds(simd, t), from, to)
-                })
-            }
-        }
-    }
-
-    /// The speed by the length, and the length from the anchor to the signed distance `d`.
-    fn speed_at(&self, d: f64) -> Option<(&SpeedByLength, f64)> {
-        let measured = self.speed.as_ref()?;
-        let (d, lengths) = (d.abs(), &measured.lengths);
-        let [from, way] = lengths[lengths.partition_point(|row| row[0] <= d).max(1) - 1];
-        let rest = if d > from { self.length_between(from, d)[0] } else { 0.0 };
-        Some((&measured.speed, way + rest))
-    }
-
-    /// Time from `y0` to `y1` where the speed follows from the length, in s.
-    pub(super) fn time_by_way(&self, y0: f64, y1: f64) -> Option<f64> {
-        let (speed, from) = self.speed_at(self.distance(y0))?;
-        let (_, to) = self.speed_at(self.distance(y1))?;
-        Some(speed.time_between(from, to))
-    }
-
-    /// The motion along the path at `y`, in the order of time, where the phase's kind says something of its jerk.
-    pub fn pace(&self, y: f64) -> Option<Pace> {
-        if let (Law::Speed { start_sq, change_sq: 0.0 }, true) = (self.law, self.share == [1.0; M]) {
-            return Some(Pace { v: start_sq.sqrt(), a: 0.0, j: 0.0 });
-        }
-        let (speed, way) = self.speed_at(self.distance(y))?;
-        let pace = speed.pace(way);
-        Some(Pace { a: self.direction * pace.a, ..pace })
     }
 
     /// Distance from the anchor, with its sign, at `y`.
@@ -298,17 +218,7 @@ impl<const M: usize> PhaseMotion<M> {
             Law::Speed { start_sq, change_sq } => {
                 (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(&self.counted(tangent))
             }
-            // At rest p is 0 also where C' vanishes: from there the length grows faster than C'.
-            Law::Length => match self.speed_by_way(d) {
-                0.0 => 0.0,
-                speed => speed / length(tangent),
-            },
         }
-    }
-
-    #[inline(never)]
-    fn speed_by_way(&self, d: f64) -> f64 {
-        self.speed_at(d).map_or(f64::NAN, |(speed, way)| speed.pace(way).v)
     }
 
     /// C' and √p at the signed distance `d` on a piece of any degree.
@@ -402,7 +312,6 @@ impl<const M: usize> PhaseMotion<M> {
                 let gained = (1.0 - start_sq / inner(&counted, &counted)).max(0.0);
                 length(&self.counted(&terms)) / length(&self.counted(&tangent)) + 0.5 * gained * self.grain
             }
-            Law::Length => length(&terms) / length(&tangent) + self.felt(d) * self.grain,
             Law::Parameter { start, .. } => 1.0 + 0.5 * (1.0 - start / root_p.powi(2)).max(0.0) * self.grain,
             _ => 1.0,
         };
@@ -418,18 +327,6 @@ impl<const M: usize> PhaseMotion<M> {
         (if self.anchored_at_end { u1 + d } else { u0 + d }).clamp(u0, u1)
     }
 
-    /// How much the rounding of the length is enlarged in the speed that follows from it.
-    fn felt(&self, d: f64) -> f64 {
-        self.speed_at(d).map_or(0.0, |(speed, way)| {
-            let Pace { v, a, .. } = speed.pace(way);
-            if way > 0.0 {
-                a.abs() / v * (way / v)
-            } else {
-                0.0
-            }
-        })
-    }
-
     /// The axis whose acceleration the law holds constant.
     pub fn held_axis(&self) -> Option<usize> {
         match self.law {
@@ -443,7 +340,7 @@ impl<const M: usize> PhaseMotion<M> {
         match self.law {
             Law::Axis { value, .. } => value == 0.0,
             Law::Parameter { .. } => false,
-            Law::Speed { .. } | Law::Length => true,
+            Law::Speed { .. } => true,
         }
     }
 
@@ -495,25 +392,6 @@ pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
 mod tests {
     use super::*;
     use crate::curve::Quadratic;
-
-    #[test]
-    fn at_rest_where_the_tangent_vanishes_velocities_are_zero() {
-        // x = u³ by s = t³: u̇ = 1, but at u = 0 both v and C' vanish.
-        let piece = Polygon::new([[0.0; 2], [0.0; 2], [0.0; 2], [1.0, 0.0]].into_iter(), &[]);
-        let part = Box::new(piece.part(0.0, 1.0));
-        let shape = Shape::General {
-            whole: Box::new(piece),
-            ends: [0.0, 1.0],
-            part,
-            tangent: [0.0; 2],
-            size: [3.0, 0.0],
-        };
-        let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
-        let motion = PhaseMotion::new(Law::Length, shape, [1.0; 2], [0.0, 1.0], false, &[1.0; 2])
-            .with_speed(|_| SpeedByLength::Jerk { start, duration: 1.0 });
-        assert_eq!(motion.velocity(0.0), [0.0; 2]);
-        assert!((motion.velocity(1.0)[0] - 3.0).abs() < 1e-12);
-    }
 
     #[test]
     fn a_parabola_is_most_curved_at_its_tip() {

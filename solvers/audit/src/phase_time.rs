@@ -3,8 +3,6 @@
 //! Times are ∫ du/√p in the variable y in [0, 1] in which √p is linear where p is linear in u: du/√p is then finite at rest,
 //! and constant where p is linear in u. Source of the rule: Kronrod 1965.
 
-use fearless_simd::{f64x4, Simd, SimdBase, SimdInto};
-
 use super::phase_motion::{Law, PhaseMotion, State, STEPPED_OVER};
 use super::{EPS, ROUNDINGS};
 
@@ -36,16 +34,6 @@ pub(super) fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let pairs = NODES.map(|node| f(middle - half * node) + f(middle + half * node));
     by_rules(pairs, f(middle), half)
-}
-
-/// The same of a function of four places at once, on the level of instructions `simd`.
-#[inline(always)]
-pub(super) fn kronrod_lanes<S: Simd>(simd: S, f: impl Fn(f64x4<S>) -> f64x4<S>, a: f64, b: f64) -> [f64; 2] {
-    let (middle, half) = (f64x4::splat(simd, 0.5 * (a + b)), 0.5 * (b - a));
-    let nodes: f64x4<S> = [NODES[0], NODES[1], NODES[2], 0.0].simd_into(simd);
-    let to = nodes * half;
-    let [outer, gauss, inner, twice] = (f(middle - to) + f(middle + to)).into();
-    by_rules([outer, gauss, inner], 0.5 * twice, half)
 }
 
 /// The integral and its doubt from the sums of the values at each pair of nodes and the value in the middle.
@@ -142,9 +130,6 @@ impl<const M: usize> PhaseMotion<M> {
     /// The time between two places, or the place between them at which the interval has to be halved.
     #[inline]
     fn integrate(&self, y0: f64, y1: f64, halvings: &mut u32) -> Result<f64, f64> {
-        if let Some(time) = self.time_by_way(y0, y1) {
-            return Ok(time);
-        }
         let (time, trusted) = self.rule(y0, y1);
         let middle = 0.5 * (y0 + y1);
         // From rest where C' vanishes the integrand is a power of y: the rules miss the same share of any part of it.
@@ -162,9 +147,6 @@ impl<const M: usize> PhaseMotion<M> {
     /// Time of an interval so short that the 3-point rule is enough, in s.
     #[inline]
     fn short_time(&self, y0: f64, y1: f64) -> f64 {
-        if let Some(time) = self.time_by_way(y0, y1) {
-            return time;
-        }
         let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
         let both = self.integrand(middle - half * NODES[1]) + self.integrand(middle + half * NODES[1]);
         let sum = INNER_WEIGHTS[1] * self.integrand(middle) + INNER_WEIGHTS[0] * both;
@@ -223,7 +205,7 @@ mod tests {
             pieces: 1,
             runs: &[0, 1],
         }
-        .motion(0, curve)
+        .by_parameter(0, curve)
     }
 
     fn quadratic(points: &[[f64; 2]; 3], width: f64) -> Curve<2> {
@@ -313,7 +295,7 @@ mod tests {
         // Y turns 6e-4 mm before the phase begins; the acceleration of X there by exact arithmetic.
         let points = [[3.33400833, -245.33330009], [4.66993226, -245.33369929], [5.18118385, -246.56792565]];
         let weights = [1.0, 0.831_556_127_752_042_9, 1.0];
-        let curve = Curve::General(Box::new(Polygon::new(points.into_iter(), &weights)), 2.22179155091747);
+        let curve = Curve::general(Polygon::new(points.into_iter(), &weights), 2.22179155091747);
         let p = [1000.311668347934, 1001.67845];
         let motion = one_phase(0, 1, -500.0, [0.0, 1.47142088], p, &curve);
         let y = motion.y_at(0.000787988);

@@ -1,6 +1,9 @@
 //! The phases of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
-use super::curve::{inner, Curve, Followed};
+use std::rc::Rc;
+
+use super::curve::{inner, length, Curve, Followed};
+use super::phase_by_length::PhaseByLength;
 use super::phase_motion::{Law, PhaseMotion, Shape};
 use super::speed_by_length::{Pace, SpeedByLength};
 use super::{EPS, ROUNDINGS};
@@ -86,8 +89,34 @@ impl Phases<'_> {
             && (is_by_length(self.kind[i]) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
     }
 
-    /// Phase `i` ready to be evaluated; its numbers must be good.
-    pub fn motion<const M: usize>(&self, i: usize, curve: &Curve<M>) -> PhaseMotion<M> {
+    /// Phase `i` on its piece, where its speed is known by the length of the path; its numbers must be good.
+    pub fn by_length<const M: usize>(&self, i: usize, curve: &Rc<Curve<M>>) -> Option<PhaseByLength<M>> {
+        let kind = self.kind[i];
+        let at_feed = kind == FEED && self.counted::<M>(i) == [1.0; M];
+        if !is_by_length(kind) && !at_feed {
+            return None;
+        }
+        let u = [self.u0[i], self.u1[i]];
+        let mut speeds =
+            [(u[0], self.p0[i]), (u[1], self.p1[i])].map(|(u, p)| length(&curve.derivative(u)) * p.sqrt());
+        // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
+        let anchored_at_end = kind != FEED && speeds[1] < speeds[0];
+        let mut a = [self.a0[i], self.a1[i]];
+        if anchored_at_end {
+            speeds.reverse();
+            a = [-a[1], -a[0]];
+        }
+        let (value, duration) = (self.value[i], self.duration[i]);
+        let speed = |length: f64| match kind {
+            FEED => SpeedByLength::Constant { speed: value.sqrt() },
+            PATH_JERK => SpeedByLength::Jerk { start: Pace { v: speeds[0], a: a[0], j: value }, duration },
+            _ => SpeedByLength::cubic(speeds.map(|v| v * v), a, length),
+        };
+        Some(PhaseByLength::new(curve.clone(), u, anchored_at_end, duration, speed))
+    }
+
+    /// Phase `i` on its piece, where its p is known by the parameter; its numbers must be good.
+    pub fn by_parameter<const M: usize>(&self, i: usize, curve: &Curve<M>) -> PhaseMotion<M> {
         let p = [self.p0[i], self.p1[i]];
         let ends = [curve.derivative(self.u0[i]), curve.derivative(self.u1[i])];
         let axis = self.axis[i] as usize;
@@ -96,7 +125,7 @@ impl Phases<'_> {
         let anchored_at_end = match self.kind[i] {
             AXIS_ACCELERATION => ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0],
             PARAMETER_ACCELERATION => p[1] < p[0],
-            SPEED_LINE | PATH_JERK | SPEED_CUBIC => speed_sq(1) < speed_sq(0),
+            SPEED_LINE => speed_sq(1) < speed_sq(0),
             _ => false,
         };
         let (tangent, p_anchor, p_far) =
@@ -108,45 +137,30 @@ impl Phases<'_> {
             }
             AXIS_VELOCITY => Law::Axis { axis, value: 0.0, start_sq: self.value[i] },
             PARAMETER_ACCELERATION => Law::Parameter { start: p_anchor, slope: 2.0 * self.value[i] },
-            FEED => Law::Speed { start_sq: self.value[i], change_sq: 0.0 },
             SPEED_LINE => {
                 let anchor = usize::from(anchored_at_end);
                 let start_sq = speed_sq(anchor);
                 Law::Speed { start_sq, change_sq: speed_sq(1 - anchor) - start_sq }
             }
-            _ => Law::Length,
+            _ => Law::Speed { start_sq: self.value[i], change_sq: 0.0 },
         };
         let shape = match curve {
             Curve::Quadratic(quadratic) => Shape::Quadratic { tangent, bend: quadratic.second_derivative() },
-            Curve::General(polygon, whole) => {
+            Curve::General(general) => {
+                let (polygon, whole) = (&general.polygon, curve.width());
                 let part = polygon.part(self.u0[i] / whole, width / whole);
                 let part = Box::new(if anchored_at_end { part.reversed() } else { part });
                 let mut ends = [self.u0[i] / whole, self.u1[i] / whole];
                 if anchored_at_end {
                     ends.reverse();
                 }
-                Shape::General { whole: polygon.clone(), ends, part, tangent, size: curve.derivative_size() }
+                let whole = Box::new(polygon.clone());
+                Shape::General { whole, ends, part, tangent, size: curve.derivative_size() }
             }
         };
-        let widths = [width, curve.width()];
         let share = if self.kind[i] == FEED { self.counted(i) } else { [1.0; M] };
-        let motion = PhaseMotion::new(law, shape, widths, [p_anchor, p_far], anchored_at_end, &share);
-        if !matches!(law, Law::Length) {
-            return motion;
-        }
-        // Counted from the anchor; from the end time runs back.
-        let (mut squares, mut a) = ([speed_sq(0), speed_sq(1)], [self.a0[i], self.a1[i]]);
-        if anchored_at_end {
-            squares.reverse();
-            a = [-a[1], -a[0]];
-        }
-        motion.with_speed(|length| match self.kind[i] {
-            PATH_JERK => SpeedByLength::Jerk {
-                start: Pace { v: squares[0].sqrt(), a: a[0], j: self.value[i] },
-                duration: self.duration[i],
-            },
-            _ => SpeedByLength::cubic(squares, a, length),
-        })
+        let widths = [width, curve.width()];
+        PhaseMotion::new(law, shape, widths, [p_anchor, p_far], anchored_at_end, &share)
     }
 
     /// What the axes count in the speed that is constant on phase `i`.

@@ -12,8 +12,6 @@
 
 mod nearest;
 
-use fearless_simd::{f64x4, Simd, SimdBase, SimdFloat};
-
 use super::curve::{inner, length};
 
 /// Greatest degree.
@@ -68,6 +66,19 @@ impl<const M: usize> Polygon<M> {
         self.degree
     }
 
+    pub fn is_rational(&self) -> bool {
+        self.rational
+    }
+
+    /// From each control point to the next.
+    pub fn steps(&self) -> &[[f64; M]] {
+        &self.steps[..self.degree]
+    }
+
+    pub fn weights(&self) -> &[f64] {
+        &self.weights[..=self.degree]
+    }
+
     /// De Casteljau's algorithm at t; calls `level` with steps, weights, τ of the first and 1 − τ of the last step.
     #[inline]
     fn levels(&self, t: f64, mut level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
@@ -93,56 +104,6 @@ impl<const M: usize> Polygon<M> {
                 }
             }
         }
-    }
-
-    /// |dC/dt| at four places, by the same algorithm.
-    #[inline(always)]
-    pub fn speeds<S: Simd>(&self, simd: S, t: f64x4<S>) -> f64x4<S> {
-        let zero = f64x4::splat(simd, 0.0);
-        let (degree, s) = (self.degree, 1.0 - t);
-        let mut steps = [[zero; M]; MOST];
-        for i in 0..degree {
-            for k in 0..M {
-                steps[i][k] = f64x4::splat(simd, self.steps[i][k]);
-            }
-        }
-        let mut scale = f64x4::splat(simd, degree as f64);
-        if self.rational {
-            let mut weights = [zero; MOST + 1];
-            for i in 0..=degree {
-                weights[i] = f64x4::splat(simd, self.weights[i]);
-            }
-            for count in (2..=degree).rev() {
-                let mut left = [zero; MOST];
-                let mut right = [zero; MOST];
-                for i in 0..count {
-                    let (a, b) = (s * weights[i], t * weights[i + 1]);
-                    weights[i] = a + b;
-                    let inverse = 1.0 / weights[i];
-                    (left[i], right[i]) = (a * inverse, b * inverse);
-                }
-                for i in 0..count - 1 {
-                    for k in 0..M {
-                        steps[i][k] = left[i] * steps[i][k] + right[i + 1] * steps[i + 1][k];
-                    }
-                }
-            }
-            let inverse = 1.0 / (s * weights[0] + t * weights[1]);
-            scale = scale * weights[0] * weights[1] * inverse * inverse;
-        } else {
-            for count in (1..degree).rev() {
-                for i in 0..count {
-                    for k in 0..M {
-                        steps[i][k] = s * steps[i][k] + t * steps[i + 1][k];
-                    }
-                }
-            }
-        }
-        let mut square = zero;
-        for k in 0..M {
-            square += steps[0][k] * steps[0][k];
-        }
-        scale * square.sqrt()
     }
 
     /// The place at t.
@@ -173,55 +134,6 @@ impl<const M: usize> Polygon<M> {
         }
         let way = self.local(t).way;
         std::array::from_fn(|k| self.start[k] + way[k])
-    }
-
-    /// The first three derivatives by t, and what the rounding of each is relative to.
-    ///
-    /// Of ω C and ω, C counted from the nearer end, by the differences of their Bézier points; the quotient rule
-    /// makes those of C of them.
-    pub fn derivatives(&self, t: f64) -> [([f64; M], [f64; M]); 3] {
-        let n = self.degree;
-        let mut rows = [([0.0; M], 0.0); MOST + 1];
-        let (mut way, mut most) = ([0.0; M], [0.0_f64; M]);
-        for place in 0..=n {
-            let i = if t <= 0.5 { place } else { n - place };
-            for k in 0..if place > 0 { M } else { 0 } {
-                way[k] += if t <= 0.5 { self.steps[i - 1][k] } else { -self.steps[i][k] };
-                most[k] = most[k].max(way[k].abs());
-            }
-            rows[i] = (way.map(|x| self.weights[i] * x), self.weights[i]);
-        }
-        let between = |a: &([f64; M], f64), b: &([f64; M], f64), s: f64, t: f64| {
-            (std::array::from_fn(|k| s * a.0[k] + t * b.0[k]), s * a.1 + t * b.1)
-        };
-        // Of every order the differences of as many rows of de Casteljau's triangle as it takes.
-        let mut found = [([0.0; M], 0.0); 4];
-        for level in (0..=n).rev() {
-            if level < found.len() {
-                let mut differences = rows;
-                for order in 1..=level {
-                    for i in 0..=level - order {
-                        differences[i] = between(&differences[i], &differences[i + 1], -1.0, 1.0);
-                    }
-                }
-                let scale: f64 = (0..level).map(|i| (n - i) as f64).product();
-                found[level] = (differences[0].0.map(|x| scale * x), scale * differences[0].1);
-            }
-            for i in 0..level {
-                rows[i] = between(&rows[i], &rows[i + 1], 1.0 - t, t);
-            }
-        }
-        let weight = found[0].1;
-        let [point, a1, a2, a3] = found.map(|(row, _)| row.map(|x| x / weight));
-        let [_, w1, w2, w3] = found.map(|(_, w)| w / weight);
-        let first: [f64; M] = std::array::from_fn(|k| a1[k] - w1 * point[k]);
-        let second: [f64; M] = std::array::from_fn(|k| a2[k] - 2.0 * w1 * first[k] - w2 * point[k]);
-        let third: [f64; M] =
-            std::array::from_fn(|k| a3[k] - 3.0 * (w1 * second[k] + w2 * first[k]) - w3 * point[k]);
-        // Every difference may double what is rounded, and quotients add what the weights are.
-        let rough = 2.0 * self.slope_scale();
-        let size = |order: i32| most.map(|x| rough.powi(order) * x);
-        [(first, size(1)), (second, size(2)), (third, size(3))]
     }
 
     /// Curvature in 1/mm at t; 0 where the piece has no direction.
@@ -388,7 +300,6 @@ fn first_direction<'a, const M: usize>(mut steps: impl Iterator<Item = &'a [f64;
 mod tests {
     use super::*;
     use crate::curve::distance;
-    use fearless_simd::{dispatch, Level, SimdInto};
 
     /// A quarter of a circle of radius 10 about (1000, 0).
     fn quarter() -> Polygon<2> {
@@ -410,18 +321,6 @@ mod tests {
             assert!((quarter.curvature(t) - 0.1).abs() < 1e-14, "t = {t}: {}", quarter.curvature(t));
             let slope = quarter.local(t).slope;
             assert!(((x - 1000.0) * slope[0] + y * slope[1]).abs() < 1e-10);
-        }
-    }
-
-    #[test]
-    fn speeds_are_the_lengths_of_slopes() {
-        let t = [0.0, 0.3, 0.8, 1.0];
-        for piece in [quarter(), cubic(), quarter().part(0.2, 0.5), cubic().part(0.9, 0.1)] {
-            let speeds: [f64; 4] =
-                dispatch!(Level::new(), simd => piece.speeds(simd, t.simd_into(simd)).into());
-            for (t, speed) in t.into_iter().zip(speeds) {
-                assert!((speed / length(&piece.local(t).slope) - 1.0).abs() < 1e-14, "{speed} at {t}");
-            }
         }
     }
 
@@ -465,30 +364,6 @@ mod tests {
             });
             let exact = (slope[0] * bend[1] - slope[1] * bend[0]).abs() / length(&slope).powi(3);
             assert!((cubic.curvature(t) - exact).abs() < 1e-6 * exact.max(1.0));
-        }
-    }
-
-    #[test]
-    fn every_derivative_is_the_difference_of_the_one_before() {
-        let rational = Polygon::new(
-            [[0.0, 1.0], [2.0, 3.0], [5.0, -1.0], [6.0, 2.0], [9.0, 9.0]].into_iter(),
-            &[1.0, 0.5, 3.0, 2.0, 0.7],
-        );
-        for polygon in [quarter(), cubic(), rational] {
-            for t in [0.1, 0.4, 0.6, 0.9] {
-                let h = 1e-5;
-                let [before, here, after] = [t - h, t, t + h].map(|t| {
-                    let [first, second, third] = polygon.derivatives(t);
-                    [polygon.local(t).way, first.0, second.0, third.0]
-                });
-                for order in 0..3 {
-                    for k in 0..2 {
-                        let slope = (after[order][k] - before[order][k]) / (2.0 * h);
-                        let scale = 1.0 + here[order + 1].map(f64::abs).iter().sum::<f64>();
-                        assert!((slope - here[order + 1][k]).abs() < 1e-7 * scale, "{order} at {t}");
-                    }
-                }
-            }
         }
     }
 

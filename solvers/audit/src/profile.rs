@@ -6,13 +6,17 @@
 //! times its magnitude; that over the time is what rounding may add to an acceleration, and it is subtracted.
 //! A profile cannot hide in it: over all phases together it allows `EPS` of the velocity per phase.
 
+mod by_length;
+
 use rayon::prelude::*;
 
-use super::curve::{length, Followed};
+use super::curve::{length, Curves, Followed};
+use super::phase_by_length::PhaseByLength;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
 use super::phases::Phases;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
+use by_length::Looker;
 
 /// Even intervals of a phase.
 const INTERVALS: usize = 8;
@@ -45,12 +49,12 @@ pub fn audit_profile<const M: usize>(
     let inside = (0..blocks)
         .into_par_iter()
         .map(|block| {
-            let mut tally = Tally::default();
+            let (mut tally, mut curves) = (Tally::default(), Curves::new(path.pieces));
             for i in block * BLOCK..((block + 1) * BLOCK).min(phases.len()) {
                 tell(seen, i);
-                auditor.phase(i, &mut tally);
+                auditor.phase(i, &mut curves, &mut tally);
                 if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
-                    auditor.joint(i - 1, i, &mut tally);
+                    auditor.joint(i - 1, i, &mut curves, &mut tally);
                 }
             }
             tally
@@ -70,7 +74,7 @@ struct Auditor<'a, const M: usize> {
 }
 
 impl<const M: usize> Auditor<'_, M> {
-    fn phase(&self, i: usize, tally: &mut Tally<M>) {
+    fn phase(&self, i: usize, curves: &mut Curves<M>, tally: &mut Tally<M>) {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
         let line = self.path.line.get(piece).copied().unwrap_or(0);
@@ -85,8 +89,25 @@ impl<const M: usize> Auditor<'_, M> {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
             return;
         }
-        let curve = self.path.curve::<M>(piece);
-        let motion = phases.motion(i, &curve);
+        let (curve, share) = (curves.get(piece), (u1 - u0) / width);
+        let width_rounding = EPS * width / (u1 - u0);
+        let by_length = phases.by_length(i, &curve);
+        if self.limits.judges_jerk {
+            self.jerks().alone(i, width_rounding, by_length.is_some(), line, tally);
+        }
+        if let Some(motion) = by_length {
+            let feeds = self.path.feeds(piece);
+            Looker { motion: &motion, limits: self.limits, feeds, start: time, line }.phase(
+                [u0, u1],
+                share,
+                curve.turns(),
+                tally,
+            );
+            self.ends_by_length(i, &motion, line, tally);
+            self.duration(i, motion.time(), width_rounding, line, tally);
+            return;
+        }
+        let motion = phases.by_parameter(i, &curve);
         let mut probe = Probe::new(self, &motion, tally, i, line);
         probe.run();
         let (elapsed, near) = (probe.elapsed, probe.nearest_limit >= NEAR);
@@ -95,19 +116,49 @@ impl<const M: usize> Auditor<'_, M> {
             probe.run_evenly(SLIDE_INTERVALS);
         }
         self.recorded_ends(i, &motion, line, tally);
-        if self.limits.judges_jerk {
-            self.jerks().phase(i, &motion, &curve, line, tally);
-        }
+        self.duration(i, elapsed, width_rounding, line, tally);
+    }
 
-        // A rounding of u0 or u1 changes the width, and with it the time, by this share.
-        let rounding = ROUNDINGS * motion.width_rounding();
-        let error = (phases.duration[i] - elapsed).abs() / elapsed - rounding;
-        tally.offer(Check::Duration, 0, error, PASS_EXCESS, time, line);
+    /// The recorded duration against the audit's own. A rounding of u0 or u1 changes the width, and with it the time, by the
+    /// share `width_rounding`.
+    fn duration(&self, i: usize, elapsed: f64, width_rounding: f64, line: i32, tally: &mut Tally<M>) {
+        let error = (self.phases.duration[i] - elapsed).abs() / elapsed - ROUNDINGS * width_rounding;
+        tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[i], line);
+    }
+
+    /// The recorded p at both ends against the speed by the length, as a jump of axis velocity. A place is known to its
+    /// rounding: over that way the axis may accelerate.
+    fn ends_by_length(&self, i: usize, motion: &PhaseByLength<M>, line: i32, tally: &mut Tally<M>) {
+        let phases = self.phases;
+        let ends = [(phases.u0[i], phases.p0[i], 0.0), (phases.u1[i], phases.p1[i], phases.duration[i])];
+        for (u, p, since) in ends {
+            let (_, pace) = motion.passage(u);
+            let Some(rates) = motion.rates(u, pace) else { continue };
+            let tangent = motion.tangent(u);
+            let size = length(&tangent);
+            let recorded = size * p.sqrt();
+            let way = ROUNDINGS * EPS * self.path.width[phases.piece[i] as usize] * size;
+            for k in 0..self.limits.axes {
+                let cosine = tangent[k].abs() / size;
+                let [slow, fast] = [pace.v.min(recorded), pace.v.max(recorded)].map(|speed| cosine * speed);
+                let gained = 2.0 * self.limits.acceleration.greatest(k) * way * cosine;
+                let reached = (slow * slow + gained).sqrt().max(slow);
+                let jump = fast - reached - rates.velocity.rounding[k];
+                tally.offer(
+                    Check::Jump,
+                    k,
+                    jump,
+                    self.limits.negligible_jump(k),
+                    self.starts[i] + since,
+                    line,
+                );
+            }
+        }
     }
 
     fn jerks(&self) -> Jerks<'_, M> {
-        let Self { path, phases, limits, starts, .. } = *self;
-        Jerks { path, phases, limits, starts }
+        let Self { phases, limits, starts, .. } = *self;
+        Jerks { phases, limits, starts }
     }
 
     /// The recorded p at both ends against what the phase's definition gives there, as a jump of axis velocity. A place is
@@ -187,7 +238,7 @@ impl<const M: usize> Auditor<'_, M> {
     }
 
     /// The change from one phase to the next: no jump of the speed, and of the axis velocities only at corners.
-    fn joint(&self, i: usize, j: usize, tally: &mut Tally<M>) {
+    fn joint(&self, i: usize, j: usize, curves: &mut Curves<M>, tally: &mut Tally<M>) {
         let phases = self.phases;
         if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, self.path.axes)) {
             return; // reported with the phase itself
@@ -197,7 +248,7 @@ impl<const M: usize> Auditor<'_, M> {
         let mut velocity = [[0.0; M]; 2];
         let mut rounding = [0.0; M];
         for (side, (piece, u, p)) in ends.into_iter().enumerate() {
-            let curve = self.path.curve::<M>(piece);
+            let curve = curves.get(piece);
             let (tangent, root_p) = (curve.derivative(u), p.sqrt());
             let scale = ROUNDINGS * EPS * root_p;
             let size = curve.derivative_size();
@@ -211,7 +262,7 @@ impl<const M: usize> Auditor<'_, M> {
         }
         let (time, line) = (self.starts[j], self.line(after));
         if self.limits.judges_jerk {
-            self.jerks().joint(i, j, line, tally);
+            self.jerks().joint(i, j, curves, line, tally);
         }
         let at_corner = if before == after { 0.0 } else { 1.0 };
         for k in 0..M {
@@ -227,7 +278,7 @@ impl<const M: usize> Auditor<'_, M> {
             for junction in before + 1..=after {
                 let allowed = self.junction_speed[junction] + self.negligible_speed();
                 tally.offer(Check::Junction, 0, speeds[0].max(speeds[1]), allowed, time, line);
-                if !self.path.curve::<M>(junction).is_motionless() {
+                if !curves.get(junction).is_motionless() {
                     break;
                 }
             }

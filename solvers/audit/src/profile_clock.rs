@@ -2,10 +2,14 @@
 //!
 //! The clock starts every run anew: setpoints may wait at a stop for their next period.
 
-use super::curve::{length, Followed};
+use std::rc::Rc;
+
+use super::curve::{length, Curve, Curves, Followed};
 use super::nearest::Place;
+use super::phase_by_length::PhaseByLength;
 use super::phase_motion::PhaseMotion;
 use super::phases::Phases;
+use super::speed_by_length::Pace;
 use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// A switch of the acceleration this share of a period away counts as at the setpoint.
@@ -28,16 +32,99 @@ pub struct ProfileClock<'a> {
 pub struct Reader<'a, const M: usize> {
     clock: ProfileClock<'a>,
     path: Followed<'a>,
-    pub phase: usize,
-    pub run: usize,
-    pub motion: PhaseMotion<M>,
+    phase: usize,
+    run: usize,
+    curves: Curves<'a, M>,
+    motion: Motion<M>,
 }
 
-/// A place on the reader's phase: its local parameter, and the same as the phase's integration variable.
+/// The motion on a phase.
+enum Motion<const M: usize> {
+    ByLength(PhaseByLength<M>),
+    ByParameter(PhaseMotion<M>),
+}
+
+/// A place on the reader's phase, and the time since the start of the phase.
 #[derive(Clone, Copy)]
 pub struct Passage {
     u: f64,
-    pub y: f64,
+    since: f64,
+    how: How,
+}
+
+/// The motion along the path, or the integration variable of a phase by its parameter.
+#[derive(Clone, Copy)]
+enum How {
+    Pace(Pace),
+    Y(f64),
+}
+
+impl<const M: usize> Motion<M> {
+    fn new(phases: &Phases, phase: usize, curve: &Rc<Curve<M>>) -> Self {
+        match phases.by_length(phase, curve) {
+            Some(motion) => Self::ByLength(motion),
+            None => Self::ByParameter(phases.by_parameter(phase, curve)),
+        }
+    }
+
+    fn passage(&self, u: f64, [u0, u1]: [f64; 2], duration: f64) -> Passage {
+        match self {
+            Self::ByLength(motion) => {
+                let (since, pace) = motion.passage(u);
+                Passage { u, since, how: How::Pace(pace) }
+            }
+            Self::ByParameter(motion) => {
+                let y = motion.y_at(if motion.anchored_at_end { u1 - u } else { u - u0 });
+                let from_anchor = motion.time_from_anchor(y);
+                let since = if motion.anchored_at_end { duration - from_anchor } else { from_anchor };
+                Passage { u, since, how: How::Y(y) }
+            }
+        }
+    }
+
+    fn velocity(&self, here: &Passage) -> [f64; M] {
+        match (self, here.how) {
+            (Self::ByLength(motion), How::Pace(pace)) => {
+                let tangent = motion.tangent(here.u);
+                let size = length(&tangent);
+                tangent.map(|q| if size > 0.0 { q / size * pace.v } else { 0.0 })
+            }
+            (Self::ByParameter(motion), How::Y(y)) => motion.velocity(y),
+            _ => [f64::NAN; M],
+        }
+    }
+
+    /// Accelerations, and what of them may be rounding.
+    fn acceleration(&self, here: &Passage) -> ([f64; M], [f64; M]) {
+        match (self, here.how) {
+            (Self::ByLength(motion), How::Pace(pace)) => match motion.rates(here.u, pace) {
+                Some(rates) => (rates.acceleration.value, rates.acceleration.rounding),
+                None => ([0.0; M], [f64::INFINITY; M]),
+            },
+            (Self::ByParameter(motion), How::Y(y)) => motion.acceleration_near(y),
+            _ => ([f64::NAN; M], [0.0; M]),
+        }
+    }
+
+    /// The place at a time since the start of the phase.
+    fn place_at(&self, since: f64, [u0, u1]: [f64; 2], duration: f64) -> f64 {
+        match self {
+            Self::ByLength(motion) => motion.place_at(since),
+            Self::ByParameter(motion) => {
+                let wanted = if motion.anchored_at_end { duration - since } else { since };
+                let (mut low, mut high) = (0.0, 1.0);
+                for _ in 0..f64::MANTISSA_DIGITS {
+                    let middle = 0.5 * (low + high);
+                    if motion.time_from_anchor(middle) < wanted {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                motion.parameter(0.5 * (low + high), [u0, u1])
+            }
+        }
+    }
 }
 
 impl ProfileClock<'_> {
@@ -74,8 +161,9 @@ impl ProfileClock<'_> {
 impl<'a, const M: usize> Reader<'a, M> {
     /// On the first phase; there must be one, and a run of the path for it.
     pub fn new(clock: &ProfileClock<'a>, path: &Followed<'a>) -> Self {
-        let motion = clock.phases.motion(0, &path.curve(clock.phases.piece[0] as usize));
-        let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, motion };
+        let mut curves = Curves::new(path.pieces);
+        let motion = Motion::new(&clock.phases, 0, &curves.get(clock.phases.piece[0] as usize));
+        let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, curves, motion };
         reader.enter(0);
         reader
     }
@@ -84,7 +172,16 @@ impl<'a, const M: usize> Reader<'a, M> {
         let phases = &self.clock.phases;
         self.phase = phase;
         self.run = phases.runs.partition_point(|&first| first <= phase as i64) - 1;
-        self.motion = phases.motion(phase, &self.path.curve(phases.piece[phase] as usize));
+        self.motion = self.motion_of(phase);
+    }
+
+    fn motion_of(&mut self, phase: usize) -> Motion<M> {
+        let phases = &self.clock.phases;
+        Motion::new(phases, phase, &self.curves.get(phases.piece[phase] as usize))
+    }
+
+    fn ends(&self, phase: usize) -> [f64; 2] {
+        [self.clock.phases.u0[phase], self.clock.phases.u1[phase]]
     }
 
     /// Goes to the phase that holds a place, the earlier one of two that meet there. A place on a motionless piece
@@ -93,13 +190,18 @@ impl<'a, const M: usize> Reader<'a, M> {
         if !self.holds(self.phase, place) {
             let next = (self.phase + 1).min(self.clock.phases.len() - 1);
             let phase = if self.holds(next, place) { next } else { self.find(place) };
-            self.enter(phase);
+            if phase != self.phase {
+                self.enter(phase);
+            }
         }
         let (phases, phase) = (&self.clock.phases, self.phase);
         let u = if phases.piece[phase] as usize == place.piece { place.u } else { phases.u0[phase] };
-        let from_anchor =
-            if self.motion.anchored_at_end { phases.u1[phase] - u } else { u - phases.u0[phase] };
-        Passage { u, y: self.motion.y_at(from_anchor) }
+        self.motion.passage(u, self.ends(phase), phases.duration[phase])
+    }
+
+    /// Axis velocities of the profile at a place of the reader's phase.
+    pub fn velocity(&self, here: &Passage) -> [f64; M] {
+        self.motion.velocity(here)
     }
 
     fn holds(&self, phase: usize, place: Place) -> bool {
@@ -120,13 +222,11 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     /// When the profile arrives at a place of the reader's phase and when it leaves, in s: at stops it pauses, and the
     /// setpoints may wait for their next period.
-    fn times(&self, here: Passage, period: f64) -> [f64; 2] {
+    fn times(&self, here: &Passage, period: f64) -> [f64; 2] {
         let (clock, phase, run) = (&self.clock, self.phase, self.run);
         let phases = &clock.phases;
         let start = clock.starts[phase] + clock.shift(run);
-        let end = start + phases.duration[phase];
-        let from_anchor = self.motion.time_from_anchor(here.y);
-        let time = if self.motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
+        let (time, end) = (start + here.since, start + phases.duration[phase]);
         let (mut from, mut until) = (time, time);
         if here.u <= phases.u0[phase] && phase == clock.phases_of(run).start {
             from = match run {
@@ -143,14 +243,14 @@ impl<'a, const M: usize> Reader<'a, M> {
     /// At most how far the profile gets between `time` and being at `place`, in mm, less what may be rounding.
     pub fn late(&mut self, place: Place, time: f64, limits: &Limits<M>) -> f64 {
         let here = self.go_to(place);
-        let [from, until] = self.times(here, limits.period);
+        let [from, until] = self.times(&here, limits.period);
         let wait = (from - time).max(time - until).max(0.0);
         // Summing the durations of all phases before has rounded once for each.
         let rounding = EPS * time.abs() * (self.phase as f64 + ROUNDINGS);
         if wait <= rounding {
             return 0.0;
         }
-        let speed = length(&self.motion.velocity(here.y));
+        let speed = length(&self.motion.velocity(&here));
         let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration.greater()));
         let most = reach(wait) - reach(rounding);
         // A profile that creeps through a turn gets nowhere near as far.
@@ -163,79 +263,65 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     /// At most the way along the path between a place and the profile's own place at `time`, in mm, on the piece of the
     /// place or one beside it.
-    fn way_from(&self, place: Place, time: f64) -> Option<f64> {
-        let there = self.place_at(time)?;
+    fn way_from(&mut self, place: Place, time: f64) -> Option<f64> {
+        let (_, here, phase) = self.motion_at(time)?;
+        let there = Place { piece: self.clock.phases.piece[phase] as usize, u: here.u };
         let (first, last) =
             if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
-        let curve = self.path.curve::<M>(first.piece);
+        let curve = self.curves.get(first.piece);
         match last.piece - first.piece {
             0 => Some(curve.way_at_most(first.u, last.u)),
             1 => {
-                let next = self.path.curve::<M>(last.piece);
+                let next = self.curves.get(last.piece);
                 Some(curve.way_at_most(first.u, curve.width()) + next.way_at_most(0.0, last.u))
             }
             _ => None,
         }
     }
 
-    /// Where the profile is at `time`, in the reader's run.
-    fn place_at(&self, time: f64) -> Option<Place> {
-        let (phase, motion, y) = self.motion_at(time)?;
-        let phases = &self.clock.phases;
-        let piece = phases.piece[phase] as usize;
-        Some(Place { piece, u: motion.parameter(y, [phases.u0[phase], phases.u1[phase]]) })
-    }
-
-    /// The phase that `time` falls into, in the reader's run, and where on it the profile is then.
-    fn motion_at(&self, time: f64) -> Option<(usize, PhaseMotion<M>, f64)> {
+    /// The motion on the phase that `time` falls into, in the reader's run, where on it the profile is then, and the phase.
+    fn motion_at(&mut self, time: f64) -> Option<(Motion<M>, Passage, usize)> {
         let (clock, run) = (&self.clock, self.clock.phases_of(self.run));
         let time = time - clock.shift(self.run);
         let passed = clock.starts[run.clone()].partition_point(|&start| start <= time);
         let phase = run.start + passed.checked_sub(1)?;
-        let since = time - clock.starts[phase];
-        let (phases, duration) = (&clock.phases, clock.phases.duration[phase]);
+        let (since, duration) = (time - clock.starts[phase], clock.phases.duration[phase]);
+        let ends = self.ends(phase);
         // Of a profile of rubbish nothing is known.
-        if !(since <= duration && phases.u0[phase] < phases.u1[phase]) {
+        if !(since <= duration && ends[0] < ends[1]) {
             return None;
         }
-        let motion = phases.motion::<M>(phase, &self.path.curve(phases.piece[phase] as usize));
-        let wanted = if motion.anchored_at_end { duration - since } else { since };
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..f64::MANTISSA_DIGITS {
-            let middle = 0.5 * (low + high);
-            if motion.time_from_anchor(middle) < wanted {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        Some((phase, motion, 0.5 * (low + high)))
+        let motion = self.motion_of(phase);
+        let here = motion.passage(motion.place_at(since, ends, duration), ends, duration);
+        Some((motion, here, phase))
     }
 
     /// The acceleration of each axis at `time`, in the reader's run: where the tool creeps back from a turn, the place of
     /// a setpoint does not tell the ways to and from it apart.
-    pub fn acceleration_at(&self, time: f64) -> Option<[f64; M]> {
-        self.motion_at(time).map(|(_, motion, y)| motion.acceleration_near(y).0)
+    pub fn acceleration_at(&mut self, time: f64) -> Option<[f64; M]> {
+        self.motion_at(time).map(|(motion, here, _)| motion.acceleration(&here).0)
     }
 
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's phase.
-    pub fn accelerations(&self, here: Passage, time: f64, period: f64) -> [[f64; 2]; M] {
+    pub fn accelerations(&mut self, here: &Passage, time: f64, period: f64) -> [[f64; 2]; M] {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
         let mut include = |(value, rounding): ([f64; M], [f64; M])| {
             for k in 0..M {
                 range[k] = [range[k][0].min(value[k] - rounding[k]), range[k][1].max(value[k] + rounding[k])];
             }
         };
-        include(self.motion.acceleration_near(here.y));
+        include(self.motion.acceleration(here));
         let switch = SWITCH_SHARE * period;
-        let (phases, starts) = (&self.clock.phases, self.clock.starts);
-        let mut neighbour = |phase: usize, at_end: bool| {
-            let motion = phases.motion::<M>(phase, &self.path.curve(phases.piece[phase] as usize));
-            let y = if at_end != motion.anchored_at_end { 1.0 } else { 0.0 };
-            include(motion.acceleration_near(y));
-        };
+        let ProfileClock { phases, starts, .. } = self.clock;
         let time = time - self.clock.shift(self.run);
         let run = self.clock.phases_of(self.run);
+        let mut neighbour = |phase: usize, at_end: bool| {
+            let ends = [phases.u0[phase], phases.u1[phase]];
+            let motion: Motion<M> =
+                Motion::new(&phases, phase, &self.curves.get(phases.piece[phase] as usize));
+            let there = motion.passage(ends[usize::from(at_end)], ends, phases.duration[phase]);
+            include(motion.acceleration(&there));
+        };
         let mut first = self.phase;
         while first > run.start.max(self.phase.saturating_sub(MOST_SWITCHES)) && time - starts[first] < switch
         {

@@ -120,10 +120,10 @@ impl<const M: usize> Stream<M> {
         let plan = plan.as_ref();
         let rows = &self.kept;
         let view = View { differences: self.differences(rows), plan };
-        let comparison = plan.map(|plan| Comparison::new(plan, &self.limits));
+        let mut comparison = plan.map(|plan| Comparison::new(plan, &self.limits));
         let mut tally = Tally::default();
         for centre in rows.len().saturating_sub(AROUND).max(1)..rows.len().saturating_sub(1) {
-            view.centre(centre, &view.differences.acceleration(centre), comparison.as_ref(), &mut tally);
+            view.centre(centre, &view.differences.acceleration(centre), comparison.as_mut(), &mut tally);
         }
         view.last(&mut tally);
         self.tally.merge(tally)
@@ -185,7 +185,7 @@ impl<const M: usize> View<'_, M> {
             }
             self.arrival(n, &recent, &rounding, comparison.as_mut(), &mut tally);
             if n > AROUND {
-                self.centre(n - AROUND, &recent.accelerations[0], comparison.as_ref(), &mut tally);
+                self.centre(n - AROUND, &recent.accelerations[0], comparison.as_mut(), &mut tally);
             }
         }
         tally
@@ -300,16 +300,16 @@ impl<const M: usize> View<'_, M> {
         &self,
         c: usize,
         acceleration: &Quotient<M>,
-        comparison: Option<&Comparison<M>>,
+        comparison: Option<&mut Comparison<M>>,
         tally: &mut Tally<M>,
     ) {
         let (limits, rows) = (self.differences.limits, self.differences.rows);
-        let mut corners = None;
+        let (mut corners, mut comparison) = (None, comparison);
         for k in 0..M {
             let value = acceleration.value[k].abs() - acceleration.rounding[k];
             let mut limit = limits.acceleration.of(k, acceleration.value[k]);
             if value > limit && limits.jump_beyond[k] > 0.0 {
-                let corners = *corners.get_or_insert_with(|| match comparison {
+                let corners = *corners.get_or_insert_with(|| match &mut comparison {
                     Some(comparison) => comparison.corners([&rows[c - 1], &rows[c], &rows[c + 1]]),
                     None if self.differences.looks_like_a_corner(c) => 1.0,
                     None => 0.0,

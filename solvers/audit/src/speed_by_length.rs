@@ -1,7 +1,7 @@
-//! The speed of a phase of limited jerk as a function of the length of the path from its anchor.
+//! The speed of a phase by the length of the path from its anchor, and the time to there.
 //!
-//! At constant jerk the time of a length is found by halving; where v² is a cubic polynomial of the length it is
-//! integrated.
+//! At constant jerk the time of a length is found by Newton's method in a bracket; where v² is a cubic polynomial of the length
+//! it is integrated.
 
 use super::phase_time::{kronrod, MOST_HALVINGS, RULES_AGREE};
 
@@ -19,10 +19,19 @@ pub struct Pace {
 /// The speed along a phase, counted from its anchor: where that is the end, time runs back.
 #[derive(Clone, Copy, Debug)]
 pub enum SpeedByLength {
+    Constant {
+        speed: f64,
+    },
     /// The state at the anchor.
-    Jerk { start: Pace, duration: f64 },
+    Jerk {
+        start: Pace,
+        duration: f64,
+    },
     /// v² by powers of the share of the length.
-    Cubic { c: [f64; 4], length: f64 },
+    Cubic {
+        c: [f64; 4],
+        length: f64,
+    },
 }
 
 impl SpeedByLength {
@@ -35,60 +44,53 @@ impl SpeedByLength {
         Self::Cubic { c, length }
     }
 
-    /// The motion after a length.
-    pub fn pace(&self, way: f64) -> Pace {
+    /// The time from the anchor to a length, and the motion there; not a number where it cannot be integrated.
+    pub fn after(&self, way: f64) -> (f64, Pace) {
         match self {
-            Self::Jerk { start, .. } => start.after(self.time(way)),
+            Self::Constant { speed } => (way / speed, Pace { v: *speed, a: 0.0, j: 0.0 }),
+            Self::Jerk { start, duration } => {
+                let time = time_at_jerk(start, *duration, way);
+                (time, start.after(time))
+            }
             Self::Cubic { c, length } => {
                 let x = way / length;
                 let slope = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]);
                 let bend = 2.0 * c[2] + 6.0 * c[3] * x;
                 let v = square(c, x).sqrt();
-                Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }
+                let time = integral(&|x: f64| length / square(c, x).sqrt(), 0.0, x, &mut { MOST_HALVINGS });
+                (time, Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) })
             }
         }
     }
+}
 
-    /// Time of the stretch between two lengths, in s; not a number where it cannot be integrated.
-    pub fn time_between(&self, from: f64, to: f64) -> f64 {
-        match self {
-            Self::Jerk { .. } => self.time(to) - self.time(from),
-            Self::Cubic { c, length } => {
-                let pace = |x: f64| length / square(c, x).sqrt();
-                integral(&pace, from / length, to / length, &mut { MOST_HALVINGS })
-            }
-        }
+/// Time at constant jerk from the anchor to a length; beyond the phase's own at its mean speed.
+fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
+    let whole = start.way(duration);
+    if way <= 0.0 {
+        return 0.0;
     }
-
-    /// Time at constant jerk from the anchor to a length; beyond the phase's own at its mean speed.
-    fn time(&self, way: f64) -> f64 {
-        let Self::Jerk { start, duration } = *self else { return f64::NAN };
-        let whole = start.way(duration);
-        if way <= 0.0 {
-            return 0.0;
-        }
-        if way >= whole {
-            return duration * (way / whole);
-        }
-        let (mut low, mut high) = (0.0, duration);
-        // From rest the time is as the cube root of the length.
-        let mut t = duration * (way / whole).cbrt();
-        for _ in 0..MOST_STEPS {
-            let miss = start.way(t) - way;
-            if miss > 0.0 {
-                high = t;
-            } else {
-                low = t;
-            }
-            let newton = t - miss / start.after(t).v;
-            let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
-            if next == t || next <= low || next >= high {
-                break;
-            }
-            t = next;
-        }
-        t
+    if way >= whole {
+        return duration * (way / whole);
     }
+    let (mut low, mut high) = (0.0, duration);
+    // From rest the time is as the cube root of the length.
+    let mut t = duration * (way / whole).cbrt();
+    for _ in 0..MOST_STEPS {
+        let miss = start.way(t) - way;
+        if miss > 0.0 {
+            high = t;
+        } else {
+            low = t;
+        }
+        let newton = t - miss / start.after(t).v;
+        let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+        if next == t || next <= low || next >= high {
+            break;
+        }
+        t = next;
+    }
+    t
 }
 
 impl Pace {
@@ -126,25 +128,25 @@ mod tests {
     #[test]
     fn from_rest_at_constant_jerk_the_length_grows_with_the_cube_of_the_time() {
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
-        let along = SpeedByLength::Jerk { start, duration: 2.0 };
+        let speed = SpeedByLength::Jerk { start, duration: 2.0 };
         for t in [1e-9, 1e-3, 0.5, 1.9, 2.0] {
             let t: f64 = t;
-            assert!((along.time_between(0.0, t.powi(3)) / t - 1.0).abs() < 1e-15, "{t}");
-            let pace = along.pace(t.powi(3));
+            let (time, pace) = speed.after(t.powi(3));
+            assert!((time / t - 1.0).abs() < 1e-15, "{t}");
             assert!((pace.v / (3.0 * t * t) - 1.0).abs() < 1e-14 && (pace.a / (6.0 * t) - 1.0).abs() < 1e-14);
         }
         // 1 % beyond the end takes 1 % more.
-        assert!((along.time_between(0.0, 8.08) - 2.02).abs() < 1e-14);
+        assert!((speed.after(8.08).0 - 2.02).abs() < 1e-14);
     }
 
     #[test]
     fn a_square_linear_in_the_length_is_constant_acceleration() {
         // v² = 25 + 60 s over 5 mm: v = 5 + 30 t.
-        let along = SpeedByLength::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
+        let speed = SpeedByLength::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
         for t in [0.01, 0.2, 0.4] {
             let way = 5.0 * t + 15.0 * t * t;
-            assert!((along.time_between(0.0, way) - t).abs() < 1e-12);
-            let Pace { v, a, j } = along.pace(way);
+            let (time, Pace { v, a, j }) = speed.after(way);
+            assert!((time - t).abs() < 1e-12);
             assert!((v - 5.0 - 30.0 * t).abs() < 1e-13 && (a - 30.0).abs() < 1e-13 && j.abs() < 1e-12);
         }
     }

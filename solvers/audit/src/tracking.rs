@@ -6,9 +6,9 @@
 
 use rayon::prelude::*;
 
-use super::curve::{distance, length, Followed};
+use super::curve::{distance, from_to, inner, length, Curves, Followed};
 use super::moves::Programmed;
-use super::nearest::{Place, Search};
+use super::nearest::{Found, Place, Search};
 use super::profile_clock::{ProfileClock, Reader};
 use super::setpoints::Row;
 use super::{tell, Limits, Seen, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
@@ -19,6 +19,11 @@ const BLOCK: usize = 4096;
 /// After so many setpoints on end that are off the path, the rest of their block counts as off by as much as the
 /// last: the verdict is clear, and searching on would take for ever.
 const MOST_ASTRAY: u32 = 64;
+
+/// Steps of Newton's method from a guess, and the length of the last one, in mm: the error after it is about the square of
+/// that over a radius of curvature.
+const MOST_GUESSES: usize = 6;
+const SETTLED: f64 = 1e-7;
 
 /// A setpoint may lie this share of its step from its place on the path: what sampling promises.
 const STEP_SHARE: f64 = 1e-6;
@@ -142,6 +147,9 @@ struct Finder<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
+    curves: Curves<'a, M>,
+    /// How far u went to the last setpoint, where that was on the same piece.
+    step: f64,
     /// No setpoint gets farther in a period or two, in mm, unless it breaks a limit.
     reach: f64,
 }
@@ -149,7 +157,9 @@ struct Finder<'a, const M: usize> {
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
-        Self { plan, limits, profile, reach: 2.0 * limits.period * length(&limits.velocity.greater()) }
+        let curves = Curves::new(plan.path.pieces);
+        let reach = 2.0 * limits.period * length(&limits.velocity.greater());
+        Self { plan, limits, profile, curves, step: 0.0, reach }
     }
 
     fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest {
@@ -168,19 +178,53 @@ impl<'a, const M: usize> Finder<'a, M> {
             return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
         let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
-        let most = path.curve::<M>(from.piece).magnitude();
-        let magnitude = row.q.iter().fold(most, |most, q| most.max(q.abs()));
+        let most = self.curves.get(from.piece).magnitude();
+        let magnitude = row.q.iter().fold(most, |most, q| q.abs().max(most));
         let rounding = ROUNDINGS * EPS * magnitude * (path.axes as f64).sqrt();
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
-        let judge = |place: Place| {
+        let close = PLACE_TOLERANCE + rounding;
+        let guess = known.filter(|_| self.profile.is_some()).and_then(|_| self.guess(from, &row.q, close));
+        let mut judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));
             (late - rounding).max(0.0)
         };
-        let close = PLACE_TOLERANCE + rounding;
-        let mut search = Search { path, reach: self.reach, close, judge, allowed };
-        let found = search.next_place(from, &row.q);
+        let guess = guess.map(|(place, distance)| Found { place, distance, error: judge(place) });
+        let found = match guess.filter(|guess| guess.error <= allowed) {
+            Some(found) => found,
+            None => Search { path, reach: self.reach, close, judge, allowed }.next_place(from, &row.q),
+        };
+        let place = found.place;
+        self.step = if place.piece == from.piece { place.u - from.u } else { 0.0 };
         let late = if found.error.is_finite() { found.error } else { 0.0 };
-        Nearest { place: found.place, magnitude, off: found.distance - rounding, late, allowed }
+        Nearest { place, magnitude, off: found.distance - rounding, late, allowed }
+    }
+
+    /// The place of a setpoint by Newton's method from where the last step leads, on the same piece or the next one, with its
+    /// distance; none where that strays or is not close.
+    fn guess(&mut self, from: Place, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
+        let (mut piece, mut u) = (from.piece, from.u + self.step);
+        let mut curve = self.curves.get(piece);
+        for _ in 0..MOST_GUESSES {
+            if u > curve.width() {
+                piece += 1;
+                if piece > from.piece + 1 || piece == self.plan.path.len() {
+                    return None;
+                }
+                (curve, u) = (self.curves.get(piece), 0.0);
+            }
+            let [point, tangent] = curve.place(u);
+            let (away, square) = (from_to(&point, q), inner(&tangent, &tangent));
+            let along = inner(&away, &tangent);
+            let (du, beside_sq) = (along / square, inner(&away, &away) - along * along / square);
+            u += du;
+            if du.abs() * square.sqrt() <= SETTLED {
+                let least = if piece == from.piece { from.u } else { 0.0 };
+                let distance = beside_sq.max(0.0).sqrt();
+                let good = least <= u && u <= curve.width() && distance <= close;
+                return good.then_some((Place { piece, u }, distance));
+            }
+        }
+        None
     }
 }
 

@@ -30,6 +30,10 @@ const K: f64 = {
     ratio * ratio / (2 * N + 1) as f64
 };
 
+/// Parts of a panel on which two and three nodes are as good as eight on the whole of it, where that is 1e-13.
+const TWO_NODES: f64 = 2e-3;
+const THREE_NODES: f64 = 3e-2;
+
 /// An interval that needs more equal panels is halved.
 const UNIFORM: f64 = 4.0;
 
@@ -180,6 +184,22 @@ pub fn quadrature<F: Integrand>(f: &F, a: f64, b: f64) -> f64 {
         sum += W[i] * (f.at(middle - half * X[i]) + f.at(middle + half * X[i]));
     }
     half * sum
+}
+
+/// The same where [a, b] is a part of a panel of the width `panel`: fewer nodes do on a short part, because the error of a rule
+/// of m nodes shrinks with the power 2 m + 1 of the part.
+#[inline]
+pub fn quadrature_of_part<F: Integrand>(f: &F, a: f64, b: f64, panel: f64) -> f64 {
+    let (middle, half, part) = (0.5 * (a + b), 0.5 * (b - a), ((b - a) / panel).abs());
+    if part < TWO_NODES {
+        let x = half * 0.577_350_269_189_625_8;
+        return half * (f.at(middle - x) + f.at(middle + x));
+    }
+    if part < THREE_NODES {
+        let x = half * 0.774_596_669_241_483_4;
+        return half * (5.0 * (f.at(middle - x) + f.at(middle + x)) + 8.0 * f.at(middle)) / 9.0;
+    }
+    quadrature(f, a, b)
 }
 
 /// N_table: the number of equal panels that integrate over `width` with an error of at most `error`; not

@@ -4,11 +4,14 @@
 //! Source: Cheatham 2007, sections 3.2.3 and 3.2.4 (equations 3.11–3.14), after Sarfraz. S may be the integral of any
 //! `Table`, S' its integrand; d = 1/S' is the slope of u(S).
 
-use crate::arc_length::{quadrature, Integrand, Node, Table};
+use crate::arc_length::{quadrature, quadrature_of_part, Integrand, Node, Table};
 
 /// Greatest number of rounds. Each makes the miss four times smaller, or a halving of the bracket follows; so fewer are
 /// needed from the width of a panel to its last digit.
 pub const MAX_ITERATIONS: u32 = 200;
+
+/// An end of the bracket within this part of the panel is the start of the next quadrature.
+const NEAR: f64 = 0.02;
 
 /// A parameter and how it was found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,6 +48,7 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located
     if s >= high.sum {
         return Located { u: high.u, ..Located::default() };
     }
+    let panel = high.u - low.u;
     let (mut best, mut halve, mut last_miss) = (Located::default(), false, f64::INFINITY);
     for iterations in 1..=MAX_ITERATIONS {
         let middle = 0.5 * (low.u + high.u);
@@ -53,7 +57,13 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located
         if !(low.u < u && u < high.u) {
             u = middle;
         }
-        let sum = start.sum + quadrature(&table.f, start.u, u);
+        // From the nearer end of the bracket, once that has come near.
+        let near = if u - low.u < high.u - u { low } else { high };
+        let sum = if (u - near.u).abs() < NEAR * panel {
+            near.sum + quadrature_of_part(&table.f, near.u, u, panel)
+        } else {
+            start.sum + quadrature(&table.f, start.u, u)
+        };
         let miss = (sum - s).abs();
         best = if miss < last_miss || iterations == 1 { Located { u, miss, iterations } } else { best };
         best.iterations = iterations;

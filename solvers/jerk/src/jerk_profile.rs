@@ -1,7 +1,7 @@
 //! Profiles of limited jerk as columns: phases along the pieces of a path, in the order of the path, from sections of
 //! constant jerk (`s_curve`) or the spline w(s) of the jerk-limited planner.
 //!
-//! Two laws, of `feedplan.profile.ArcKind`: the jerk along the path is constant, or v² is a cubic of the arc length.
+//! Two laws, of `feedplan.profile.PhaseLaw`: the jerk along the path is constant, or v² is a cubic of the arc length.
 //! Both stay what they are where a phase is cut at the end of a piece. Lengths in mm, times in s.
 
 use std::ops::Range;

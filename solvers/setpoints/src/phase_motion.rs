@@ -200,7 +200,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         }
         let step = period / phase.duration;
         let (part, clock_work) = match &self.clock {
-            Clock::Even(even) => (even.part(self.from_start(done), done, left), Located::default()),
+            Clock::Even(even) => (even.part(self.counts_from_start(done), done, left), Located::default()),
             Clock::Jerk(jerk) => (jerk.part(done, left), Located::default()),
             Clock::Cubic(cubic) => cubic.part(done, JERK_STEP_ERROR * step),
             Clock::Line(line) => {
@@ -224,7 +224,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
     }
 
     /// Whether the part of the measure is counted from the start of the phase: always from the side where it grows slower.
-    fn from_start(&self, done: f64) -> bool {
+    fn counts_from_start(&self, done: f64) -> bool {
         match &self.measure {
             Measure::Axis(way) => way.from_start,
             _ => done <= 0.5,
@@ -257,7 +257,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
             Measure::Axis(way) => way.part(&self.phase, u),
             Measure::Length { before, total } => {
                 let share = (self.path.length(law, u) - before) / total;
-                Part { from_start: true, share: share.clamp(0.0, 1.0) }.from_nearer_end()
+                Part { from_start: true, share: share.clamp(0.0, 1.0) }.nearer_end()
             }
             Measure::Parameter if u - u0 <= u1 - u => Part { from_start: true, share: (u - u0) / (u1 - u0) },
             Measure::Parameter => Part { from_start: false, share: (u1 - u) / (u1 - u0) },
@@ -369,7 +369,7 @@ struct Part {
 }
 
 impl Part {
-    fn from_nearer_end(self) -> Self {
+    fn nearer_end(self) -> Self {
         if self.share <= 0.5 {
             self
         } else {
@@ -386,11 +386,13 @@ fn state_of(found: Located) -> State {
 #[inline(always)]
 fn rates_of<const M: usize>(q: &[[f64; M]; 4], du: f64, ddu: f64, dddu: f64) -> Rates<M> {
     let p = du * du;
-    Rates {
-        velocity: q[1].map(|q| q * du),
-        acceleration: std::array::from_fn(|l| q[1][l] * ddu + q[2][l] * p),
-        jerk: std::array::from_fn(|l| q[1][l] * dddu + du * (3.0 * q[2][l] * ddu + q[3][l] * p)),
+    let mut rates = Rates { velocity: [0.0; M], acceleration: [0.0; M], jerk: [0.0; M] };
+    for k in 0..M {
+        rates.velocity[k] = q[1][k] * du;
+        rates.acceleration[k] = q[1][k] * ddu + q[2][k] * p;
+        rates.jerk[k] = q[1][k] * dddu + du * (3.0 * q[2][k] * ddu + q[3][k] * p);
     }
+    rates
 }
 
 /// Why nothing can follow a phase whose numbers are finite.

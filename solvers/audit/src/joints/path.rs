@@ -257,11 +257,11 @@ impl<const M: usize> Piece<'_, M> {
     /// First to third derivatives of the joints by u, and of the way, each with how wrong it may be.
     pub fn bends(&self, u: f64, work: &mut Work) -> Bends<M> {
         let tip = self.curve.at(u);
-        let slopes = self.curve.derivatives(u);
+        let (slopes, sizes) = (self.curve.derivatives(u), self.curve.derivative_sizes());
         self.fill(&mut work.bends, |k| {
             let term = |order: usize| match order {
                 0 => (tip[k], self.size),
-                order => (slopes[order - 1].0[k], slopes[order - 1].1[k]),
+                order => (slopes[order - 1][k], sizes[order - 1][k]),
             };
             Jet {
                 value: std::array::from_fn(|order| term(order).0),
@@ -274,8 +274,8 @@ impl<const M: usize> Piece<'_, M> {
         for k in 0..M {
             let scale = self.way_scale[k];
             let axis = Jet::<3> {
-                value: std::array::from_fn(|order| scale * slopes[order].0[k]),
-                error: std::array::from_fn(|order| TIP_ROUNDINGS * scale * slopes[order].1[k]),
+                value: std::array::from_fn(|order| scale * slopes[order][k]),
+                error: std::array::from_fn(|order| TIP_ROUNDINGS * scale * sizes[order][k]),
             };
             let own = axis.times(&axis);
             for order in 0..3 {

@@ -10,14 +10,19 @@ use super::phase_motion::ROUNDING;
 use super::profile::JointAudit;
 use super::speed_by_length::{paces, Pace};
 use crate::curve::length;
+use crate::peak::peaks;
 use crate::phases::{is_by_length, PATH_JERK};
 use crate::{Check, Seen, Tally, PASS_EXCESS};
 
-/// Steps of a phase: those of phases up to so many servo periods long.
-const STEPS: [(usize, f64); 3] = [(10, 10.0), (80, 80.0), (640, f64::INFINITY)];
+/// Steps of a phase that covers its whole piece, for each degree, and at least.
+const STEPS: f64 = 4.0;
+const LEAST: usize = 2;
 
 /// Joints that leave a joint at a smaller angle than this, in rad, pass without a corner.
 const SMOOTH: f64 = 1e-6;
+
+/// Shares of the limits of acceleration and jerk that a place uses.
+type Use<const M: usize> = [[f64; M]; 2];
 
 /// A rate of each joint, and how wrong it may be.
 type Rate<const M: usize> = ([f64; M], [f64; M]);
@@ -92,19 +97,53 @@ impl<const M: usize> JointAudit<'_, M> {
         if is_silent {
             return;
         }
-        let periods = phases.duration[phase] / self.limits.period;
-        let Some((steps, _)) = STEPS.into_iter().find(|&(_, most)| periods < most) else { return };
         let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
+        let covered = STEPS * piece.curve.turns() as f64 * (u1 - u0) / piece.width;
+        let steps = (covered.ceil() as usize).max(LEAST);
         let share = |i: usize| i as f64 / steps as f64;
         let u: Vec<f64> = (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
-        for (u, pace) in u.iter().zip(paces(piece, phases, phase, &u)) {
-            let (jerk, error) = rates(piece, *u, |_| pace, work).jerk;
-            tally.samples += 1;
-            for k in 0..joints {
-                let value = jerk[k].abs() - error[k];
-                tally.offer(Check::Jerk, k, value, self.limits.jerk[k], start + pace.time, piece.line);
+        let used: Vec<Use<M>> = u
+            .iter()
+            .zip(paces(piece, phases, phase, &u))
+            .map(|(&u, pace)| self.look(piece, u, pace, start, work, tally))
+            .collect();
+        for i in 1..steps {
+            let of = |i: usize| used[i].iter().flatten().copied();
+            let checks = [Check::Acceleration, Check::Jerk].into_iter();
+            let worst = checks.flat_map(|check| (0..M).map(move |k| (check, k)));
+            let worst = worst.map(|(check, k)| tally.get(check, k).ratio);
+            for x in peaks([of(i - 1), of(i), of(i + 1)], worst) {
+                let at = u[i] + 0.5 * x * (u[i + 1] - u[i - 1]);
+                let pace = paces(piece, phases, phase, &[u0, at, u1])[1];
+                self.look(piece, at, pace, start, work, tally);
             }
         }
+    }
+
+    /// Offers acceleration and jerk at a place; the shares of the limits that they use.
+    fn look(
+        &self,
+        piece: &Piece<M>,
+        u: f64,
+        pace: Pace,
+        start: f64,
+        work: &mut Work,
+        tally: &mut Tally<M>,
+    ) -> Use<M> {
+        let (limits, time) = (&self.limits, start + pace.time);
+        let Rates { acceleration, jerk, .. } = rates(piece, u, |_| pace, work);
+        tally.samples += 1;
+        let mut used = [[0.0; M]; 2];
+        for k in 0..self.path.joints {
+            let strongest = limits.acceleration.of(k, acceleration.0[k]);
+            let of = [(Check::Acceleration, &acceleration, strongest), (Check::Jerk, &jerk, limits.jerk[k])];
+            for (row, (check, rate, limit)) in of.into_iter().enumerate() {
+                let value = rate.0[k].abs() - rate.1[k];
+                used[row][k] = value.max(0.0).copysign(rate.0[k]) / limit;
+                tally.offer(check, k, value, limit, time, piece.line);
+            }
+        }
+        used
     }
 
     /// A change of the acceleration along the path over a time that means nothing to any joint: in that time, or in a servo

@@ -9,11 +9,11 @@ use super::path::{JointPath, Piece, Place, TURN};
 use super::phase_jerk::audit_jerk;
 use super::phase_motion::{motion, State, ROUNDING};
 use crate::curve::length;
-use crate::phases::Phases;
+use crate::phases::{is_by_length, Phases};
 use crate::{Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
 
-/// Places of a phase, as shares of the variable in which √p would be linear if p were: close at the ends, where accelerations
-/// have their extremes.
+/// Places of a phase, as shares of the variable in which √p is linear where p is: close at the ends, where accelerations have
+/// their extremes.
 const PLACES: [f64; 11] = [0.0, 1.0 / 64.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 63.0 / 64.0, 1.0];
 
 /// Phases measured at once: the memory for their places stays below some 30 MB.
@@ -82,7 +82,8 @@ pub(super) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: S
                 || audit.path.work(),
                 |work, &phase| {
                     let piece: Piece<M> = audit.path.piece(audit.phases.piece[phase] as usize);
-                    let places: Vec<_> = places(&audit.phases, phase).map(|u| piece.place(u, work)).into();
+                    let places = places(&audit.phases, phase, &piece);
+                    let places: Vec<_> = places.into_iter().map(|u| piece.place(u, work)).collect();
                     let states = motion(&piece, &audit.phases, phase, &places, places.len() - 1);
                     let (own, mut tally) = (Measured { phase, piece, places, states }, Tally::default());
                     audit.phase(&own, &mut tally);
@@ -104,21 +105,29 @@ pub(super) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: S
     tally
 }
 
-/// u at the places of a phase.
-fn places(phases: &Phases, phase: usize) -> [f64; 11] {
+/// u at the places of a phase. Where the speed is known by the length, `phase_jerk` measures the accelerations as well.
+fn places<const M: usize>(phases: &Phases, phase: usize, piece: &Piece<M>) -> Vec<f64> {
     let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
+    if is_by_length(phases.kind[phase]) {
+        let covered = piece.curve.turns() as f64 * (u1 - u0) / piece.width;
+        let steps = (covered.ceil() as usize).max(2);
+        let share = |i: usize| i as f64 / steps as f64;
+        return (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
+    }
     let (near, both) = match (phases.p0[phase].sqrt(), phases.p0[phase].sqrt() + phases.p1[phase].sqrt()) {
-        (near, both) if both.is_finite() && both > 0.0 => (near, both),
+        (near, both) if both > 0.0 => (near, both),
         _ => (1.0, 2.0),
     };
-    PLACES.map(|x| {
-        let share = x * (2.0 * near + (both - 2.0 * near) * x) / both;
-        if x == 1.0 {
-            u1
-        } else {
-            u0 + (u1 - u0) * share.min(1.0)
-        }
-    })
+    PLACES
+        .map(|x| {
+            let share = x * (2.0 * near + (both - 2.0 * near) * x) / both;
+            if x == 1.0 {
+                u1
+            } else {
+                u0 + (u1 - u0) * share.min(1.0)
+            }
+        })
+        .into()
 }
 
 /// Numbers, and phases that cover every piece in order; which phases can be measured.

@@ -6,8 +6,9 @@
 //! |---|---|---|
 //! | axis acceleration, axis velocity | v_k² + 2 a Δq_k | q'_k² |
 //! | parameter acceleration | p + 2 s d | 1 |
-//! | feed, speed line | v² linear in d | the square of what counts of C' |
-//! | path jerk, speed cubic | v² by the length from the anchor | the square of C' |
+//! | feed of shares, speed line | v² linear in d | the square of what counts of C' |
+//!
+//! Where v is by the length of the path see `phase_by_length`.
 
 use crate::curve::{inner, length};
 
@@ -20,8 +21,6 @@ pub enum Law {
     Parameter { start: f64, slope: f64 },
     /// N changes by `change_sq` to the other end, evenly with d.
     Speed { start_sq: f64, change_sq: f64 },
-    /// N is by the length of the path: see `PhaseMotion::with_speed`.
-    Length,
 }
 
 impl Law {

@@ -121,45 +121,27 @@ impl<'a, const M: usize> Speed<'a, M> {
         }
     }
 
-    /// h(t), and ω(t), by Horner's scheme from the nearer end.
+    /// h(t), and ω(t), by the scheme of Volk and Schumaker: sums of the terms' positive weights, without a division.
     #[inline(always)]
     fn numerator(&self, t: f64) -> ([f64; M], f64) {
         let s = 1.0 - t;
-        let n = self.h.len() - 1;
-        let (mut h, mut omega);
-        if t <= 0.5 {
-            let ratio = t / s;
-            h = self.h[n];
-            for row in self.h[..n].iter().rev() {
-                for k in 0..M {
-                    h[k] = h[k] * ratio + row[k];
-                }
-            }
-            omega = 0.0;
-            for value in self.omega.iter().rev() {
-                omega = omega * ratio + value;
-            }
-        } else {
-            let ratio = s / t;
-            h = self.h[0];
-            for row in &self.h[1..] {
-                for k in 0..M {
-                    h[k] = h[k] * ratio + row[k];
-                }
-            }
-            omega = 0.0;
-            for value in self.omega {
-                omega = omega * ratio + value;
+        let mut h = self.h[0];
+        let mut power = 1.0;
+        for row in &self.h[1..] {
+            power *= t;
+            for k in 0..M {
+                h[k] = h[k] * s + power * row[k];
             }
         }
-        let base = t.max(s);
-        if self.omega.is_empty() {
-            omega = 1.0;
-        } else {
-            omega *= base.powi(self.omega.len() as i32 - 1);
+        let mut omega = 1.0;
+        if let Some((first, rest)) = self.omega.split_first() {
+            (omega, power) = (*first, 1.0);
+            for value in rest {
+                power *= t;
+                omega = omega * s + power * value;
+            }
         }
-        let scale = base.powi(n as i32);
-        (h.map(|value| value * scale), omega)
+        (h, omega)
     }
 }
 

@@ -310,14 +310,14 @@ impl SpeedLine {
         };
         let mut made = Self { law: phase.law, line, rest, times: vec![], time_error: 0.0 };
         let mut times = vec![];
-        made.time_error = match made.from_rest(path) {
+        made.time_error = match made.time_from_rest(path) {
             Some(f) => fill(f, (0.0, (u1 - u0).sqrt()), &mut times),
             None => fill(path.rate(phase.law, line), (u0, u1), &mut times),
         };
         Self { times, ..made }
     }
 
-    fn from_rest<'a, const M: usize>(&self, path: &'a PiecePath<M>) -> Option<FromRest<'a, M>> {
+    fn time_from_rest<'a, const M: usize>(&self, path: &'a PiecePath<M>) -> Option<FromRest<'a, M>> {
         self.rest.map(|(place, sign)| FromRest {
             source: path.rate(self.law, self.line).source,
             place,
@@ -328,7 +328,7 @@ impl SpeedLine {
 
     /// The place when these parts of the duration are done and left, within an error in parts of the duration.
     pub fn place<const M: usize>(&self, path: &PiecePath<M>, done: f64, left: f64, error: f64) -> Located {
-        match self.from_rest(path) {
+        match self.time_from_rest(path) {
             Some(f) => {
                 let found = self.invert(f, if f.sign > 0.0 { done } else { left }, error);
                 Located { u: f.u(found.u), ..found }
@@ -346,7 +346,7 @@ impl SpeedLine {
 
     /// The part of the duration that has passed at u.
     pub fn done<const M: usize>(&self, path: &PiecePath<M>, u: f64) -> f64 {
-        match self.from_rest(path) {
+        match self.time_from_rest(path) {
             Some(f) => {
                 let table = Table { f, nodes: &self.times };
                 let done = table.integral((u - f.place).abs().sqrt()) / table.total();

@@ -84,12 +84,16 @@ impl<'a, const M: usize> PiecePath<'a, M> {
 
     /// The length from the start of the piece to u.
     pub(super) fn length(&self, law: PhaseLaw, u: f64) -> f64 {
-        self.of(law).table().integral(u)
+        let lengths = self.of(law);
+        lengths.even.map_or_else(|| lengths.table().integral(u), |even| even * u)
     }
 
     /// The place at a length, with the proven error of the table in its miss.
     pub(super) fn locate(&self, law: PhaseLaw, length: f64, tolerance: f64) -> Located {
         let lengths = self.of(law);
+        if let Some(even) = lengths.even {
+            return Located { u: length / even, ..Located::default() };
+        }
         let table = lengths.table();
         let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()));
         Located { miss: found.miss + lengths.error, ..found }
@@ -115,13 +119,13 @@ impl<'a, const M: usize> PiecePath<'a, M> {
 
     /// The length per u, and its first two derivatives, where q and its derivatives are known.
     pub(super) fn slopes(&self, law: PhaseLaw, u: f64, q: &[[f64; M]; 4]) -> [f64; 3] {
-        let of_axes = |q: [[f64; M]; 4]| {
+        let of_axes = |q: &[[f64; M]; 4]| {
             let bend = 2.0 * (dot(&q[2], &q[2]) + dot(&q[1], &q[3]));
             [dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]), bend]
         };
         let [square, slope, bend] = match self.counts(law).1 {
-            Counts::Axes => of_axes(*q),
-            Counts::Shares(share) => of_axes(q.map(|q| times(share, &q))),
+            Counts::Axes => of_axes(q),
+            Counts::Shares(share) => of_axes(&q.map(|q| times(share, &q))),
             Counts::Tip(tip) => tip.derivatives().map(|d| d.value(u / self.piece.width)),
         };
         // A square that touches 0 may be a rounding error below it.
@@ -145,14 +149,22 @@ impl<'a, const M: usize> PiecePath<'a, M> {
 
     /// The place a length of the axes ahead of u, within `tolerance` mm, by Newton–Raphson.
     pub fn advance(&self, u: f64, step: f64, tolerance: f64) -> Located {
-        let table = self.lengths(AXES, &Counts::Axes).table();
+        let lengths = self.lengths(AXES, &Counts::Axes);
+        if let Some(even) = lengths.even {
+            return Located { u: u + step / even, ..Located::default() };
+        }
+        let table = lengths.table();
         newton::advance(&table, (u, table.integral(u)), step, tolerance).0
     }
 
     /// No length of the axes is found more closely than this, and the proven error of its table.
     pub fn length_errors(&self) -> [f64; 2] {
         let lengths = self.lengths(AXES, &Counts::Axes);
-        [lengths.table().rounding(), lengths.error]
+        let rounding = match lengths.even {
+            Some(even) => 4.0 * f64::EPSILON * even * self.piece.width,
+            None => lengths.table().rounding(),
+        };
+        [rounding, lengths.error]
     }
 }
 
@@ -177,6 +189,17 @@ impl<const M: usize> Speeds<M> {
         }
     }
 
+    /// The length per u of a line, whose control points are even.
+    fn even(&self) -> Option<f64> {
+        match self {
+            Self::Axes { coefficients, width } => {
+                let line = coefficients.hodograph().len() == 1 && coefficients.denominator().is_empty();
+                line.then(|| norm(&coefficients.hodograph()[0]) / width)
+            }
+            Self::Tip { .. } => None,
+        }
+    }
+
     /// Over the root of v².
     fn rate(&self, foot: f64, line: Line) -> Rate<'_, M> {
         let source = match self {
@@ -193,6 +216,8 @@ impl<const M: usize> Speeds<M> {
 /// A table of a length with its proven error.
 struct Lengths<const M: usize> {
     speeds: Speeds<M>,
+    /// The length per u, where it is the same everywhere: on lines.
+    even: Option<f64>,
     foot: f64,
     nodes: Vec<Node>,
     error: f64,
@@ -201,9 +226,12 @@ struct Lengths<const M: usize> {
 impl<const M: usize> Lengths<M> {
     fn new(piece: &Piece<M>, counts: &Counts<M>, foot: f64) -> Self {
         let speeds = Speeds::new(piece, counts);
-        let mut nodes = vec![];
-        let error = fill(speeds.rate(foot, Line::ONE), (0.0, piece.width), &mut nodes);
-        Self { speeds, foot, nodes, error }
+        let even = speeds.even();
+        let (mut nodes, mut error) = (vec![], 0.0);
+        if even.is_none() {
+            error = fill(speeds.rate(foot, Line::ONE), (0.0, piece.width), &mut nodes);
+        }
+        Self { speeds, even, foot, nodes, error }
     }
 
     fn table(&self) -> Table<'_, Rate<'_, M>> {

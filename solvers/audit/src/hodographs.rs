@@ -1,0 +1,194 @@
+//! Position and derivatives of a piece of any degree at many places, by the Bernstein coefficients of all of them.
+//!
+//! C = P_0 + N/ω, polynomial where ω = 1. The coefficients of the derivatives of N and ω are differences of theirs; sums of
+//! positive weights of these lose no digits (scheme of Schumaker and Volk 1986). The quotient rule makes the derivatives of C.
+
+use super::curve::{length, vector_of};
+use super::polygon::{Polygon, MOST};
+
+/// Coefficients of a function of the piece, times binomials.
+type Rows<const M: usize> = [[f64; M]; MOST + 1];
+
+#[derive(Clone, Debug)]
+pub struct Hodographs<const M: usize> {
+    start: [f64; M],
+    degree: usize,
+    rational: bool,
+    /// Of N and its first three derivatives by t, and of ω and its own.
+    rows: [Rows<M>; 4],
+    weights: [Rows<1>; 4],
+    /// What the rounding of the first three derivatives is relative to.
+    sizes: [[f64; M]; 3],
+    /// The greatest lengths of the second to the fourth derivative; infinite on rational pieces.
+    bounds: [f64; 3],
+}
+
+impl<const M: usize> Hodographs<M> {
+    pub fn new(polygon: &Polygon<M>) -> Self {
+        let (steps, weights) = (polygon.steps(), polygon.weights());
+        let (degree, rational) = (steps.len(), polygon.is_rational());
+        let (mut ways, mut longest) = ([[0.0; M]; MOST + 1], [0.0_f64; M]);
+        for (i, step) in steps.iter().enumerate() {
+            for k in 0..M {
+                ways[i + 1][k] = ways[i][k] + step[k];
+                longest[k] = longest[k].max(step[k].abs());
+            }
+        }
+        let mut of_weights = [[0.0]; MOST + 1];
+        let mut ratio = 1.0;
+        if rational {
+            for i in 0..=degree {
+                ways[i] = vector_of(|k| weights[i] * ways[i][k]);
+                of_weights[i] = [weights[i]];
+            }
+            let least = weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
+            ratio = degree as f64 * weights.iter().fold(0.0_f64, |most, w| most.max(*w)) / least;
+        }
+        let (mut rows, mut bounds) = derivatives(ways, degree);
+        if !rational {
+            // From the steps themselves: differences of sums of them lose digits.
+            let mut own = [[0.0; M]; MOST + 1];
+            own[..degree].copy_from_slice(steps);
+            let scale = degree as f64;
+            let (slopes, lengths) = derivatives(own, degree.saturating_sub(1));
+            bounds = lengths.map(|length| scale * length);
+            for order in 1..4 {
+                for i in 0..degree {
+                    rows[order][i] = vector_of(|k| scale * slopes[order - 1][i][k]);
+                }
+            }
+        }
+        let mut scale = 0.5;
+        let sizes = std::array::from_fn(|order| {
+            scale *= 2.0 * ratio * degree.saturating_sub(order) as f64;
+            longest.map(|step| scale * step)
+        });
+        Self {
+            start: polygon.start,
+            degree,
+            rational,
+            rows,
+            weights: derivatives(of_weights, degree).0,
+            sizes,
+            bounds: if rational { [f64::INFINITY; 3] } else { [bounds[1], bounds[2], bounds[3]] },
+        }
+    }
+
+    /// C, counted from the start of the piece, and its first R − 1 derivatives by t, where `rest` is 1 − t.
+    #[inline(always)]
+    fn local<const R: usize>(&self, t: f64, rest: f64) -> [[f64; M]; R] {
+        let mut c = [[0.0; M]; R];
+        for order in 0..R.min(self.degree + 1) {
+            c[order] = sum(&self.rows[order][..=self.degree - order], t, rest);
+        }
+        if self.rational {
+            let mut w = [0.0; R];
+            for order in 0..R.min(self.degree + 1) {
+                [w[order]] = sum(&self.weights[order][..=self.degree - order], t, rest);
+            }
+            for order in 0..R {
+                let mut binomial = 1.0;
+                for i in 1..=order {
+                    binomial *= (order + 1 - i) as f64 / i as f64;
+                    for k in 0..M {
+                        c[order][k] -= binomial * w[i] * c[order - i][k];
+                    }
+                }
+                for k in 0..M {
+                    c[order][k] /= w[0];
+                }
+            }
+        }
+        c
+    }
+
+    /// C at t.
+    #[inline]
+    pub fn at(&self, t: f64, rest: f64) -> [f64; M] {
+        let [way] = self.local::<1>(t, rest);
+        vector_of(|k| self.start[k] + way[k])
+    }
+
+    /// C and its first R − 1 derivatives by t.
+    #[inline]
+    pub fn derivatives<const R: usize>(&self, t: f64, rest: f64) -> [[f64; M]; R] {
+        let mut c = self.local::<R>(t, rest);
+        for k in 0..M {
+            c[0][k] += self.start[k];
+        }
+        c
+    }
+
+    /// What the rounding of the first three derivatives is relative to.
+    pub fn sizes(&self) -> &[[f64; M]; 3] {
+        &self.sizes
+    }
+
+    /// The greatest lengths of the second to the fourth derivative; infinite on rational pieces.
+    pub fn bounds(&self) -> [f64; 3] {
+        self.bounds
+    }
+}
+
+/// Σ rows_i t^i rest^(n − i).
+#[inline(always)]
+fn sum<const M: usize>(rows: &[[f64; M]], t: f64, rest: f64) -> [f64; M] {
+    let (mut value, mut power) = (rows[0], 1.0);
+    for row in &rows[1..] {
+        power *= t;
+        for k in 0..M {
+            value[k] = value[k] * rest + power * row[k];
+        }
+    }
+    value
+}
+
+/// The coefficients, times binomials, of a function of this degree and of its derivatives up to order 3, and the greatest lengths
+/// of its coefficients of each order.
+fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize) -> ([Rows<M>; 4], [f64; 4]) {
+    let (mut found, mut lengths) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 4]);
+    for order in 0..4.min(degree + 1) {
+        let count = degree - order;
+        let mut binomial = 1.0;
+        for i in 0..=count {
+            found[order][i] = vector_of(|k| binomial * rows[i][k]);
+            lengths[order] = f64::max(lengths[order], length(&rows[i]));
+            binomial *= (count - i) as f64 / (i + 1) as f64;
+        }
+        for i in 0..count {
+            rows[i] = vector_of(|k| count as f64 * (rows[i + 1][k] - rows[i][k]));
+        }
+    }
+    (found, lengths)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::distance;
+
+    #[test]
+    fn places_are_those_of_the_polygon_and_each_derivative_is_that_of_the_one_before() {
+        let points = [[1000.0, 1.0], [1002.0, 3.0], [1005.0, -1.0], [1006.0, 2.0], [1009.0, 9.0]];
+        for weights in [&[][..], &[1.0, 0.5, 3.0, 2.0, 0.7]] {
+            let polygon = Polygon::new(points.into_iter(), weights);
+            let hodographs = Hodographs::new(&polygon);
+            for t in [0.0, 0.1, 0.4, 0.6, 0.9, 1.0] {
+                assert!(distance(&hodographs.at(t, 1.0 - t), &polygon.at(t)) < 1e-12, "{t}");
+            }
+            for t in [0.1, 0.4, 0.6, 0.9] {
+                let h = 1e-5;
+                let [before, here, after] =
+                    [t - h, t, t + h].map(|t| hodographs.derivatives::<4>(t, 1.0 - t));
+                for order in 0..3 {
+                    for k in 0..2 {
+                        let slope = (after[order][k] - before[order][k]) / (2.0 * h);
+                        let scale = 1000.0 + here[order + 1].map(f64::abs).iter().sum::<f64>();
+                        assert!((slope - here[order + 1][k]).abs() < 1e-7 * scale, "{order} at {t}");
+                    }
+                }
+                assert!(!weights.is_empty() || crate::curve::length(&here[2]) <= hodographs.bounds()[0]);
+            }
+        }
+    }
+}
