@@ -50,13 +50,13 @@ pub fn to_segment<const D: usize>(a: &[f64; D], b: &[f64; D], p: &[f64; D]) -> f
 pub fn dense<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>) -> f64 {
     const NEAR: usize = 3;
     let (mut worst, mut samples) = (0.0f64, Vec::new());
-    for (piece, stretch) in smooth.curve.pieces().zip(&smooth.stretches) {
+    for (piece, covered) in smooth.curve.pieces().zip(&smooth.covered) {
         for i in 0..=24 {
             let point = derivatives(&piece, i as f64 / 24.0)[0];
-            let chords = stretch.first.saturating_sub(NEAR)..(stretch.last + NEAR + 1).min(line.chords());
+            let chords = covered.first.saturating_sub(NEAR)..(covered.last + NEAR + 1).min(line.chords());
             let away = chords.map(|j| to_segment(&line.vertex[j], &line.vertex[j + 1], &point));
             worst = worst.max(away.fold(f64::INFINITY, f64::min));
-            samples.push((point, stretch.first, stretch.last));
+            samples.push((point, covered.first, covered.last));
         }
     }
     let mut from = 0;

@@ -4,6 +4,7 @@ pub mod arc_length;
 pub mod conic;
 mod instances;
 pub mod inverse_length;
+pub mod lanes;
 pub mod newton;
 pub mod polynomial;
 pub mod quadratic;

@@ -9,12 +9,12 @@ pub mod curvature_jumps;
 pub mod feed;
 pub mod jerk_limited;
 pub mod jerk_profile;
-mod lanes;
 pub mod path_limits;
 pub mod s_curve;
 pub mod subruns;
 
 use feedplan_geometry::instances;
+use feedplan_geometry::lanes;
 use feedplan_planner::problem::Fault;
 
 use jerk_limited::Effort;

@@ -13,7 +13,7 @@ use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
 use fit::{FitOptions, FittedPiece};
-use path_builder::{Axes, BuiltPath};
+use path_builder::{Axes, BuiltPath, Motion};
 use program_pieces::{MoveError, PathOptions};
 
 instances! {
@@ -22,8 +22,9 @@ instances! {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
         fn path(&self, options: &PathOptions, axes: &Axes<M>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_path;
-        /// One smooth curve between two stops; with `sized` arcs and bends keep their size.
-        fn smooth_path(&self, options: &PathOptions, axes: &Axes<M>, sized: bool, watch: Watch)
+        /// One smooth curve between two stops: without a `motion` arcs and bends keep their size, with one it is fitted
+        /// to its speed.
+        fn smooth_path(&self, options: &PathOptions, axes: &Axes<M>, motion: Option<&Motion<M>>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_smooth_path;
     }
 }

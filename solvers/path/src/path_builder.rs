@@ -14,7 +14,7 @@ use crate::program_pieces::{program_pieces, FitCounts, MoveError, Moves, PathOpt
 use crate::smooth_fit::Offsets;
 use corner_rounding::round_corners;
 pub use corner_rounding::Chunk;
-pub use smooth_path::{build_smooth_path, NotSmooth};
+pub use smooth_path::{build_smooth_path, Motion, NotSmooth};
 use travel::{outside, Outside};
 
 use feedplan_geometry::watch::Watch;

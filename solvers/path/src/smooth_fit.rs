@@ -1,21 +1,24 @@
-//! A run of lines as a C4 quintic B-spline within a tolerance: a convex fit in a band, certified both ways.
+//! A run of lines becomes a C4 quintic B-spline within the tolerance: the one of least energy in the tolerance tube, with
+//! certified distances both ways. The method is our own.
 //!
-//! | file | idea |
+//! | file | what it computes |
 //! |---|---|
-//! | `polyline` | what is to be followed: vertices, stations, directions, tolerances |
-//! | `bends` | which vertices draw the curve, so that bends keep their size |
-//! | `size` | how long intervals may be, and knots of them |
-//! | `spline`, `bezier` | the curve, its energy; its pieces and bounds on them |
-//! | `rows` | the band around the polyline as linear rows |
-//! | `band`, `interior_point` | the convex problem of least ∫ \|C'''\|² du in a window |
-//! | `windows` | all windows of a run in parallel, and their seams |
-//! | `certificate` | the proof: distances both ways, and that the curve never stops |
+//! | `polyline` | what the curve follows: vertices, stations, directions, tolerances |
+//! | `bends` | the weights that pull the curve to vertices, so that bends keep their size |
+//! | `pace` | the energy of the curve at the speed of a motion |
+//! | `size` | the greatest length of intervals along the polyline, and the knots |
+//! | `spline`, `bezier` | the curve and forms of its energy; its pieces and bounds on them |
+//! | `rows` | the tolerance tube as linear rows |
+//! | `band`, `interior_point` | the solution of the convex problem in a window |
+//! | `quads` | the rows of four intervals side by side in the vectors of the processor |
+//! | `windows` | all windows of a run in parallel, then the seams between them |
+//! | `certificate` | a proof of the distances both ways, and that the curve never stops |
 //! | `offsets` | on which side of the polyline the curve lies |
-//! | `refine` | intervals halved where it fails |
-//! | `corner` | corners rounded one by one, where no refinement helps |
+//! | `refine` | halved intervals where the certificate fails |
+//! | `corner` | a curve of its own for each corner, where refinement does not help |
 //!
-//! The parameter u of the curve is the length of the chords, so that blocks and feeds map by their stations; D is the
-//! number of axes that move. Time and memory are linear in the number of vertices.
+//! The parameter u of the curve is the length of the chords in mm, so that stations tell the block and the feed of a place.
+//! D is the number of axes that move, ε the tolerance. Time and memory are linear in the number of vertices.
 
 mod band;
 mod bends;
@@ -24,7 +27,9 @@ mod certificate;
 mod corner;
 mod interior_point;
 mod offsets;
+pub mod pace;
 pub mod polyline;
+mod quads;
 mod refine;
 mod rows;
 mod size;
@@ -43,79 +48,79 @@ use spline::DEGREE;
 use std::ops::Range;
 use windows::{Fit, FREE};
 
-/// Times that intervals are halved.
+/// The number of times that intervals are halved.
 const REFINEMENTS: usize = 3;
-/// Times that a run is taken apart where it cannot be fitted, before all of it is left to its corners.
+/// The number of times that a run is split where it cannot be fitted; after that all its corners are rounded one by one.
 const PARTINGS: usize = 3;
-/// A run whose vertices are this close to a line, in tolerances, is one.
+/// A run whose vertices are this close to a line, in tolerances, becomes that line.
 const STRAIGHT: f64 = 1e-3;
-/// Rounding of its points by half a digit each is this in the third derivative of a quintic, times its width cubed.
+/// What rounding of the control points of a quintic adds to its third derivative, in coordinates over its width cubed.
 const ROUNDING: f64 = 240.0 * f64::EPSILON;
-/// That of a part of an interval is known to this share of one over the square of the interval's width.
+/// What it may add on a part of an interval, times the square of the interval's width.
 const KNOWN: f64 = 1e-3;
 
 /// How a run is fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothOptions<const D: usize> {
-    /// Chords longer than this are straight in the middle, in mm.
+    /// Chords longer than this, in mm, are straight in the middle.
     pub long: f64,
-    /// Least and greatest position of each axis: where no curve stays inside, corners are rounded one by one.
+    /// Least and greatest position of each axis. Where no curve stays inside, corners are rounded one by one.
     pub bounds: [[f64; 2]; D],
 }
 
 /// What a piece of the curve follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+pub struct Covered {
     /// First and last chord.
     pub first: usize,
     pub last: usize,
-    /// Upper bound of the distance between both, both ways, in mm.
+    /// Upper bound of the distances from piece to chords and from chords to piece, in mm.
     pub deviation: f64,
-    /// The curve has a corner before this piece: nothing smooth was found.
+    /// The curve has a corner before this piece, where the tool stops: no smooth curve was found.
     pub stop: bool,
 }
 
-impl Stretch {
+impl Covered {
     fn new(first: usize, last: usize, deviation: f64) -> Self {
         Self { first, last, deviation, stop: false }
     }
 }
 
-/// The curve of a run. Pieces of degree 1 are lines, of degree 5 parts of splines, of degree 7 corners.
+/// The curve of a run. Pieces of degree 1 are lines, those of degree 5 parts of splines, those of degree 7 corners.
 #[derive(Clone, Debug, Default)]
 pub struct Smooth<const D: usize> {
     pub curve: CompositeCurve<D>,
-    pub stretches: Vec<Stretch>,
-    /// B-splines and lines, and the polynomials of them before they are cut.
+    pub covered: Vec<Covered>,
+    /// The numbers of B-splines and lines, and of their polynomials before they are cut.
     pub splines: usize,
     pub polynomials: usize,
-    /// Chords that are left to their corners, between stops.
+    /// Chords whose corners are rounded one by one, with a stop before and after.
     pub corners: Vec<Range<usize>>,
-    /// On which side of the polyline the curve lies, and how far.
+    /// On which side of the polyline the curve lies, and how far away.
     pub offsets: Offsets,
-    /// Newton steps times intervals that the fit took.
+    /// The work of the fit: the sum of Newton steps times intervals.
     pub work: usize,
 }
 
 impl<const D: usize> Smooth<D> {
-    fn push(&mut self, control: &[[f64; D]], width: f64, stretch: Stretch) {
+    fn push(&mut self, control: &[[f64; D]], width: f64, covered: Covered) {
         self.curve.push(control, &[], width);
-        self.stretches.push(stretch);
+        self.covered.push(covered);
     }
 
-    /// Calls `append`, and says that the curve stops where its pieces begin, unless they are the first.
+    /// Calls `append`; the curve stops before the pieces that it appends, unless they are the first.
     fn after_stop(&mut self, append: impl FnOnce(&mut Self)) {
-        let at = self.stretches.len();
+        let at = self.covered.len();
         append(self);
-        if at > 0 && at < self.stretches.len() {
-            self.stretches[at].stop = true;
+        if at > 0 && at < self.covered.len() {
+            self.covered[at].stop = true;
         }
     }
 }
 
-/// The curve along a polyline of one chord or more, cut beside the vertices that `cut` says.
+/// The curve along a polyline of one chord or more. It is cut into pieces near the vertices for which `cut` is true.
 ///
-/// Vertices that turn back must end a polyline: no curve passes them without standing still.
+/// A polyline must end at vertices that turn back: no curve passes them without a stop.
 pub fn smooth_fit<const D: usize>(
     line: &Polyline<D>,
     cut: &[bool],
@@ -123,7 +128,7 @@ pub fn smooth_fit<const D: usize>(
     watch: Watch,
 ) -> Smooth<D> {
     let mut out = Smooth::default();
-    // Not a number is no length.
+    // A length that is not a number cannot be fitted.
     let partings = if line.length().is_finite() { PARTINGS } else { 0 };
     Run { line, cut, options, watch: watch.each(line.chords()) }.fit(0..line.chords(), partings, &mut out);
     out
@@ -166,10 +171,10 @@ impl<const D: usize> Run<'_, D> {
         self.fit(next..chords.end, partings - 1, out);
     }
 
-    /// The fit of a part, refined until its certificate holds or refining helps no more.
+    /// The fit of a part, refined until its certificate holds, at most REFINEMENTS times.
     fn refined<'b>(&self, part: &'b Polyline<D>) -> (Fit<'b, D>, Vec<bezier::Control<D>>, Certificate) {
         let long = self.options.long;
-        // How often it is refined is not known: each round counts as half of what is left.
+        // The number of refinements is not known, so each one counts as half of the work that is left.
         let mut watch = self.watch.part(0.5 * part.chords() as f64);
         let mut fit = Fit::new(part, size::knots(part, long), long);
         let all = 0..fit.spline.intervals();
@@ -196,7 +201,8 @@ impl<const D: usize> Run<'_, D> {
         }
     }
 
-    /// How far the vertices are from one line that the chords follow without turning back, if that is next to nothing.
+    /// The greatest distance of the vertices from the line between the ends, if that is below STRAIGHT tolerances and no
+    /// chord turns back.
     fn straight(&self, chords: &Range<usize>) -> Option<f64> {
         let line = self.line;
         let (start, end) = (line.vertex[chords.start], line.vertex[chords.end]);
@@ -218,7 +224,7 @@ impl<const D: usize> Run<'_, D> {
         Some(worst)
     }
 
-    /// A line, cut beside the vertices of the run.
+    /// Appends a line, cut near the vertices of the run.
     fn append_line(&self, chords: &Range<usize>, deviation: f64, out: &mut Smooth<D>) {
         let (start, end) = (self.line.vertex[chords.start], self.line.vertex[chords.end]);
         out.splines += 1;
@@ -234,25 +240,25 @@ impl<const D: usize> Run<'_, D> {
             let to = if i == chords.end { end } else { std::array::from_fn(|k| start[k] + along * way[k]) };
             let width = norm(&sub(&to, &from));
             if width > 0.0 {
-                out.push(&[from, to], width, Stretch::new(first, i - 1, deviation));
+                out.push(&[from, to], width, Covered::new(first, i - 1, deviation));
                 (from, first) = (to, i);
             }
         }
     }
 
     fn leave_corners(&self, chords: Range<usize>, out: &mut Smooth<D>) {
-        let before = out.stretches.len();
+        let before = out.covered.len();
         out.after_stop(|out| append_corners(self.line, chords.start, chords.end, out));
         out.splines += chords.len();
-        out.polynomials += out.stretches.len() - before;
-        // Corners lie between their legs.
-        for stretch in &out.stretches[before..] {
-            out.offsets.offer(-stretch.deviation);
+        out.polynomials += out.covered.len() - before;
+        // The curve of a corner lies inside it, between its legs.
+        for covered in &out.covered[before..] {
+            out.offsets.offer(-covered.deviation);
         }
         out.corners.push(chords);
     }
 
-    /// The pieces of a spline, those that lie on one line joined, cut at the foot points of vertices.
+    /// Appends the pieces of a spline, cut at the foot points of vertices; pieces on one straight chord become one line.
     fn append_spline(
         &self,
         chords: &Range<usize>,
@@ -269,14 +275,14 @@ impl<const D: usize> Run<'_, D> {
             let pins = &fit.pin[j..=j + DEGREE];
             (pins[0] != FREE && pins.iter().all(|&pin| pin == pins[0])).then_some(pins[0] as usize)
         };
-        // The chord at the end of what is appended, and the first that no piece follows yet: none is left out, though
-        // all of it may be nearest to a single place.
+        // The chord at the end of what is appended, and the first that no piece follows yet. Every chord is followed by a
+        // piece, also one that has a single foot point for all its places.
         let last = chords.len() - 1;
         let (mut chord, mut next) = (0, 0);
         let mut push = |control: &[[f64; D]], width: f64, [first, end]: [usize; 2], j: usize| {
             let end = if j + 1 == pieces.len() && foot[end + 1] >= knots[j + 1] { last } else { end };
             let first = chords.start + first.min(next);
-            out.push(control, width, Stretch::new(first, chords.start + end, deviation[j]));
+            out.push(control, width, Covered::new(first, chords.start + end, deviation[j]));
             next = end + 1;
         };
         let (mut j, mut polynomials) = (0, 0);
@@ -315,13 +321,13 @@ impl<const D: usize> Run<'_, D> {
     }
 }
 
-/// The width of parts of an interval that are not cut off: rounding of their points would be a jerk of its own.
+/// The least width of parts of an interval: the rounding of the control points of a shorter one would add to the jerk.
 fn sliver<const D: usize>(control: &bezier::Control<D>, width: f64) -> f64 {
     let coordinate = control.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     width * (ROUNDING * coordinate / (KNOWN * width)).cbrt()
 }
 
-/// The chords around the intervals that are not good, an interval more on each side.
+/// The chords around the intervals that fail their certificate, with one interval more on each side.
 fn zones<const D: usize>(line: &Polyline<D>, knots: &[f64], certificate: &Certificate) -> Vec<Range<usize>> {
     let last = knots.len() - 1;
     let mut zones: Vec<Range<usize>> = Vec::new();

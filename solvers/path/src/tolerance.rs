@@ -21,6 +21,8 @@ pub const ROUNDED_TANGENT: f64 = 0.0175;
 pub const REVERSAL: f64 = 2.356;
 /// Two edges are opposite that turn by half a circle but for less. [program: a planner that goes on there checks it itself]
 pub const OPPOSITE: f64 = 1e-6;
+/// The same of a smooth path that is fitted to a speed: only what is next to a reversal stops. [177.6°]
+pub const FITTED_REVERSAL: f64 = 3.1;
 /// Corners that turn back are not rounded where cos(turn/2) is below this, for they are passed near rest anyway. [177.7°]
 pub const REVERSAL_COSINE: f64 = 0.02;
 /// The sweep of an arc is corrected by up to this to the end point that the program gives. [program, on a small radius]

@@ -5,7 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::arrays::{padded, padded_rows, row, rows, to_array2};
+use super::arrays::{indices, padded, padded_rows, row, rows, to_array2};
 use super::curve::{Curve, Padded};
 use super::moves::Moves;
 use super::native::Of;
@@ -16,7 +16,7 @@ use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_path::arc::ArcError;
 use feedplan_path::corner::Rounding;
-use feedplan_path::path_builder::{Axes, BuiltPath, Chunk};
+use feedplan_path::path_builder::{Axes, BuiltPath, Chunk, Motion};
 use feedplan_path::program_pieces::{self, ArcShape, MoveFault, PathOptions, PathPiece, Shape};
 use feedplan_path::PathOfMoves as _;
 
@@ -52,6 +52,33 @@ struct Rules<'py> {
     max_speed: f64,
     corner_angle: f64,
     corners: String,
+}
+
+/// `feedplan.geometry.rules.Motion`.
+#[derive(FromPyObject)]
+struct MotionArrays<'py> {
+    run: PyReadonlyArray2<'py, i64>,
+    start: Numbers<'py>,
+    place: Floats<'py>,
+    speed_sq: Floats<'py>,
+    max_jerk: Floats<'py>,
+}
+
+impl MotionArrays<'_> {
+    fn motion<const M: usize>(&self) -> PyResult<Motion<M>> {
+        let runs: Vec<[usize; 2]> =
+            self.run.as_slice()?.as_chunks().0.iter().map(|run: &[i64; 2]| run.map(|i| i as usize)).collect();
+        let (start, place) = (indices(&self.start), self.place.as_slice()?.to_vec());
+        let speed_sq = self.speed_sq.as_slice()?.to_vec();
+        let good = start.len() == runs.len() + 1
+            && start.is_sorted()
+            && start.last() == Some(&place.len())
+            && place.len() == speed_sq.len();
+        let max_jerk = row::<M>(&self.max_jerk, f64::INFINITY)?;
+        let motion = Motion { runs, start, place, speed_sq, max_jerk };
+        good.then_some(motion)
+            .ok_or_else(|| PyValueError::new_err("the columns of the motion differ in length"))
+    }
 }
 
 /// The curve; feeds, first and last moves, tolerances and runs of the path.
@@ -99,11 +126,12 @@ fn arcs(moves: &Moves) -> PyResult<Vec<(usize, ArcShape)>> {
 
 /// The path of a program.
 #[pyfunction]
-#[pyo3(signature = (program, rules, progress=None))]
+#[pyo3(signature = (program, rules, motion=None, progress=None))]
 fn build_path<'py>(
     py: Python<'py>,
     program: Of<Moves>,
     rules: Rules<'py>,
+    motion: Option<MotionArrays<'py>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)> {
     let moves = &*program;
@@ -150,8 +178,9 @@ fn build_path<'py>(
             travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
             jump: rules.jump,
         };
+        let motion = motion.as_ref().map(MotionArrays::motion::<M>).transpose()?;
         let build = |watch: Watch| match corners {
-            "smooth" | "fastest" => followed.smooth_path(&options, &limits, corners == "smooth", watch),
+            "smooth" => followed.smooth_path(&options, &limits, motion.as_ref(), watch),
             _ => followed.path(&options, &limits, watch),
         };
         let path = run(py, progress.as_ref(), build)?.map_err(|error| {

@@ -36,23 +36,23 @@ fn check<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>, name: &str) {
     let last = smooth.curve.len() - 1;
     assert_eq!(smooth.curve.piece(0).control[0], line.vertex[0], "{name}");
     assert_eq!(smooth.curve.piece(last).control.last(), line.vertex.last(), "{name}");
-    assert_eq!((smooth.stretches[0].first, smooth.stretches[last].last), (0, line.chords() - 1), "{name}");
+    assert_eq!((smooth.covered[0].first, smooth.covered[last].last), (0, line.chords() - 1), "{name}");
     for i in 0..last {
         let (before, after) = (smooth.curve.piece(i), smooth.curve.piece(i + 1));
         assert_eq!(*before.control.last().unwrap(), after.control[0], "{name}: {i}");
-        let [a, b] = [smooth.stretches[i], smooth.stretches[i + 1]];
+        let [a, b] = [smooth.covered[i], smooth.covered[i + 1]];
         assert!(b.first >= a.first && b.first <= a.last + 1 && b.last >= a.last, "{name}: {a:?} {b:?}");
     }
-    for (piece, stretch) in smooth.curve.pieces().zip(&smooth.stretches) {
+    for (piece, covered) in smooth.curve.pieces().zip(&smooth.covered) {
         assert!(piece.width > 0.0, "{name}");
-        assert!(stretch.deviation <= tolerance, "{name}: {stretch:?}");
+        assert!(covered.deviation <= tolerance, "{name}: {covered:?}");
         for i in 0..=10 {
             let speed = length(&derivatives(&piece, i as f64 / 10.0)[1]);
-            assert!(speed > 0.02 - 1e-9, "{name}: {stretch:?} speed {speed}");
+            assert!(speed > 0.02 - 1e-9, "{name}: {covered:?} speed {speed}");
         }
     }
     let found = dense(line, smooth);
-    let proven = smooth.stretches.iter().map(|stretch| stretch.deviation).fold(0.0, f64::max);
+    let proven = smooth.covered.iter().map(|covered| covered.deviation).fold(0.0, f64::max);
     // Chords between samples of the curve cut its bends.
     assert!(found <= proven + 2e-3 * tolerance, "{name}: {found} found, {proven} proven");
 }
@@ -62,7 +62,7 @@ fn jumps<const D: usize>(smooth: &Smooth<D>) -> [f64; 5] {
     let mut worst = [0.0f64; 5];
     for i in 1..smooth.curve.len() {
         let (before, after) = (smooth.curve.piece(i - 1), smooth.curve.piece(i));
-        if smooth.stretches[i].stop {
+        if smooth.covered[i].stop {
             continue;
         }
         let (end, start) = (derivatives(&before, 1.0), derivatives(&after, 0.0));
@@ -87,7 +87,7 @@ fn a_line_is_reproduced_exactly() {
     cut[10] = true;
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 2] };
     let parts = smooth_fit(&many, &cut, &options, Watch::default());
-    assert_eq!(parts.stretches.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(), [(0, 9), (10, 29)]);
+    assert_eq!(parts.covered.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(), [(0, 9), (10, 29)]);
     assert!(distance(&parts.curve.piece(0).control[1], &many.vertex[10]) < 1e-15);
 }
 
@@ -121,8 +121,8 @@ fn the_sides_of_a_square_are_straight_in_the_middle() {
         let smooth = fit(&line);
         check(&line, &smooth, "square");
         for chord in 0..4 {
-            let own = |stretch: &usize| smooth.curve.piece(*stretch).degree() == 1;
-            let of = |i: &usize| smooth.stretches[*i].first == chord;
+            let own = |covered: &usize| smooth.curve.piece(*covered).degree() == 1;
+            let of = |i: &usize| smooth.covered[*i].first == chord;
             let lines: Vec<usize> = (0..smooth.curve.len()).filter(own).filter(of).collect();
             assert_eq!(lines.len(), 1, "{side} {tolerance}");
             for i in lines {
@@ -202,9 +202,9 @@ fn derivatives_to_the_fourth_agree_at_joints_also_where_pieces_are_cut() {
     let parts = smooth_fit(&line, &cut, &options, Watch::default());
     assert!(parts.curve.len() > smooth.curve.len() + 40);
     check(&line, &parts, "cut");
-    for stretch in &parts.stretches {
-        let inside = (stretch.first + 1..=stretch.last).filter(|&i| cut[i]).count();
-        assert!(inside == 0, "{stretch:?} goes over a place to cut");
+    for covered in &parts.covered {
+        let inside = (covered.first + 1..=covered.last).filter(|&i| cut[i]).count();
+        assert!(inside == 0, "{covered:?} goes over a place to cut");
     }
 }
 
@@ -216,7 +216,7 @@ fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
     check(&line, &smooth, "bounds");
     assert!(smooth.curve.control.iter().all(|point| point[0] >= -1e-6));
     // The side on the bound is a line, with a stop where it begins.
-    assert!(!smooth.corners.is_empty() && smooth.stretches.iter().any(|stretch| stretch.stop));
+    assert!(!smooth.corners.is_empty() && smooth.covered.iter().any(|covered| covered.stop));
 }
 
 fn random_polylines<const D: usize>(seed: u64, count: usize) -> usize {

@@ -20,6 +20,7 @@ use super::{deviation, Axes, BuiltPath, Chunk};
 use crate::program_pieces::{
     Chord, Chords, FitCounts, MoveError, Moves, PathOptions, PathPiece, Shape, RAPID,
 };
+use crate::smooth_fit::pace::Pace;
 use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 use crate::tolerance;
@@ -48,19 +49,52 @@ struct Section<const M: usize> {
     offsets: Offsets,
 }
 
-/// The smooth path of a program. With `sized` bends keep their size; without it they are cut as far as the tolerance
-/// allows, which is faster.
+/// A motion along a path of the same program, to which a smooth path is fitted.
+pub struct Motion<const M: usize> {
+    /// First and last move of each run of that path.
+    pub runs: Vec<[usize; 2]>,
+    /// The number of places before each run, and of all places.
+    pub start: Vec<usize>,
+    /// Places as fractions of their run, ascending, and the square of the speed there, in mm²/s².
+    pub place: Vec<f64>,
+    pub speed_sq: Vec<f64>,
+    /// Of each axis, in mm/s³; infinite where there is no limit.
+    pub max_jerk: [f64; M],
+}
+
+impl<const M: usize> Motion<M> {
+    /// Stations of a run of chords and the square of the speed there.
+    fn along(&self, chords: &[Chord], station: &[f64]) -> Vec<[f64; 2]> {
+        let (first, last) = (chords[0].first as usize, chords[chords.len() - 1].last as usize);
+        let begin = self.runs.partition_point(|run| run[1] < first);
+        let mut table = Vec::new();
+        for (run, places) in self.runs.iter().zip(self.start.windows(2)).skip(begin) {
+            if run[0] > last {
+                break;
+            }
+            let from = station[chords.partition_point(|chord| (chord.last as usize) < run[0])];
+            let to = station[chords.partition_point(|chord| chord.first as usize <= run[1])];
+            let own = places[0]..places[1];
+            let stations = self.place[own.clone()].iter().map(|part| from + part * (to - from));
+            table.extend(stations.zip(&self.speed_sq[own]).map(|(u, &square)| [u, square]));
+        }
+        table
+    }
+}
+
+/// The smooth path of a program. Without a motion it is that of the program alone, and bends keep their size. With one it
+/// is fitted to the speed of the motion, and bends are cut as far as the tolerance allows.
 pub fn build_smooth_path<const M: usize>(
     moves: &Moves<M>,
     options: &PathOptions,
     axes: &Axes<M>,
-    sized: bool,
+    motion: Option<&Motion<M>>,
     watch: Watch,
 ) -> Result<BuiltPath<M>, MoveError> {
     let each = watch.each(moves.kind.len());
     let sections: Vec<Section<M>> = sections(moves, tolerance::CRAWL * options.max_speed)
         .into_par_iter()
-        .map(|range| Section::new(moves, options, axes, range.clone(), sized, each.part(range.len() as f64)))
+        .map(|range| Section::new(moves, options, axes, range.clone(), motion, each.part(range.len() as f64)))
         .collect::<Result<_, _>>()?;
     let mut path = BuiltPath { runs: vec![], ..BuiltPath::default() };
     let (mut total, mut offsets) = (0, Offsets::default());
@@ -113,13 +147,13 @@ fn goes_back<const M: usize>(moves: &Moves<M>, before: &PathPiece<M>, after: &Pa
 }
 
 /// How the runs of a section are fitted.
-struct Rules<const M: usize> {
+struct Rules<'a, const M: usize> {
     exact: bool,
     travel: [[f64; 2]; M],
     /// Longer chords are straight in the middle, in mm.
     long: f64,
-    /// Whether bends keep their size.
-    sized: bool,
+    max_acceleration: [f64; M],
+    motion: Option<&'a Motion<M>>,
 }
 
 impl<const M: usize> Section<M> {
@@ -128,13 +162,15 @@ impl<const M: usize> Section<M> {
         options: &PathOptions,
         axes: &Axes<M>,
         range: Range<usize>,
-        sized: bool,
+        motion: Option<&Motion<M>>,
         watch: Watch,
     ) -> Result<Self, MoveError> {
         let exact = moves.tolerance[range.start] <= 0.0;
         let has_travel = range.clone().all(|i| moves.joints[i]);
         let travel = if has_travel { axes.travel } else { [[f64::NEG_INFINITY, f64::INFINITY]; M] };
-        let rules = Rules { exact, travel, long: options.max_chord, sized };
+        let max_acceleration = axes.max_acceleration;
+        let rules = Rules { exact, travel, long: options.max_chord, max_acceleration, motion };
+        let reversal = if motion.is_some() { tolerance::FITTED_REVERSAL } else { tolerance::REVERSAL };
         let chords = moves.chords(options, range)?;
         let mut section = Self::default();
         let count = chords.chords.len();
@@ -143,10 +179,10 @@ impl<const M: usize> Section<M> {
         for end in 1..=count {
             let stops = end == count || {
                 let turn = chords.turn(end);
-                if turn > tolerance::REVERSAL && !exact {
+                if turn > reversal && !exact {
                     section.not_smooth.reversals.push(chords.chords[end - 1].last);
                 }
-                turn > tolerance::REVERSAL || exact && !chords.meet(end)
+                turn > reversal || exact && !chords.meet(end)
             };
             if stops {
                 let watch = each.part((end - first) as f64);
@@ -158,7 +194,7 @@ impl<const M: usize> Section<M> {
     }
 
     /// Appends a run.
-    fn append(&mut self, chords: &Chords<M>, run: Range<usize>, rules: &Rules<M>, watch: Watch) {
+    fn append(&mut self, chords: &Chords<M>, run: Range<usize>, rules: &Rules<'_, M>, watch: Watch) {
         self.runs.push(self.chunk.pieces.len());
         let own = &chords.chords[run.clone()];
         if rules.exact && own.iter().all(Chord::is_line) {
@@ -177,9 +213,7 @@ impl<const M: usize> Section<M> {
         match moving.len() {
             0..=2 => self.append_curve::<2>(chords, run, &moving, rules, watch),
             3 => self.append_curve::<3>(chords, run, &moving, rules, watch),
-            4 => self.append_curve::<4>(chords, run, &moving, rules, watch),
-            5 => self.append_curve::<5>(chords, run, &moving, rules, watch),
-            6 => self.append_curve::<6>(chords, run, &moving, rules, watch),
+            4..=6 => self.append_curve::<6>(chords, run, &moving, rules, watch),
             _ => self.append_curve::<9>(chords, run, &moving, rules, watch),
         }
     }
@@ -190,15 +224,23 @@ impl<const M: usize> Section<M> {
         chords: &Chords<M>,
         run: Range<usize>,
         moving: &[usize],
-        rules: &Rules<M>,
+        rules: &Rules<'_, M>,
         watch: Watch,
     ) {
-        let Rules { exact, travel, long, sized } = rules;
+        let Rules { exact, travel, long, max_acceleration, motion } = rules;
         let own = &chords.chords[run.clone()];
         let narrow = |p: &[f64; M]| std::array::from_fn(|k| moving.get(k).map_or(0.0, |&axis| p[axis]));
         let points: Vec<[f64; D]> = chords.points[run.start..=run.end].iter().map(narrow).collect();
         let mut line = Polyline::new(points, own.iter().map(Chord::rest).collect());
-        line.sized = *sized;
+        line.sized = motion.is_none();
+        if let Some(motion) = motion {
+            let of =
+                |limits: &[f64; M]| std::array::from_fn(|k| moving.get(k).map_or(1.0, |&axis| limits[axis]));
+            let table = motion.along(own, &line.station);
+            if !table.is_empty() {
+                line.pace = Pace::new(table, of(max_acceleration), of(&motion.max_jerk));
+            }
+        }
         line.hold_bends(*long, |i| !own[i].is_line(), watch);
         let differ = |a: &Chord, b: &Chord| a.feed != b.feed || a.tolerance != b.tolerance;
         let cut: Vec<bool> =
@@ -212,7 +254,7 @@ impl<const M: usize> Section<M> {
         let options = SmoothOptions { long: *long, bounds: std::array::from_fn(bounds) };
         let smooth = smooth_fit(&line, &cut, &options, watch);
         let rest = chords.points[run.start];
-        for (piece, along) in smooth.curve.pieces().zip(&smooth.stretches) {
+        for (piece, along) in smooth.curve.pieces().zip(&smooth.covered) {
             let control: Vec<[f64; M]> = piece
                 .control
                 .iter()

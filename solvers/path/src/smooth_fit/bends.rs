@@ -1,19 +1,19 @@
-//! Bends keep their size: vertices away from corners draw the curve.
+//! Bends keep their size: vertices away from corners pull the curve to them.
 //!
-//! Least ∫ |C'''|² alone draws every bend towards its centre, by the whole tolerance: holes and bosses alike come out
-//! too small. So the vertices V_i of bends add a weight to it,
+//! The least energy alone moves every bend towards its centre by the whole tolerance, so that holes and bosses come out
+//! too small. Therefore the vertices V_i of bends add a term to it,
 //!
 //! ```text
 //! ∫ |C'''|² du + Σ (l_i / λ⁶) |C(u_i) − V_i|²
 //! ```
 //!
-//! where l_i is the length of the chords at V_i and λ the length over which the curve forgets what bends it: noise
-//! of a shorter wave than about 2πλ is smoothed out, on a circle of radius r the curve is off by −λ⁶/r⁵, and by about
-//! λ³/r² where a bend begins or ends, which fades as exp(−u/2λ).
+//! where l_i is the length of the chords at V_i, and λ the length over which the effect of a vertex fades: noise of a wave
+//! shorter than about 2πλ is smoothed out, on a circle of radius r the curve is off by −λ⁶/r⁵, and where a bend begins or
+//! ends by about λ³/r², which fades as exp(−u/2λ).
 //!
-//! Vertices of arcs and splines have no noise: there λ is a part of the chord, and the curve nearly the best
-//! approximation. It is no part of the interval, since intervals beside a corner are shorter: weights would fall by a
-//! factor of four from one to the next, and what the corner does to the curve would alternate over many of them.
+//! Vertices of arcs and splines have no noise: there λ is a part of the chord, and the curve is nearly the best
+//! approximation. λ is not a part of the interval, because intervals near a corner are shorter: the weights would fall by a
+//! factor of four from one to the next, and the effect of the corner on the curve would alternate over many of them.
 //!
 //! Points of a program may have noise; with intervals h = √(6 ε r) the end of a bend leaves no more than OFF ε if
 //!
@@ -21,7 +21,7 @@
 //! λ = h (OFF h / 36 ε)^(1/3)
 //! ```
 //!
-//! At corners and near them nothing is added, and the curve may use the tolerance on one side.
+//! At corners and near them nothing is added, so that the curve may use the tolerance on one side.
 
 use super::bezier::{point_and_slope, Control};
 use super::polyline::{angle, Polyline};
@@ -30,10 +30,10 @@ use feedplan_geometry::watch::Watch;
 
 /// A vertex at which the polyline turns by more, in rad, is a corner,
 const CORNER: f64 = std::f64::consts::FRAC_PI_6;
-/// seen from places this far from it on both sides, in tolerances: an arc of a radius below about four tolerances is a
-/// corner, and noise far below the tolerance is none.
+/// if it does so between the places this far from it on both sides, in tolerances. An arc of a radius below about four
+/// tolerances so is a corner, and noise far below the tolerance is not.
 const VIEW: f64 = 2.0;
-/// The curve leaves the polyline for a corner over this length, in tolerances by the angle.
+/// The curve leaves the polyline this far before a corner, in tolerances over the angle in rad.
 const REACH: f64 = 10.0;
 /// λ of arcs and splines, in chords, of which an interval on a circle has six,
 const EXACT: f64 = 0.18;
@@ -43,18 +43,18 @@ const LEAST_EXACT: f64 = 0.03;
 const OFF: f64 = 0.2;
 /// the least λ, in intervals,
 const LEAST: f64 = 0.1;
-/// and the vertices in an interval below which it is smaller: the mean of a few smooths nothing out.
+/// and the number of vertices in an interval below which λ is smaller, since the mean of a few vertices smooths little.
 const FEW: f64 = 2.0;
 /// The greatest λ of all vertices, in intervals.
 const MOST: f64 = 0.6;
-/// An interval shorter than a chord at a vertex, in which the curve is farther from it than this, in tolerances,
-/// is too long to follow it.
+/// An interval shorter than a chord at a vertex is halved if the curve in it is farther from the vertex than this, in
+/// tolerances.
 const MISS: f64 = 0.1;
 
-/// What a vertex is to the curve.
+/// How a vertex acts on the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hold {
-    /// Any place within the tolerance will do.
+    /// The curve may be anywhere within the tolerance.
     Free,
     /// A point of a program, which may have noise.
     Point,
@@ -63,8 +63,8 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// l/λ⁶ in an interval of length h, in mm⁻⁵, of a vertex between two chords. A line beside an arc has no other
-    /// vertices: of arcs the shorter chord counts.
+    /// l/λ⁶ in mm⁻⁵ of a vertex between two chords, in an interval of length h. At the end of an arc next to a long line the
+    /// shorter chord counts, because the line has no other vertices.
     pub fn weight(self, chords: [f64; 2], h: f64, tolerance: f64) -> f64 {
         // Both λ are in parts of h.
         let (length, lambda) = match self {
@@ -83,7 +83,7 @@ impl Hold {
     }
 }
 
-/// The intervals that are too long to pass the vertices of bends in them, near places `foot`.
+/// The intervals that are too long to pass near the vertices of bends in them; `foot` are the vertices' foot points.
 pub fn missed<const D: usize>(
     line: &Polyline<D>,
     knots: &[f64],
@@ -108,12 +108,12 @@ pub fn missed<const D: usize>(
 }
 
 impl<const D: usize> Polyline<D> {
-    /// Tells the vertices of bends from those of corners. Chords longer than `long` are lines, and a lone vertex between
-    /// two of them is a corner; `curved` says which chords stand for arcs or splines.
+    /// Finds the vertices of bends. Chords longer than `long` are lines, and a lone vertex between two of them is a corner;
+    /// `curved` tells which chords stand for arcs or splines.
     pub fn hold_bends(&mut self, long: f64, curved: impl Fn(usize) -> bool, watch: Watch) {
         let last = self.chords();
         let turn = self.turns_in_view(watch);
-        // Up to where the corners before it reach; where a corner is seen from several vertices, the sharpest counts.
+        // Vertices within the reach of a corner are free; where several vertices are one corner, the sharpest counts.
         let mut free = vec![false; last + 1];
         let reach = |i: usize| {
             let sharpest = turn[i] >= turn[i - 1].max(turn[i + 1]);
@@ -141,7 +141,7 @@ impl<const D: usize> Polyline<D> {
         }
     }
 
-    /// The turn at every vertex, in rad, seen from two tolerances before and after it; 0 at the ends.
+    /// The turn at every vertex between the places VIEW tolerances before and after it, in rad; 0 at the ends.
     fn turns_in_view(&self, watch: Watch) -> Vec<f64> {
         let last = self.chords();
         let mut turns = vec![0.0; last + 1];
@@ -151,7 +151,7 @@ impl<const D: usize> Polyline<D> {
             let view = VIEW * self.tolerance_at(i);
             let (low, high) =
                 ((self.station[i] - view).max(0.0), (self.station[i] + view).min(self.length()));
-            // Tolerances change: the view need not move on with the vertex.
+            // Where tolerances change, the places may move back.
             while a > 0 && self.station[a] > low {
                 a -= 1;
             }
@@ -171,7 +171,7 @@ impl<const D: usize> Polyline<D> {
         turns
     }
 
-    /// Vertex i lies between two long chords, and at neither of their other ends the polyline bends on the same way.
+    /// Whether vertex i lies between two long chords, at whose other ends the polyline does not bend in the same sense.
     fn is_lone(&self, i: usize, long: f64) -> bool {
         if self.chord_length(i - 1) <= long || self.chord_length(i) <= long {
             return false;

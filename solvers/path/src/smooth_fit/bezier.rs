@@ -1,4 +1,4 @@
-//! A quintic Bernstein piece: points, parts, its greatest distance from a chord, its least speed.
+//! A quintic Bézier piece: points, parts, bounds of its distance from a chord and of its speed, by convex hulls.
 
 use super::polyline::Polyline;
 use super::spline::{DEGREE, ORDER};
@@ -6,7 +6,7 @@ use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 
 pub type Control<const D: usize> = [[f64; D]; ORDER];
 
-/// Halvings until a bound is tight enough to tell.
+/// The greatest number of halvings for a bound.
 const DEPTH: u32 = 5;
 
 /// The parts before and after t in [0, 1].
@@ -47,8 +47,8 @@ pub fn derivatives<const D: usize>(control: &Control<D>, t: f64) -> [[f64; D]; 3
     [lerp(&lerp(&c[0], &c[1], t), &lerp(&c[1], &c[2], t), t), slope, second]
 }
 
-/// An upper bound of the distance from a chord, no closer than needed to tell that it is below `enough`: the
-/// distance from a segment is convex, so that none is greater than that of the farthest control point.
+/// An upper bound of the distance from a chord, refined until it is below `enough`. The distance from a segment is a
+/// convex function, so that no point is farther than the farthest control point.
 pub fn distance_bound<const D: usize>(
     control: &Control<D>,
     line: &Polyline<D>,
@@ -75,7 +75,7 @@ fn distance_within<const D: usize>(
         .fold(0.0, |most, half| most.max(distance_within(half, line, chord, enough, depth - 1)))
 }
 
-/// The piece is within the bounds of its axes; where its control points are not, its halves say so.
+/// Whether the piece is within the bounds of the axes; where its control points are not, its halves are tested.
 pub fn is_inside<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D]) -> bool {
     is_inside_within(control, bounds, DEPTH)
 }
@@ -92,8 +92,8 @@ fn is_inside_within<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D]
     is_inside_within(&left, bounds, depth - 1) && is_inside_within(&right, bounds, depth - 1)
 }
 
-/// A lower bound of |C'|, no closer than needed to tell that it is above `enough`: that of the derivative's control
-/// points along the way from end to end.
+/// A lower bound of |C'|, refined until it is above `enough`: the least component of the derivative's control points along
+/// the line from end to end.
 pub fn speed_bound<const D: usize>(control: &Control<D>, width: f64, enough: f64) -> f64 {
     speed_within(control, width, enough, DEPTH)
 }

@@ -1,28 +1,28 @@
-//! What is left where no smooth curve is found: the lines, each corner rounded by a curve of degree 7 of its own.
+//! Where no smooth curve is found: the lines, with each corner rounded by a curve of degree 7 of its own.
 //!
-//! Four control points on each leg, a line's distance apart, make it meet the lines with three derivatives. It lies
-//! between both legs, and no point of curve or corner is farther from the other than the middle from the vertex:
-//! with V − a t₋ + b t₊ on the curve, min(a, b) |t₊ − t₋| is such a distance.
+//! Four control points in even steps on each leg make the curve meet the lines with three derivatives. It lies between both
+//! legs. The distance of curve and corner, both ways, is at most that of the middle of the curve from the vertex: a point
+//! V − a t₋ + b t₊ of the curve is at most min(a, b) |t₊ − t₋| from the legs.
 
 use super::polyline::Polyline;
-use super::{Smooth, Stretch};
+use super::{Covered, Smooth};
 use feedplan_geometry::quadratic::norm;
 
 const DEGREE: usize = 7;
-/// The control points of a leg, in parts of it, from its end to the vertex.
+/// The distances of the control points of a leg from the vertex, in parts of the leg.
 const LEG: [f64; 4] = [1.0, 1.0 - 0.65 / 3.0, 1.0 - 1.3 / 3.0, 0.35];
 /// The middle is V + MIDDLE l (t₊ − t₋): (LEG₀ + 7 LEG₁ + 21 LEG₂ + 35 LEG₃)/2⁷.
 const MIDDLE: f64 = (LEG[0] + 7.0 * LEG[1] + 21.0 * LEG[2] + 35.0 * LEG[3]) / 128.0;
 /// The width of a corner of legs of length 1 that meets the lines at speed 1.
 const WIDTH: f64 = DEGREE as f64 * (LEG[0] - LEG[1]);
-/// Share of the tolerance that a corner uses.
+/// The part of the tolerance that a corner uses.
 const FILL: f64 = 0.99;
-/// Legs are no longer than this part of their chord: neighbouring corners do not meet.
+/// Legs are at most this part of their chord, so that neighbouring corners do not overlap.
 const HALF: f64 = 0.5;
-/// Corners between which a smaller part of a line than this would be left, or which overlap by no more, meet: a profile
-/// has no digits for so short a line.
+/// Two corners that would leave less than this part of a line between them, or overlap by no more, meet: rounding would
+/// spoil the profile on so short a line.
 const SLIVER: f64 = 1e-3;
-/// Vertices that turn by less, in |t₊ − t₋|, are none.
+/// Where |t₊ − t₋| is less than this, the polyline does not turn.
 const STRAIGHT: f64 = 1e-9;
 
 /// Appends lines and corners of the chords from `first` to before `end`.
@@ -47,7 +47,7 @@ pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usi
             None => line.vertex[chord + 1],
         };
         if to != from {
-            out.push(&[from, to], room - corner.unwrap_or(0.0), Stretch::new(chord, chord, 0.0));
+            out.push(&[from, to], room - corner.unwrap_or(0.0), Covered::new(chord, chord, 0.0));
         }
         if let Some(leg) = corner {
             let next = chord + 1;
@@ -58,7 +58,7 @@ pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usi
             }
             control[0] = to;
             let turn: [f64; D] = std::array::from_fn(|k| line.direction[next][k] - line.direction[chord][k]);
-            out.push(&control, WIDTH * leg, Stretch::new(chord, next, MIDDLE * leg * norm(&turn)));
+            out.push(&control, WIDTH * leg, Covered::new(chord, next, MIDDLE * leg * norm(&turn)));
             (from, begun) = (control[DEGREE], leg);
         } else {
             (from, begun) = (line.vertex[chord + 1], 0.0);
@@ -93,7 +93,7 @@ mod tests {
         append_corners(&line, 0, 2, &mut out);
         assert_eq!(out.curve.pieces().map(|piece| piece.degree()).collect::<Vec<_>>(), [1, 7, 1]);
         assert_eq!(
-            out.stretches.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(),
+            out.covered.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(),
             [(0, 0), (0, 1), (1, 1)]
         );
         let corner = out.curve.piece(1);
@@ -109,7 +109,7 @@ mod tests {
             points = points.windows(2).map(|p| [0, 1].map(|k| 0.5 * (p[0][k] + p[1][k]))).collect();
         }
         assert!((norm(&sub(&points[0], &[10.0, 0.0])) - 0.099).abs() < 1e-12);
-        assert!((out.stretches[1].deviation - 0.099).abs() < 1e-12);
+        assert!((out.covered[1].deviation - 0.099).abs() < 1e-12);
         // Where two corners leave next to nothing of a line they meet.
         let left = 2e-7;
         let mut out = Smooth::default();

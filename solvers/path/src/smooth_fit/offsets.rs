@@ -1,17 +1,16 @@
-//! Offsets: how far the curve lies on which side of the polyline, outside (away from the centre of its curvature) or
-//! inside.
+//! On which side of the polyline the curve lies and how far: outside (away from the centre of its curvature) or inside.
 //!
 //! With N the unit normal of the curve towards its centre of curvature and away = C − R from the polyline to the curve,
-//! the offset is −N · away: above 0 outside. In bends its mean is that over the angle by which they turn, so that
-//! straight parts, which have no sides, count for nothing:
+//! the offset is −N · away, positive outside. The mean offset of bends is weighted by the angle by which they turn, since
+//! straight parts have no inside:
 //!
 //! ```text
 //! Σ −N · (C(u*_i) − V_i) θ_i / Σ θ_i
 //! ```
 //!
 //! over the vertices V_i of bends with the places u*_i of the curve near them. θ_i is the angle by which the curve turns
-//! there over the mean length of the chords, but no more than the polyline does: an arc beside a long line ends there.
-//! The greatest distances are those at vertices and between them, at corners as well.
+//! there over the mean length of the chords, and at most the angle of the polyline, because an arc next to a long line ends
+//! at their vertex. The greatest offsets are those at vertices and between them, also at corners.
 
 use super::bends::Hold;
 use super::bezier::{derivatives, Control};
@@ -19,9 +18,9 @@ use super::polyline::Polyline;
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// Places in an interval.
+/// The number of places in an interval.
 const PLACES: usize = 4;
-/// A curve that turns by less than this, in rad, over the length of a chord has no sides.
+/// A curve that turns by less than this over the length of a chord, in rad, is straight.
 const STRAIGHT: f64 = 1e-9;
 
 /// The mean and the greatest offsets, in mm.
@@ -52,7 +51,7 @@ impl Offsets {
         self.offer(other.outside);
     }
 
-    /// A distance with its sign; not a number is none.
+    /// Takes an offset into the greatest ones; one that is not a number changes nothing.
     pub fn offer(&mut self, distance: f64) {
         self.inside = self.inside.max(-distance);
         self.outside = self.outside.max(distance);

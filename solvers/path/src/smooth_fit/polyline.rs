@@ -1,13 +1,14 @@
 //! The programmed polyline of a run: vertices, stations, directions and tolerances.
 
 use super::bends::Hold;
+use super::pace::Pace;
 use feedplan_geometry::quadratic::{dot, norm, sub};
 
 /// Chords between vertices, none of them without a length.
 #[derive(Clone, Debug, Default)]
 pub struct Polyline<const D: usize> {
     pub vertex: Vec<[f64; D]>,
-    /// Length of the chords before each vertex, in mm: the parameter u of the curve.
+    /// Length of the chords before each vertex, in mm; it is the parameter u of the curve.
     pub station: Vec<f64>,
     /// Unit vector along each chord.
     pub direction: Vec<[f64; D]>,
@@ -15,13 +16,15 @@ pub struct Polyline<const D: usize> {
     pub tolerance: Vec<f64>,
     /// What each vertex is to the curve.
     pub hold: Vec<Hold>,
-    /// Bends keep their size: vertices that are held draw the curve.
+    /// Bends keep their size: vertices that are held pull the curve to them. Else the curve is fitted to a motion.
     pub sized: bool,
+    /// How fast it is followed.
+    pub pace: Pace<D>,
 }
 
 impl<const D: usize> Polyline<D> {
-    /// The polyline through `vertex`, with a tolerance for each chord; all vertices are free, and bends of any
-    /// size.
+    /// The polyline through `vertex`, with a tolerance for each chord; all vertices are free, bends of any size,
+    /// and the pace is even.
     pub fn new(vertex: Vec<[f64; D]>, tolerance: Vec<f64>) -> Self {
         let mut station = Vec::with_capacity(vertex.len());
         let mut direction = Vec::with_capacity(tolerance.len());
@@ -35,13 +38,14 @@ impl<const D: usize> Polyline<D> {
             direction.push(chord.map(|x| x / length));
         }
         let hold = vec![Hold::Free; vertex.len()];
-        Self { vertex, station, direction, tolerance, hold, sized: false }
+        Self { vertex, station, direction, tolerance, hold, sized: false, pace: Pace::default() }
     }
 
     /// The part between two vertices, its stations from 0.
     pub fn part(&self, first: usize, last: usize) -> Self {
         let part = Self::new(self.vertex[first..=last].to_vec(), self.tolerance[first..last].to_vec());
-        Self { hold: self.hold[first..=last].to_vec(), sized: self.sized, ..part }
+        let pace = self.pace.from(self.station[first]);
+        Self { hold: self.hold[first..=last].to_vec(), sized: self.sized, pace, ..part }
     }
 
     /// Number of chords.

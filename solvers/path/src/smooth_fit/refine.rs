@@ -1,4 +1,4 @@
-//! Halves the intervals that miss their limits, and says where the fit is to be solved again.
+//! Halves the intervals that fail their certificate, and finds the ranges of intervals to be solved again.
 
 use std::ops::Range;
 
@@ -18,13 +18,13 @@ pub fn halved<'a, const D: usize>(
     let count = halve.len();
     let chosen = |j: usize| halve[j.saturating_sub(1)..(j + 2).min(count)].contains(&true);
     let mut knots = Vec::with_capacity(2 * count);
-    // Whether an interval is new, and which one it was.
+    // For each interval: whether it is a half, and of which old interval it is the half or the whole.
     let mut origin: Vec<(bool, usize)> = Vec::with_capacity(2 * count);
     for j in 0..count {
         let (low, high) = (fit.spline.knots[j], fit.spline.knots[j + 1]);
         let middle = 0.5 * (low + high);
         knots.push(low);
-        // On knots that nearly meet nothing is left to halve.
+        // Between knots that differ by rounding alone there is no middle.
         let new = chosen(j) && low < middle && middle < high;
         origin.push((new, j));
         if new {
@@ -48,16 +48,16 @@ pub fn halved<'a, const D: usize>(
     (next, ranges)
 }
 
-/// The coefficients that see no new interval are those of the spline before.
+/// Coefficients of basis functions that are zero on all halved intervals keep their values.
 fn keep_coefficients<const D: usize>(old: &Spline<D>, new: &mut Spline<D>, origin: &[(bool, usize)]) {
-    // The last new interval up to each place.
+    // The last halved interval up to each place.
     let mut last_new = None;
     let count = origin.len();
     for i in 0..count + DEGREE {
         if i < count && origin[i].0 {
             last_new = Some(i);
         }
-        // Coefficient i is seen by the intervals i − 5 to i.
+        // The basis function of coefficient i is not zero on the intervals i − 5 to i.
         if last_new.is_none_or(|j| j + DEGREE < i) {
             let (at, before) = if i < count { (i, 0) } else { (count - 1, i + 1 - count) };
             new.coefficient[i] = old.coefficient[origin[at].1 + before];

@@ -1,11 +1,11 @@
-//! The size function: how long an interval of the spline may be at each place of the polyline, and knots from it.
+//! The greatest length h of an interval of the spline at each place of the polyline, and the knots that follow from it.
 //!
 //! ```text
 //! h(u)  the largest w with w · angle(V − P(u − w), P(u + w) − V) ≤ C ε, w growing by 1.5
 //! ```
 //!
-//! An interval so bends away from its polyline by no more than a few tolerances, and noise below the tolerance does not
-//! shorten it. Neighbours differ by a grade of at most `GRADE`: |h'| ≤ GRADE.
+//! The polyline so leaves an interval by no more than a few tolerances, and noise below the tolerance does not shorten
+//! intervals. Neighbours differ little: |h'| ≤ GRADE.
 
 use super::polyline::{angle, Polyline};
 use feedplan_geometry::quadratic::sub;
@@ -14,14 +14,14 @@ use feedplan_geometry::quadratic::sub;
 const TURN: f64 = 6.0;
 /// The greatest |h'|.
 const GRADE: f64 = 0.25;
-/// The first w, in tolerances: below it no turn, however sharp, is too much.
+/// The first w, in tolerances: an interval need not be shorter, however sharp the turn.
 const LEAST: f64 = 0.5;
 const GROWTH: f64 = 1.5;
 /// The greatest interval, in parts of the length from which a chord is long;
 const GREATEST: f64 = 0.8;
-/// and in a long chord, in parts of it: enough of them lie in its middle to make it straight.
+/// in a long chord, in parts of it, so that enough intervals lie in its middle to make it straight.
 const SHARE: f64 = 0.05;
-/// Intervals of a run, at least.
+/// The least number of intervals of a run.
 const FEWEST: usize = 4;
 
 /// The knots of a run from 0 to its length; chords longer than `long` have several intervals.
@@ -49,12 +49,12 @@ pub fn knots<const D: usize>(line: &Polyline<D>, long: f64) -> Vec<f64> {
         knots.push(line.station[chord] + grades[chord].place(aim - before));
     }
     knots.push(line.length());
-    // Rounding may make neighbours meet on coordinates that are large for their tolerance.
+    // On coordinates that are large for their tolerance, rounding may make neighbours equal.
     knots.dedup_by(|b, a| *b <= *a);
     knots
 }
 
-/// h along a chord, and its integral of 1/h: it rises with GRADE, stays at its peak and falls with GRADE.
+/// h along a chord and the integral of 1/h: h rises with slope GRADE, stays at its peak and falls with slope GRADE.
 struct Grade {
     length: f64,
     start: f64,

@@ -1,13 +1,14 @@
 //! A C4 quintic B-spline over strictly increasing knots, its ends clamped.
 //!
-//! Interval j lies between knots j and j + 1 and sees the coefficients j to j + 5.
+//! Interval j lies between knots j and j + 1; on it the basis functions of the coefficients j to j + 5 are not zero: these
+//! are the coefficients that it sees.
 
 use feedplan_geometry::quadratic::{lerp, sub};
 
 pub const DEGREE: usize = 5;
-/// Coefficients that an interval sees.
+/// The number of basis functions, and so of coefficients, of an interval.
 pub const ORDER: usize = DEGREE + 1;
-/// Knots that decide the basis in an interval: those five on each side, the ends counted again beyond them.
+/// The number of knots on which the basis in an interval depends: five on each side, the ends repeated beyond them.
 const LOCAL: usize = 2 * DEGREE;
 
 #[derive(Clone, Debug, Default)]
@@ -52,34 +53,48 @@ fn basis_of_degree(t: &Around, u: f64, degree: usize, out: &mut [f64]) {
     }
 }
 
-/// ∫ |C'''|² du over an interval: the matrix of the form in the coefficients that it sees.
-pub fn energy(t: &Around) -> [[f64; ORDER]; ORDER] {
-    // Abscissae and weights of Gauss on [−1, 1]: exact for the square of a quadratic.
-    const GAUSS: [(f64, f64); 3] =
-        [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
-    let third = third_differences(t);
+/// A quadratic form in the coefficients that an interval sees.
+pub type Form = [[f64; ORDER]; ORDER];
+
+/// ∫ w₂ |C''|² du and ∫ w₃ |C'''|² du over an interval, as forms of one axis; `weights` gives w₂ and w₃ at a place.
+pub fn energies(t: &Around, weights: impl Fn(f64) -> [f64; 2]) -> [Form; 2] {
+    // Abscissae and weights of Gauss on [−1, 1]: exact for the square of a cubic.
+    const GAUSS: [(f64, f64); 4] = [
+        (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+        (-0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+        (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
+        (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+    ];
+    let differences = [derivative_coefficients::<2>(t), derivative_coefficients::<3>(t)];
     let (middle, half) = (0.5 * (t[4] + t[5]), 0.5 * (t[5] - t[4]));
-    let mut out = [[0.0; ORDER]; ORDER];
-    for (x, weight) in GAUSS {
-        let mut values = [0.0; 3];
-        basis_of_degree(t, middle + half * x, 2, &mut values);
-        let row: [f64; ORDER] = std::array::from_fn(|a| (0..3).map(|q| values[q] * third[q][a]).sum());
-        for a in 0..ORDER {
-            for b in 0..ORDER {
-                out[a][b] += weight * half * row[a] * row[b];
+    let mut out = [[[0.0; ORDER]; ORDER]; 2];
+    for (x, share) in GAUSS {
+        let u = middle + half * x;
+        for (which, weight) in weights(u).into_iter().enumerate().filter(|(_, weight)| *weight > 0.0) {
+            let degree = DEGREE - 2 - which;
+            let mut values = [0.0; ORDER];
+            basis_of_degree(t, u, degree, &mut values);
+            let rows = &differences[which];
+            let row: [f64; ORDER] =
+                std::array::from_fn(|a| (0..=degree).map(|q| values[q] * rows[q][a]).sum());
+            for a in 0..ORDER {
+                for b in 0..ORDER {
+                    out[which][a][b] += weight * share * half * row[a] * row[b];
+                }
             }
         }
     }
     out
 }
 
-/// The coefficients of C''', a quadratic spline, from those of C.
-fn third_differences(t: &Around) -> [[f64; ORDER]; 3] {
+/// The coefficients of the derivative of an order, a spline of a lower degree, from those of C; rows beyond them are of
+/// no use.
+fn derivative_coefficients<const R: usize>(t: &Around) -> [[f64; ORDER]; ORDER] {
     let mut rows = [[0.0; ORDER]; ORDER];
     for (a, row) in rows.iter_mut().enumerate() {
         row[a] = 1.0;
     }
-    for level in 1..=3 {
+    for level in 1..=R {
         for a in 0..ORDER - level {
             let scale = (DEGREE + 1 - level) as f64 / (t[a + DEGREE] - t[a + level - 1]);
             for b in 0..ORDER {
@@ -87,7 +102,7 @@ fn third_differences(t: &Around) -> [[f64; ORDER]; 3] {
             }
         }
     }
-    [rows[0], rows[1], rows[2]]
+    rows
 }
 
 impl<const D: usize> Spline<D> {
@@ -95,7 +110,7 @@ impl<const D: usize> Spline<D> {
         self.knots.len() - 1
     }
 
-    /// The Bernstein control points of every interval, each starting exactly where the one before ends.
+    /// The Bézier control points of every interval; each begins exactly where the one before ends.
     pub fn pieces(&self) -> Vec<[[f64; D]; ORDER]> {
         let mut pieces: Vec<[[f64; D]; ORDER]> = Vec::with_capacity(self.intervals());
         for j in 0..self.intervals() {
@@ -171,7 +186,7 @@ mod tests {
             })
             .collect();
         for j in 0..5 {
-            let form = energy(&around(&KNOTS, j));
+            let [_, form] = energies(&around(&KNOTS, j), |_| [0.0, 1.0]);
             let mut sum = 0.0;
             for a in 0..ORDER {
                 for b in 0..ORDER {

@@ -1,7 +1,8 @@
-//! A spline fitted to a run in windows of intervals: independent solutions, then the seams between them again.
+//! A spline fitted to a run in windows of intervals that are solved in parallel, and then the seams between them.
 //!
-//! All windows share one knot vector, so C4 is automatic; where the coefficients of two windows meet only the band is
-//! perturbed, and the seam, its ends held as they are, is solved once more.
+//! All windows share one knot vector, so that the spline is C4 whatever its coefficients. Where the coefficients of two
+//! windows meet, the curve may leave the tolerance tube; so the intervals around the seam are solved once more, with the
+//! coefficients at their ends held.
 
 use rayon::prelude::*;
 
@@ -9,41 +10,44 @@ use super::band::Band;
 use super::interior_point::Problem;
 use super::polyline::Polyline;
 use super::rows::rows;
-use super::spline::{around, energy, greville, Spline, DEGREE};
+use super::spline::{around, greville, Spline, DEGREE};
 use feedplan_geometry::watch::Watch;
 use std::ops::Range;
 
-/// Intervals of a window.
+/// The number of intervals of a window.
 const WINDOW: usize = 300;
-/// Intervals by which a window reaches over its ends, and half the length of a seam.
+/// The number of intervals by which a window reaches over its ends, and by which a seam reaches to each side.
 const OVERLAP: usize = 20;
-/// Long chords are straight in the middle: from this part of their length at each end, and from so many times the
-/// length from which a chord is long.
+/// Long chords are straight but for this part of their length at each end,
 const BENT: f64 = 0.25;
+/// or for this part if the curve is fitted to a motion: more room for corners, and still straight lines.
+const FITTED_BENT: f64 = 0.35;
+/// which is at most so many times the length from which a chord is long.
 const MOST_BENT: f64 = 4.0;
-/// The chord of a coefficient that is free.
+/// In place of a chord: the coefficient is free.
 pub const FREE: u32 = u32::MAX;
 
 /// The fit of a run.
 pub struct Fit<'a, const D: usize> {
     pub line: &'a Polyline<D>,
     pub spline: Spline<D>,
-    /// The long chord on which a coefficient is held.
+    /// The long chord on which each coefficient is held, or FREE.
     pub pin: Vec<u32>,
-    /// Newton steps times intervals.
+    /// The sum of Newton steps times intervals.
     pub work: usize,
 }
 
 impl<'a, const D: usize> Fit<'a, D> {
-    /// The polyline itself as coefficients; chords longer than `long` are pinned.
+    /// The polyline itself as coefficients; those in the middle of chords longer than `long` are held there.
     pub fn new(line: &'a Polyline<D>, knots: Vec<f64>, long: f64) -> Self {
         let count = knots.len() - 1 + DEGREE;
+        let bent = if line.sized { BENT } else { FITTED_BENT };
         let (mut coefficient, mut pin) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for i in 0..count {
             let u = greville(&knots, i);
             let chord = line.chord_at(u);
             let length = line.chord_length(chord);
-            let end = (BENT * length).min(MOST_BENT * long);
+            let end = (bent * length).min(MOST_BENT * long);
             let inside = u >= line.station[chord] + end && u <= line.station[chord + 1] - end;
             pin.push(if length > long && inside { chord as u32 } else { FREE });
             coefficient.push(match i {
@@ -55,7 +59,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         Self { line, spline: Spline { knots, coefficient }, pin, work: 0 }
     }
 
-    /// Solves the problem in ranges of intervals that are far from each other; all else stays as it is.
+    /// Solves the problem in ranges of intervals that are far from each other; other coefficients stay as they are.
     pub fn solve(&mut self, ranges: &[Range<usize>], watch: Watch) {
         let (mut windows, mut seams) = (Vec::new(), Vec::new());
         for range in ranges {
@@ -65,7 +69,7 @@ impl<'a, const D: usize> Fit<'a, D> {
                 let own = cut(i)..cut(i + 1);
                 let wide =
                     range.start.max(own.start.saturating_sub(OVERLAP))..range.end.min(own.end + OVERLAP);
-                // Of the coefficients that a cut lies between, half belong to each side.
+                // Half of the coefficients around a cut are taken from the window on each side.
                 let first = if i == 0 { wide.start } else { own.start + DEGREE / 2 };
                 let end = if i + 1 == parts { wide.end + DEGREE } else { own.end + DEGREE / 2 };
                 let hold = [i == 0, i + 1 == parts];
@@ -86,7 +90,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         let each = watch.each(windows.len());
         let solved: Vec<(Vec<[f64; D]>, usize)> = windows
             .par_iter()
-            .map_init(Band::default, |band, window| {
+            .map_init(Band::<D>::default, |band, window| {
                 each.advance(1);
                 self.window(window, band)
             })
@@ -101,8 +105,8 @@ impl<'a, const D: usize> Fit<'a, D> {
         }
     }
 
-    /// The coefficients that the intervals of a window see, and the work that they took.
-    fn window(&self, window: &Window, band: &mut Band) -> (Vec<[f64; D]>, usize) {
+    /// The coefficients of the basis functions on the intervals of a window, and the work that they took.
+    fn window(&self, window: &Window, band: &mut Band<D>) -> (Vec<[f64; D]>, usize) {
         let Window { intervals, hold, .. } = window;
         let (first, end) = (intervals.start, intervals.end);
         let count = self.spline.coefficient.len();
@@ -118,15 +122,22 @@ impl<'a, const D: usize> Fit<'a, D> {
         }
         let knots = &self.spline.knots;
         let origin = given[given.len() / 2];
-        let (rows, start) = rows(self.line, knots, first, end, &origin);
-        let chord = |j: usize| self.line.tolerance[self.line.chord_at(knots[j])];
+        let pace = &self.line.pace;
+        let density: Vec<f64> = (first..end)
+            .map(|j| pace.density(0.5 * (knots[j] + knots[j + 1]), knots[j + 1] - knots[j]))
+            .collect();
+        let (rows, start) = rows(self.line, knots, first, &density, &origin);
+        let unit = |j: usize| {
+            let tolerance = self.line.tolerance[self.line.chord_at(knots[j])];
+            density[j - first] * tolerance.powi(2) / (knots[j + 1] - knots[j]).powi(5)
+        };
         let mut problem = Problem {
-            energy: (first..end).map(|j| energy(&around(knots, j))).collect(),
+            energy: (first..end).map(|j| pace.energy(&around(knots, j))).collect(),
             rows,
             start,
             x: given.iter().map(|x| std::array::from_fn(|k| x[k] - origin[k])).collect(),
             fixed,
-            unit_energy: (first..end).map(|j| chord(j).powi(2) / (knots[j + 1] - knots[j]).powi(5)).sum(),
+            unit: (first..end).map(unit).collect(),
         };
         let iterations = problem.solve(band);
         let moved = problem.x.iter().zip(&problem.fixed).zip(given).map(|((x, &fixed), given)| {
@@ -140,10 +151,10 @@ impl<'a, const D: usize> Fit<'a, D> {
     }
 }
 
-/// Intervals to be solved together.
+/// Intervals that are solved together.
 struct Window {
     intervals: Range<usize>,
-    /// The coefficients that reach over the start, over the end, keep their values.
+    /// Whether the coefficients that reach over the start, and over the end, keep their values.
     hold: [bool; 2],
     /// The coefficients that are taken from the solution.
     keep: Range<usize>,
