@@ -96,14 +96,12 @@ def run(quick: bool = False) -> Result:
             "Arcs: radius of the curve at many places. Chords: distance of the centre from the places of the "
             "curve that are nearest to the points.",
             "off: the greatest difference of arcs, the mean one of chords, in percent of the tolerance.",
-            "fastest: the median with `--path fastest`.",
         ),
     )
 
 
 def _row(shape: str, r: float, tolerance: float) -> dict[str, Cell]:
-    radius = radii(shape, r, tolerance, Corners.SMOOTH)
-    fastest = radii(shape, r, tolerance, Corners.FASTEST)
+    radius = radii(shape, r, tolerance)
     by_points = shape.startswith("chords")
     off = abs(radius.mean() - r) if by_points else np.abs(radius - r).max()
     return {
@@ -114,16 +112,15 @@ def _row(shape: str, r: float, tolerance: float) -> dict[str, Cell]:
         "least": f"{radius.min():.5f}",
         "greatest": f"{radius.max():.5f}",
         "off [%]": 100.0 * float(off) / tolerance,
-        "fastest": f"{np.median(fastest):.5f}",
     }
 
 
-def radii(shape: str, r: float, tolerance: float, corners: Corners) -> Array:
+def radii(shape: str, r: float, tolerance: float) -> Array:
     """Distances [mm] of the path from the centre of the arc of a shape."""
     write, turn = SHAPES[shape]
     machine = Machine.load("mill")
     program = read_gcode(f"G21 G90 G64 F1000\n{write(r)}\nM2\n".encode(), machine, shape)
-    path = build_path(program, machine, tolerance, corners=corners)
+    path = build_path(program, machine, tolerance, corners=Corners.SMOOTH)
     place = _places(path)
     if shape.startswith("chords"):
         points = program.target[1:-1, :2]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from feedplan.audit import _Limits
 from feedplan.constraints.problem import Problem as _Problem
-from feedplan.geometry.rules import Rules
+from feedplan.geometry.rules import Motion, Rules
 from feedplan.machine.expression import Expression
 from feedplan.machine.joint_interpolants import Accuracy
 from feedplan.machine.path_derivatives import TipPieces
@@ -109,7 +109,7 @@ def fit_points(
     points: _Floats, tolerance: float, max_chord: float, max_curvature: float, corner_angle: float
 ) -> tuple[_Floats, _Floats, _Integers, _Floats, _Naturals]: ...
 def build_path(
-    program: Program, rules: Rules, progress: _Progress = None
+    program: Program, rules: Rules, motion: Motion | None = None, progress: _Progress = None
 ) -> tuple[
     tuple[Curve, _Floats, _Integers, _Floats, _Integers],
     tuple[int, int, int, float, list[float] | None],

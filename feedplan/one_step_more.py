@@ -50,13 +50,13 @@ def one_step_more(made: Plan) -> tuple[Step, ...]:
 
 def _request(made: Plan) -> dict[str, Any]:
     """The arguments that made the plan; the machine without its controller."""
-    shared = ("tolerance", "feed", "feed_override", "start_speed", "end_speed", "path")
+    shared = ("tolerance", "feed", "feed_override", "start_speed", "end_speed", "path", "path_rounds")
     named = (*shared, *options_of(made.method))
     given = {name: made.options[name] for name in named if made.options.get(name) is not None}
     source: Any = made.program
     if source is None:
         source = made.path
-        del given["path"]
+        del given["path"], given["path_rounds"]
     machine = replace(made.machine, controller=None)
     return {"source": source, "machine": machine, "method": made.method, **given}
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,12 @@ from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.errors import InputError, SolverError
 from feedplan.event_places import PlannedEvents
 from feedplan.events import PlacedEvents, TimedEvents
+from feedplan.faster_path import MAX_ROUNDS, Followed, Gain, faster
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
+from feedplan.geometry.path_words import path_words
+from feedplan.geometry.rules import Motion
 from feedplan.knots import Knots
 from feedplan.lazy import cached_property
 from feedplan.lower_bound import lower_bound
@@ -76,7 +80,7 @@ class Plan:
     is faster, though one of another path within the tolerance may be (a method with a bound of its own, as
     jerk-limited, may prove its on a grid and say so); `compute` is the computing time of each stage [s];
     `options` those that the plan was made with; `today` what a controller takes for the same program, where
-    one was named.
+    one was named; `gain` what a path fitted to the speed gained, where one was asked for.
     """
 
     program: Program | None
@@ -91,6 +95,7 @@ class Plan:
     warnings: tuple[str, ...] = field(default=())
     options: Mapping[str, Any] = field(default_factory=dict)
     today: Today | None = None
+    gain: Gain | None = None
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
     _account: list[Account] = field(default_factory=list, init=False, repr=False, compare=False)
 
@@ -312,6 +317,7 @@ class Plan:
                 "inside": fit.inside,
                 "outside": fit.outside,
             },
+            "gain": None if self.gain is None else self.gain.to_json(),
             "compute": dict(self.compute),
             "audit": verdict.to_json(),
             "warnings": list(self.warnings),
@@ -332,6 +338,7 @@ def plan(
     interpolator: Interpolator = "sarfraz",
     max_setpoints: int = MAX_SETPOINTS,
     path: FollowedPath = "as-fitted",
+    path_rounds: int = 1,
     reading: Reading | None = None,
     controller: Controller | Mapping[str, Any] | str | None = None,
     progress: Progress | None = None,
@@ -344,8 +351,14 @@ def plan(
     Path. `machine`: a Machine, or the name or file of one. `method`: one of `methods()`.
     `tolerance` [mm] is the greatest distance from the programmed path where the program lets the tool leave
     it (default: the program's own, else 0.01; a Path has its own); how the path follows the program within it
-    is the method's choice. Where the method takes smooth paths, `path` "as-fitted" keeps the size of arcs and
-    bends, "fastest" cuts them as far as the tolerance allows. `feed` [mm/s] replaces the programmed feeds,
+    is the method's choice. With `path` "as-fitted" the path depends on the program and the tolerance alone,
+    and arcs and bends keep their size. With "fastest" it is planned a second time, along a smooth path that
+    is fitted to the speed of the first plan: it bends where the tool is slow, and cuts corners, arcs and
+    bends as far as the tolerance allows. Of each section between two stops the faster of both paths is
+    followed, and `Plan.gain` says what that gained. `path_rounds` (1 to 3) is how often it is fitted to the
+    speed of the plan before, as long as that gains. Such a path depends on machine, feeds and method;
+    neighbouring passes may differ by up to twice the tolerance. Methods that follow the lines themselves
+    know one path only, and take no "fastest". `feed` [mm/s] replaces the programmed feeds,
     `feed_override` multiplies them. `reading` are keywords of `read_program`, such as a tool table. `period`
     [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
     `interpolator` makes the setpoints: "sarfraz" or "newton".
@@ -390,8 +403,8 @@ def plan(
     machine = Machine.of(machine)
     rival = machine.controller if controller is None else Controller.of(controller)
     choice = corners(method)
-    if one_of(path, "path", PATHS) == "fastest" and choice is Corners.SMOOTH:
-        choice = Corners.FASTEST
+    refits = one_of(path, "path", PATHS) == "fastest" and choice in (Corners.SMOOTH, Corners.ROUNDED)
+    rounds = whole(path_rounds, "path_rounds", f"a whole number from 1 to {MAX_ROUNDS}", most=MAX_ROUNDS)
     if period is not None:
         machine = machine.with_period(period)
     one_of(interpolator, "interpolator", INTERPOLATORS)
@@ -402,6 +415,18 @@ def plan(
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
     program: Program | None = None
+    gain: Gain | None = None
+
+    def stated(path: Path) -> Problem:
+        return build_problem(
+            path,
+            machine,
+            feed=feed,
+            feed_override=feed_override,
+            start_speed=start_speed,
+            end_speed=end_speed,
+        )
+
     if isinstance(source, Path):
         if tolerance is not None:
             raise refuse("the tolerance", tolerance, "it where the path is made: a Path has its own")
@@ -431,31 +456,44 @@ def plan(
     share = of_stage(progress, "plan")
     report("plan", 0.0)
     with _timed(compute, "plan"):
-        problem = build_problem(
-            followed,
-            machine,
-            feed=feed,
-            feed_override=feed_override,
-            start_speed=start_speed,
-            end_speed=end_speed,
-        )
+        problem = stated(followed)
         report("plan", 0.0)
-        if limit is not None:
-            solve = partial(
-                solve,
-                time_limit=limit.left,
-                # How long what follows will take is known from setpoints of a first plan.
-                reserve=lambda first: limit.keep_for(
-                    setpoints(problem, first, machine.period, interpolator, max_setpoints)
-                ),
-            )
-        if tells_progress(method):
-            solve = partial(solve, progress=part(share, 0.0, PLANNING))
         others = {} if elsewhere is None else {"elsewhere": elsewhere}
         solve = partial(solve, **others)
-        profile = solve(problem)
-        if not math.isfinite(profile.time):
-            raise SolverError(f"{method} loses its digits on this path: take another method or machine")
+        # Equal parts of the progress for each plan.
+        each = PLANNING / (1 + rounds if refits else 1)
+        turns = count()
+
+        def solved(problem: Problem) -> SpeedProfile:
+            own: dict[str, Any] = {}
+            if limit is not None:
+                own["time_limit"] = limit.left
+                # How long what follows will take is known from setpoints of a first plan.
+                own["reserve"] = lambda first: limit.keep_for(
+                    setpoints(problem, first, machine.period, interpolator, max_setpoints)
+                )
+            if tells_progress(method):
+                turn = next(turns)
+                own["progress"] = part(share, turn * each, (turn + 1) * each)
+            profile = solve(problem, **own)
+            if not math.isfinite(profile.time):
+                raise SolverError(f"{method} loses its digits on this path: take another method or machine")
+            return profile
+
+        profile = solved(problem)
+    if refits and program is not None and not profile.stopped:
+
+        def follow(motion: Motion) -> Followed:
+            path = build_path(program, machine, tolerance, corners=Corners.SMOOTH, motion=motion)
+            problem = stated(path)
+            return Followed(path, problem, solved(problem))
+
+        with _timed(compute, "refit"):
+            max_jerk = path_words(program, machine).max_jerk
+            if not limits_jerk(method):
+                max_jerk = np.full_like(max_jerk, np.inf)
+            best, gain = faster(Followed(followed, problem, profile), max_jerk, follow, stated, rounds)
+            followed, problem, profile = best.path, best.problem, best.profile
     with _timed(compute, "bound"):
         settings = {**options_of(method), **given}
         # A method's own bound takes what is left of a time limit.
@@ -520,8 +558,10 @@ def plan(
             "end_speed": end_speed,
             "interpolator": interpolator,
             "path": path,
+            "path_rounds": path_rounds,
         },
         today=beside,
+        gain=gain,
     )
 
 

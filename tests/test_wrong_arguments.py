@@ -101,6 +101,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         "end_speed": 0.0,
         "interpolator": "newton",
         "path": "as-fitted",
+        "path_rounds": 1,
         "reading": {"whole_step": 1.0},
         "controller": "grbl",
         "progress": None,

@@ -10,6 +10,7 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from feedplan import planners
+from feedplan.faster_path import MAX_ROUNDS
 from feedplan.geometry.corners import PATHS
 from feedplan.setpoints import MAX_SETPOINTS
 
@@ -60,7 +61,15 @@ PATH = click.option(
     type=click.Choice(PATHS),
     default="as-fitted",
     show_default=True,
-    help="Smooth paths keep the size of arcs (as-fitted), or cut arcs up to the tolerance (fastest).",
+    help="The path of the program alone, with arcs of their size (as-fitted), or one that is fitted to the "
+    "speed of a first plan, within the tolerance, where that is faster (fastest).",
+)
+PATH_ROUNDS = click.option(
+    "--path-rounds",
+    type=click.IntRange(1, MAX_ROUNDS),
+    default=1,
+    show_default=True,
+    help="How often the fastest path is fitted to the speed of the plan before, as long as that gains.",
 )
 ACCURACY = click.option(
     "--accuracy", type=Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."

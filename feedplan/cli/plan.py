@@ -26,6 +26,7 @@ from feedplan.cli.options import (
     MOST_SETPOINTS,
     NO_SETPOINTS,
     PATH,
+    PATH_ROUNDS,
     PERIOD,
     PROGRAM,
     QUIET,
@@ -55,6 +56,7 @@ from feedplan.setpoints import INTERPOLATORS, Interpolator
 @click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=WHOLE_LIMIT_HELP)
 @TOLERANCE
 @PATH
+@PATH_ROUNDS
 @FEED
 @FEED_OVERRIDE
 @PERIOD
@@ -86,6 +88,7 @@ def plan(
     time_limit: float | None,
     tolerance: float | None,
     path: FollowedPath,
+    path_rounds: int,
     feed: float | None,
     feed_override: float,
     period: float | None,
@@ -144,6 +147,7 @@ def plan(
             method=method,
             tolerance=tolerance,
             path=path,
+            path_rounds=path_rounds,
             feed=feed,
             feed_override=feed_override,
             period=period,

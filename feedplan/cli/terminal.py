@@ -142,6 +142,8 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     rows.append(("tolerance", tolerance_text(**summary["tolerance"])))
     rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))
     rows += fit_rows(summary.get("fit") or {})
+    if summary.get("gain"):
+        rows.append(("faster path", gain_text(summary["gain"])))
     rows.append(("audit", audit_text(audit)))
     compute: Mapping[str, float] = summary.get("compute") or {}
     if compute:
@@ -206,6 +208,14 @@ def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
     if polynomials:
         text += f" of {polynomials} polynomials ({ratio_text(points, polynomials)})"
     return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} mm"), *_side_rows(fit)]
+
+
+def gain_text(gain: Mapping[str, Any]) -> str:
+    """What a path fitted to the speed gained."""
+    times = " → ".join(duration_text(float(seconds)) for seconds in gain["times"])
+    if len(gain["times"]) == 1:
+        return f"{times} as fitted: a path fitted to the speed gains nothing"
+    return f"{times}; the last fit is faster in {gain['faster']} of {counted(gain['sections'], 'section')}"
 
 
 def _side_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -70,6 +70,7 @@ class Client:
         interpolator: Interpolator = "sarfraz",
         max_setpoints: int = MAX_SETPOINTS,
         path: FollowedPath = "as-fitted",
+        path_rounds: int = 1,
         reading: Reading | None = None,
         controller: Controller | Mapping[str, Any] | str | None = None,
         progress: Progress | None = None,
@@ -90,6 +91,7 @@ class Client:
             "interpolator": interpolator,
             "max_setpoints": max_setpoints,
             "path": path,
+            "path_rounds": path_rounds,
             "controller": _controller(controller),
         }
         given = {name: value for name, value in given.items() if value != _USUAL[name]} | options

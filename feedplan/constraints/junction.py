@@ -18,7 +18,7 @@ def junction_limit(path: Path, max_velocity_jump: NDArray[np.float64]) -> NDArra
     motion agrees is left to the planner. A smooth path rests where it turns back.
     """
     jump = tangent_jumps(path.curve)
-    if path.corners in (Corners.SMOOTH, Corners.FASTEST):
+    if path.corners is Corners.SMOOTH:
         max_velocity_jump = np.zeros_like(max_velocity_jump)
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(jump > 0, max_velocity_jump / jump, np.inf).min(axis=1)

@@ -17,7 +17,7 @@ from feedplan.geometry.fit_settings import FitSettings, tolerance_of
 from feedplan.geometry.joined import joined
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
-from feedplan.geometry.rules import Rules
+from feedplan.geometry.rules import Motion, Rules
 from feedplan.machine.machine import Machine
 from feedplan.program.program import PathControl, Program
 from feedplan.progress import Listener, part, tell
@@ -34,6 +34,7 @@ def build_path(
     tolerance: float | None = None,
     settings: FitSettings | None = None,
     corners: Corners = Corners.ROUNDED,
+    motion: Motion | None = None,
     progress: Listener | None = None,
 ) -> Path:
     """The path that the machine follows.
@@ -61,10 +62,12 @@ def build_path(
     - SMOOTH: all moves between two stops, arcs and splines too, are one curve of continuous fourth derivative
       within the tolerance; Q does not count. Exact moves are followed within `exact_tolerance`, with the
       lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and bends
-      of points keep their size, except with FASTEST. The path stops where a rapid meets a feed below 1e-4 of
-      the machine's speed, where an exact path meets another one, and where it turns back by more than 135°.
-      Where it goes back along its own line, and nothing else asks for a stop, it rests within a run. Where no
-      curve is found, corners are rounded one by one between stops, and `Path.warnings` says so.
+      of points keep their size. The path stops where a rapid meets a feed below 1e-4 of the machine's speed,
+      where an exact path meets another one, and where it turns back by more than 135°. Where it goes back
+      along its own line, and nothing else asks for a stop, it rests within a run. Where no curve is found,
+      corners are rounded one by one between stops, and `Path.warnings` says so. With a `motion` along a path
+      of the same program the curve is fitted to its speed: arcs and bends are cut up to the tolerance, and
+      turns up to 178° are no stops.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The tool
     also stops where the coordinate mode or the tool length changes.
@@ -124,7 +127,7 @@ def build_path(
         corner_angle=math.radians(settings.corner_angle),
         corners=(Corners.ARCS if corners is Corners.JOINED else corners).value,
     )
-    built, summary, outside, rough = native_build_path(program, rules, part(progress, 0.0, _BUILT))
+    built, summary, outside, rough = native_build_path(program, rules, motion, part(progress, 0.0, _BUILT))
     native, feed, move, allowed, runs = built
     tell(progress, 1.0)
     if outside is not None:

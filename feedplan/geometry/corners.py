@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Literal, get_args
 
-# Smooth paths keep the size of arcs and bends, or make them as fast as the tolerance allows.
+# What a plan does with the tolerance: see `feedplan.plan`.
 FollowedPath = Literal["as-fitted", "fastest"]
 PATHS: tuple[FollowedPath, ...] = get_args(FollowedPath)
 
@@ -22,12 +22,11 @@ class Corners(Enum):
     - `SMOOTH`: all moves between two stops, arcs and splines too, are one curve of continuous fourth
       derivative, in which long lines are straight. Its curvature has no jumps, as limits of jerk require.
       Away from their ends arcs and bends of G1 moves (points that turn by less than 30°) keep their size.
-    - `FASTEST`: as SMOOTH, but bends are cut like corners, up to the tolerance.
+      A path that is fitted to a motion (`feedplan.geometry.rules.Motion`) cuts them up to the tolerance.
     """
 
     ROUNDED = "rounded"
     ARCS = "arcs"
     PROGRAMMED = "programmed"
     SMOOTH = "smooth"
-    FASTEST = "fastest"
     JOINED = "joined"

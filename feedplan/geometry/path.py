@@ -46,7 +46,7 @@ class FitSummary:
     pieces are cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance
     between the whole path (arcs and corners too) and the programmed one, both ways.
 
-    The last three are for smooth paths (`Corners.SMOOTH`, `FASTEST`), else None. They are distances [mm] from
+    The last three are for smooth paths (`Corners.SMOOTH`), else None. They are distances [mm] from
     the program, positive on the outside, away from the centre of curvature. `mean_offset` is the mean over
     all bends, which are arcs and points that turn by less than 30°, away from corners: the error of the
     radius of a hole or a boss. `inside` and `outside` are the greatest distances on each side, corners

@@ -20,10 +20,10 @@ class PathWords:
 
     `names` are those of the machine that the program names, in the machine's order. `joints` (n,): the
     words of the move are joint positions; `changes` (n − 1,): the mode or the tool length of the next move
-    differs. `max_velocity`, `max_acceleration` (axes,) are for rounding corners, the smaller ones
-    of both directions: those of the joint where all words are joints; otherwise the least of all linear
-    joints, or of the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all
-    words are joints, and those that move allow a velocity jump at corners.
+    differs. `max_velocity`, `max_acceleration`, `max_jerk` (axes,) are for rounding corners and fits, the
+    smaller ones of both directions: those of the joint where all words are joints; otherwise the least of all
+    linear joints, or of the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`:
+    all words are joints, and those that move allow a velocity jump at corners.
     """
 
     names: tuple[str, ...]
@@ -31,6 +31,7 @@ class PathWords:
     changes: NDArray[np.bool_]
     max_velocity: NDArray[np.float64]
     max_acceleration: NDArray[np.float64]
+    max_jerk: NDArray[np.float64]
     travel: NDArray[np.float64]
     may_jump: bool
 
@@ -84,6 +85,7 @@ def path_words(program: Program, machine: Machine) -> PathWords:
         changes=changes,
         max_velocity=_limits(machine, names, bool(joints.all()), "max_velocity"),
         max_acceleration=_limits(machine, names, bool(joints.all()), "max_acceleration"),
+        max_jerk=_limits(machine, names, bool(joints.all()), "max_jerk"),
         travel=np.array(
             [machine.axis(name).travel if name in machine.axis_names else (-np.inf, np.inf) for name in names]
         ),

@@ -46,3 +46,19 @@ class Rules:
     corner_angle: float
     corners: str
     splines: CompositeCurve | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion along a path of the same program, by which a faster path is fitted.
+
+    `run` (r, 2) first and last move of each run of that path; `start` (r + 1,) where its places begin in
+    `place` (m,), ascending parts of the run from 0 to 1; `speed_sq` (m,) the square of the speed there
+    [mm²/s²]; `max_jerk` (axes,) [mm/s³], infinite where the motion has no limit of jerk.
+    """
+
+    run: NDArray[np.int64]
+    start: NDArray[np.int64]
+    place: Floats
+    speed_sq: Floats
+    max_jerk: Floats

@@ -172,6 +172,10 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
                 ("… of bends in the mean, outside positive", "mean_offset"),
             )
         ]
+    gain = summary.get("gain")
+    if gain:
+        rows.append(("Time along the path as fitted", duration_text(float(gain["times"][0]))))
+        rows.append(("… gained by fits to the speed", f"{_short(gain['gained'])} s"))
     rows.append(("Pieces planned", f"{summary['pieces']} in {_counted(summary['runs'], 'run')}"))
     compute = summary.get("compute") or {}
     rows += [(f"Time to {name}", duration_text(float(seconds))) for name, seconds in compute.items()]

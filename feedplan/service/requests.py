@@ -57,6 +57,7 @@ class CommonOptions(BaseModel):
     interpolator: Interpolator | None = None
     max_setpoints: int | None = Field(default=None, ge=1, description="A plan of more setpoints is refused")
     path: FollowedPath | None = None
+    path_rounds: int | None = Field(default=None, ge=1, le=3, description="Fits of the fastest path")
     controller: str | dict[str, Value] | None = Field(
         default=None, description="The controller of today: its name, or a table as in a machine file"
     )

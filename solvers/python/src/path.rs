@@ -58,7 +58,7 @@ struct Rules<'py> {
 #[derive(FromPyObject)]
 struct MotionArrays<'py> {
     run: PyReadonlyArray2<'py, i64>,
-    start: Numbers<'py>,
+    start: PyReadonlyArray1<'py, i64>,
     place: Floats<'py>,
     speed_sq: Floats<'py>,
     max_jerk: Floats<'py>,

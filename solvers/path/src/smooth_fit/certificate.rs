@@ -79,7 +79,7 @@ fn interval_at(knots: &[f64], u: f64) -> usize {
 
 /// A place where the curve is near vertex i, by the method of Gauss and Newton from its station.
 fn foot_point<const D: usize>(line: &Polyline<D>, knots: &[f64], pieces: &[Control<D>], i: usize) -> f64 {
-    let slip = if line.sized { SLIP } else { FITTED_SLIP } * line.tolerance_at(i);
+    let slip = if line.pace.fitted { FITTED_SLIP } else { SLIP } * line.tolerance_at(i);
     let low = (line.station[i] - slip).max(0.0);
     let high = (line.station[i] + slip).min(line.length());
     let mut u = line.station[i];

@@ -21,12 +21,14 @@ pub struct Pace<const D: usize> {
     /// 1/A² and 1/J² of each axis.
     per_acceleration_sq: [f64; D],
     per_jerk_sq: [f64; D],
+    /// It is that of a motion.
+    pub fitted: bool,
 }
 
 impl<const D: usize> Default for Pace<D> {
     /// The same speed everywhere, limits of jerk that are the same for all axes and none of acceleration.
     fn default() -> Self {
-        Self { table: vec![[0.0, 1.0]], per_acceleration_sq: [0.0; D], per_jerk_sq: [1.0; D] }
+        Self { table: vec![[0.0, 1.0]], per_acceleration_sq: [0.0; D], per_jerk_sq: [1.0; D], fitted: false }
     }
 }
 
@@ -38,7 +40,12 @@ impl<const D: usize> Pace<D> {
             *square = square.max(LEAST * LEAST * greatest);
         }
         let per_square = |limits: [f64; D]| limits.map(|limit| 1.0 / (limit * limit));
-        Self { table, per_acceleration_sq: per_square(max_acceleration), per_jerk_sq: per_square(max_jerk) }
+        Self {
+            table,
+            per_acceleration_sq: per_square(max_acceleration),
+            per_jerk_sq: per_square(max_jerk),
+            fitted: true,
+        }
     }
 
     /// The pace from a station on, its stations from 0.

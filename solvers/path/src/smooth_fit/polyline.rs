@@ -16,7 +16,7 @@ pub struct Polyline<const D: usize> {
     pub tolerance: Vec<f64>,
     /// What each vertex is to the curve.
     pub hold: Vec<Hold>,
-    /// Bends keep their size: vertices that are held pull the curve to them. Else the curve is fitted to a motion.
+    /// Bends keep their size: vertices that are held pull the curve to them.
     pub sized: bool,
     /// How fast it is followed.
     pub pace: Pace<D>,

@@ -104,7 +104,7 @@ fn limits<const D: usize>(line: &Polyline<D>, chord: usize, vertex: Option<usize
     let along = if length > 1e-3 { sum.map(|x| x / length) } else { after };
     let slip = slip(line, vertex - 1).min(slip(line, vertex));
     if line.turn(vertex) > SHARP {
-        let slip = if line.sized { SHARP_ALONG } else { slip };
+        let slip = if line.pace.fitted { slip } else { SHARP_ALONG };
         (along, [SHARP_ACROSS * across * epsilon, slip * epsilon])
     } else {
         (along, [FILL * across * epsilon, slip * epsilon])
@@ -114,7 +114,7 @@ fn limits<const D: usize>(line: &Polyline<D>, chord: usize, vertex: Option<usize
 /// The limit along a chord, in tolerances.
 fn slip<const D: usize>(line: &Polyline<D>, chord: usize) -> f64 {
     let at_corners = line.hold[chord] == Hold::Free && line.hold[chord + 1] == Hold::Free;
-    if at_corners && !line.sized {
+    if at_corners && line.pace.fitted {
         FITTED_ALONG
     } else {
         1.0
@@ -150,6 +150,7 @@ fn frame<const D: usize>(along: &[f64; D]) -> [[f64; D]; D] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::pace::Pace;
     use super::*;
 
     #[test]
@@ -168,7 +169,6 @@ mod tests {
     #[test]
     fn every_vertex_is_a_sample_and_the_sharp_one_is_held_along_its_bisector() {
         let mut line = Polyline::new(vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.1], [2.0, 2.0]], vec![0.1; 3]);
-        line.sized = true;
         let knots: Vec<f64> = (0..=4).map(|i| line.length() * i as f64 / 4.0).collect();
         let (rows, start) = rows(&line, &knots, 0, &[1.0; 4], &[0.0; 2]);
         assert_eq!((rows.len(), start[4]), (18, 18));
@@ -178,7 +178,7 @@ mod tests {
         assert!((corner.half[0] - 0.095).abs() < 1e-15);
         assert!((dot(&corner.direction[1], &[1.0, 1.0])).abs() > 1.3);
         // A curve that is fitted to a motion may slip along the polyline, but not where a vertex is held.
-        line.sized = false;
+        line.pace = Pace::new(vec![[0.0, 1.0]], [1.0; 2], [1.0; 2]);
         let along = |line: &Polyline<2>| {
             let (rows, _) = super::rows(line, &knots, 0, &[1.0; 4], &[0.0; 2]);
             rows.iter().map(|row| row.half[1]).fold(0.0, f64::max)

@@ -41,7 +41,7 @@ impl<'a, const D: usize> Fit<'a, D> {
     /// The polyline itself as coefficients; those in the middle of chords longer than `long` are held there.
     pub fn new(line: &'a Polyline<D>, knots: Vec<f64>, long: f64) -> Self {
         let count = knots.len() - 1 + DEGREE;
-        let bent = if line.sized { BENT } else { FITTED_BENT };
+        let bent = if line.pace.fitted { FITTED_BENT } else { BENT };
         let (mut coefficient, mut pin) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for i in 0..count {
             let u = greville(&knots, i);

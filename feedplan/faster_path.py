@@ -1,0 +1,248 @@
+"""A faster path within the tolerance: fitted anew to the speed of a plan, and kept where it is faster.
+
+A path that is fitted without knowing the speed spreads each bend evenly. Fitted to the speed of a plan (the
+energy is in `solvers/path/src/smooth_fit/pace.rs`) it bends where the tool is slow and is smooth where it is
+fast. Between two stops that both paths have, the tool is at rest at the same places, so each of these
+sections can follow the path on which it takes less time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InfeasibleError, SolverError
+from feedplan.geometry.path import Path
+from feedplan.geometry.rules import Motion
+from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
+
+# The most rounds: later ones hardly gain.
+MAX_ROUNDS = 3
+# A section that takes no more than this over its time at the feed and at the speed of the axes gains nothing.
+_WORTH_TRYING = 1e-3
+# A section that is shorter by less than this part is none the faster.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A path, the problem along it and a profile of it."""
+
+    path: Path
+    problem: Problem
+    profile: SpeedProfile
+
+    @property
+    def time(self) -> float:
+        """Time of the program, pauses included [s]."""
+        return self.profile.time + self.path.pauses
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What paths fitted to the speed gained.
+
+    `times` [s]: along the path as fitted, and after each round; `sections` between the stops that both paths
+    of the last round have, and in how many of them the new one was `faster`."""
+
+    times: tuple[float, ...]
+    sections: int
+    faster: int
+
+    @property
+    def gained(self) -> float:
+        """Time saved [s]."""
+        return self.times[0] - self.times[-1]
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers by name, as plan.json has them."""
+        return {**asdict(self), "gained": self.gained}
+
+
+def faster(
+    first: Followed,
+    max_jerk: NDArray[np.float64],
+    follow: Callable[[Motion], Followed],
+    join: Callable[[Path], Problem],
+    rounds: int,
+) -> tuple[Followed, Gain]:
+    """The first plan, each section on the path on which it takes least time.
+
+    In each of the `rounds`, as long as they gain, a path is fitted to the speed of the plan before.
+    `max_jerk` (path axes,) [mm/s³] is infinite where the plan has no limit of jerk; `follow` makes and plans
+    the path for a motion; `join` states the problem along a path.
+    """
+    best, times, sections, count = first, [first.time], _Sections(first.path, first.path), 0
+    worth: NDArray[np.bool_] = _excess(first, sections.runs[0]) > _WORTH_TRYING
+    while worth.any() and len(times) <= rounds:
+        try:
+            other = follow(motion_of(best, max_jerk))
+        except (InfeasibleError, SolverError):
+            # What can be planned along one path need not be along another; the first plan holds.
+            break
+        sections = _Sections(best.path, other.path)
+        before, after = (
+            _sums(each.profile.run_times, runs)
+            for each, runs in zip((best, other), sections.runs, strict=True)
+        )
+        better: NDArray[np.bool_] = after < (1.0 - _ROUNDING) * before
+        count = int(better.sum())
+        if count == 0:
+            break
+        best = other if better.all() else _joined(best, other, sections, better, join)
+        times.append(best.time)
+    return best, Gain(tuple(times), len(sections), count)
+
+
+def motion_of(followed: Followed, max_jerk: NDArray[np.float64]) -> Motion:
+    """The motion of a plan: u̇² at the ends of its phases, by the part of the way from rest to rest."""
+    path, profile = followed.problem.path, followed.profile
+    # Where one move ends and the next begins at rest, a run goes back along its own line.
+    phase = np.searchsorted(profile.piece, np.arange(len(path) + 1))
+    rests = 1 + np.flatnonzero((path.move[1:, 0] > path.move[:-1, 1]) & (profile.p0[phase[1:-1]] == 0.0))
+    runs = np.union1d(path.runs, rests)
+    begin, ends = np.concatenate([[0.0], np.cumsum(path.width)]), phase[runs]
+    # The starts of all phases, and the end of the last one of each run.
+    place = np.insert(begin[profile.piece] + profile.u0, ends[1:], begin[runs[1:]])
+    speed_sq = np.insert(profile.p0, ends[1:], profile.p1[ends[1:] - 1])
+    finite = np.isfinite(speed_sq)
+    speed_sq = np.where(finite, speed_sq, speed_sq[finite].max(initial=0.0))
+    start = ends + np.arange(len(ends))
+    run = np.repeat(np.arange(len(runs) - 1), np.diff(start))
+    part = (place - begin[runs[run]]) / np.diff(begin[runs])[run]
+    moves = np.stack([path.move[runs[:-1], 0], path.move[runs[1:] - 1, 1]], axis=1)
+    return Motion(run=moves, start=start, place=np.clip(part, 0.0, 1.0), speed_sq=speed_sq, max_jerk=max_jerk)
+
+
+class _Sections:
+    """The runs of two paths of one program between the stops that both have: offsets in both."""
+
+    def __init__(self, first: Path, other: Path) -> None:
+        ends = [_stops(path) for path in (first, other)]
+        common = np.intersect1d(ends[0], ends[1])
+        self.runs = [
+            np.concatenate(
+                [[0], np.searchsorted(_last_moves(path), common, side="right"), [len(path.runs) - 1]]
+            )
+            for path in (first, other)
+        ]
+
+    def __len__(self) -> int:
+        return len(self.runs[0]) - 1
+
+
+def _last_moves(path: Path) -> NDArray[np.int64]:
+    """The last move of each run."""
+    return np.asarray(path.move[path.runs[1:] - 1, 1])
+
+
+def _stops(path: Path) -> NDArray[np.int64]:
+    """The moves at whose end the tool stops, but for the last; stops within a move do not count."""
+    last, after = _last_moves(path)[:-1], path.move[path.runs[1:-1], 0]
+    return np.asarray(last[after > last])
+
+
+def _sums(values: NDArray[np.float64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+    return np.add.reduceat(values, offsets[:-1])
+
+
+def _excess(followed: Followed, runs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """By how much each section takes longer than at the feed and the axes' greatest speeds, as a part."""
+    problem, path = followed.problem, followed.problem.path
+    control, offsets = path.curve.control_points, path.curve.offsets
+    way = np.abs(control[offsets[1:] - 1] - control[offsets[:-1]])
+    least = path.width / problem.feed
+    if not problem.words:
+        least = np.maximum(least, (way / problem.limits("velocity").max(axis=0)).max(axis=1))
+    time = _sums(followed.profile.run_times, runs)
+    return np.asarray(time / np.maximum(_sums(_sums(least, path.runs), runs), 1e-300) - 1.0)
+
+
+def _joined(
+    first: Followed,
+    other: Followed,
+    sections: _Sections,
+    better: NDArray[np.bool_],
+    join: Callable[[Path], Problem],
+) -> Followed:
+    """Each section as one of two plans has it."""
+    both = (first, other)
+    changes = np.flatnonzero(np.diff(better)) + 1
+    taken = [
+        (both[which], slice(int(sections.runs[which][begin]), int(sections.runs[which][end])))
+        for begin, end in pairwise([0, *changes.tolist(), len(better)])
+        for which in [int(better[begin])]
+    ]
+    if (first.path.group_feed is None) == (other.path.group_feed is None):
+        path = _joined_path([(each.path, own) for each, own in taken], (first.path, other.path))
+        problem = join(path)
+        profile = _joined_profile([(each.problem.path, each.profile, own) for each, own in taken])
+        if len(problem.path) == sum(_pieces(each.problem.path, own) for each, own in taken):
+            return Followed(path, problem, profile)
+    # Feeds or joints make other pieces of both paths together.
+    return min(both, key=lambda each: each.time)
+
+
+def _pieces(path: Path, own: slice) -> int:
+    """The number of pieces of some runs."""
+    return int(path.runs[own.stop] - path.runs[own.start])
+
+
+def _joined_path(taken: list[tuple[Path, slice]], both: tuple[Path, Path]) -> Path:
+    def pieces(path: Path, own: slice) -> slice:
+        return slice(int(path.runs[own.start]), int(path.runs[own.stop]))
+
+    def column(name: str, of_runs: bool = False) -> Any:
+        parts = [getattr(path, name) for path, _ in taken]
+        if any(part is None for part in parts):
+            return None
+        where = [own if of_runs else pieces(path, own) for path, own in taken]
+        return np.concatenate([part[own] for part, own in zip(parts, where, strict=True)])
+
+    counts = np.concatenate([np.diff(path.runs)[own] for path, own in taken])
+    fits = [path.fit for path in both]
+    fit = replace(
+        fits[1],
+        deviation=max(fit.deviation for fit in fits),
+        inside=max(fit.inside or 0.0 for fit in fits),
+        outside=max(fit.outside or 0.0 for fit in fits),
+    )
+    warnings = dict.fromkeys(sentence for path in both for sentence in path.warnings)
+    return replace(
+        both[1],
+        curve=CompositeCurve.joined([path.curve[pieces(path, own)] for path, own in taken]),
+        **{name: column(name) for name in ("feed", "group_feed", "move", "line", "tolerance")},
+        **{
+            name: column(name, of_runs=True)
+            for name in ("dwell", "coordinate_mode", "tool_length", "new_words")
+        },
+        runs=np.concatenate([[0], np.cumsum(counts)]),
+        fit=fit,
+        warnings=tuple(warnings),
+    )
+
+
+def _joined_profile(taken: list[tuple[Path, SpeedProfile, slice]]) -> SpeedProfile:
+    columns: dict[str, list[Any]] = {name: [] for name in (*OF_PHASES, *OF_PIECES)}
+    runs, pieces = [np.zeros(1, dtype=np.int64)], 0
+    for path, profile, own in taken:
+        first, last = int(path.runs[own.start]), int(path.runs[own.stop])
+        phases = slice(int(profile.runs[own.start]), int(profile.runs[own.stop]))
+        for name in OF_PHASES:
+            columns[name].append(getattr(profile, name)[phases])
+        columns["piece"][-1] = columns["piece"][-1].astype(np.int64) + (pieces - first)
+        for name in OF_PIECES:
+            listed = getattr(profile, name).astype(np.int64)
+            columns[name].append(listed[(listed >= first) & (listed < last)] + (pieces - first))
+        runs.append(runs[-1][-1] + profile.runs[own.start + 1 : own.stop + 1] - phases.start)
+        pieces += last - first
+    joined: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}
+    excess = [profile.excess for _, profile, _ in taken]
+    return SpeedProfile(**joined, runs=np.concatenate(runs), excess=max(excess))
