@@ -129,9 +129,8 @@ def arm_python(folder: Path) -> list[str]:
     apt = ["apt-get", "--quiet=2", "-oAPT::Architecture=arm64", "-oAPT::Architectures=arm64"]
     apt += [f"-oDir::{name}={place}" for name, place in directories.items()]
     subprocess.run([*apt, "update"], check=True)
-    subprocess.run(
-        [*apt, "install", "--yes", "--download-only", "--no-install-recommends", "python3"], check=True
-    )
+    install = [*apt, "install", "--yes", "--download-only", "--no-install-recommends"]
+    subprocess.run([*install, "python3", "libstdc++6"], check=True)
     root = folder / "root"
     for package in folder.glob("archives/*.deb"):
         subprocess.run(["dpkg", "--extract", package, root], check=True)

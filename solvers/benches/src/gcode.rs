@@ -1,4 +1,5 @@
-//! Blocks read a second: straight moves, arcs, calls and expressions; a line counts each time that it is run.
+//! The number of blocks that are read in a second: straight moves, arcs, calls and expressions. A line counts each time
+//! that it is run.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -19,7 +20,7 @@ fn lines() -> String {
     text + "M30\n"
 }
 
-/// What a short modal post writes.
+/// The shortest text of modal blocks.
 fn short_lines() -> String {
     let mut text = String::from("G21G90G17\nG0Z5\nG1F2000\n");
     for i in 0..BLOCKS {
@@ -42,7 +43,7 @@ fn arcs() -> String {
     text + "M30\n"
 }
 
-/// Calls in a loop: seven lines for each of their moves.
+/// Calls in a loop: seven lines for each move.
 fn calls() -> String {
     let calls = BLOCKS / 7;
     format!(
@@ -51,7 +52,7 @@ fn calls() -> String {
     )
 }
 
-/// Expressions in a loop: three lines for each of their moves.
+/// Expressions in a loop: three lines for each move.
 fn expressions() -> String {
     let times = BLOCKS / 3;
     format!(

@@ -1,12 +1,12 @@
 //! Time per interval and iteration of the jerk-limited planner in three axes on one thread: of whole plans, preparation and
-//! checks between the nodes included, and of iterations alone, from plans that differ in nothing but their number.
+//! checks between the stations included, and of iterations alone, from two plans that differ in their number only.
 
 use std::time::{Duration, Instant};
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_jerk::jerk_limited::{plan, Effort, End, Geometry, Limits, PathPoint, Problem};
 
-/// A space curve that winds to both sides and up and down, its derivatives known by the length.
+/// A space curve that winds to both sides and up and down, with its derivatives by length.
 struct Winding([f64; 2]);
 
 impl Geometry<3> for Winding {
@@ -36,7 +36,7 @@ impl Geometry<3> for Winding {
     }
 }
 
-/// Iterations of the two plans whose difference is taken: neither has converged.
+/// The numbers of iterations of the two plans; neither converges in them.
 const ITERATIONS: [usize; 2] = [3, 12];
 
 fn jerk_limited(criterion: &mut Criterion) {

@@ -16,7 +16,7 @@ use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 const PIECES: usize = 1000;
 const SETPOINTS: usize = 100_000;
 
-/// x = u; y and z have slopes that waver between the joints.
+/// x = u; the slopes of y and z vary.
 fn spline() -> CompositeCurve<3> {
     let slope = |i: usize| [1.0, (1.7 * i as f64).sin(), 0.5 * (2.3 * i as f64).cos()];
     let mut curve = CompositeCurve::default();

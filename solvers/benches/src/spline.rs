@@ -1,4 +1,4 @@
-//! Time per place on a curve: derivatives to the third, lengths and places at lengths; and per piece: extraction,
+//! The time per point of a curve: derivatives to the third, lengths and points at lengths; and per piece: extraction,
 //! length table, cusps. Cubics in three axes, polynomial and rational.
 
 use criterion::{criterion_group, Criterion, Throughput};
@@ -13,7 +13,7 @@ use feedplan_geometry::watch::Watch;
 
 const SPANS: usize = 1000;
 
-/// A winding curve, its weights between 0.5 and 2.
+/// A winding curve with weights between 0.5 and 2.
 fn winding(degree: usize, rational: bool) -> Spline<3> {
     let points = SPANS + degree;
     let control = (0..points)

@@ -1,23 +1,23 @@
-//! What a profile does to the limits, from the control points and the columns alone.
+//! An audit of a profile against all limits, from the control points and the columns of the profile alone.
 
 use feedplan_planner::profile::Profile;
 
 use super::cases::Case;
 
-/// Worst figures of a profile; limits as (value/limit − 1).
+/// The worst figures of a profile; those of limits are value/limit − 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Audit {
     pub acceleration: f64,
     pub velocity: f64,
     pub feed: f64,
     pub chord: f64,
-    /// The greatest distance of the nearest limit from being active.
+    /// The greatest margin to the nearest limit over all phases.
     pub idle: f64,
-    /// Relative to the greatest v² nearby.
+    /// The greatest jump of v², relative to the greatest v² nearby.
     pub jump: f64,
-    /// Ends of an arc against its own law, relative to p.
+    /// The greatest deviation of p at the end of a phase from the law of the phase, relative to p.
     pub ends: f64,
-    /// Durations against the way over the mean speed in small steps, relative to the whole time.
+    /// The greatest deviation of a duration from its integral over small steps, relative to the whole time.
     pub duration: f64,
 }
 
@@ -41,7 +41,7 @@ impl Audit {
     }
 }
 
-/// Checks the profile at `samples` places of each arc; panics if its arcs do not cover the path in order.
+/// Checks the profile at `samples` points of each phase; panics if the phases do not cover the path in order.
 pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) -> Audit {
     let mut worst = Audit::default();
     let mut last: Option<(usize, f64, f64)> = None;
@@ -51,7 +51,7 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
         assert!(u0 < u1 && profile.duration[row] >= 0.0, "arc {row}: {u0} to {u1}");
         let arc = ArcLaw::new(case, profile, row);
         let ends = [arc.at(u0), arc.at(u1)];
-        // The chain: every piece from 0 to its width, v² continuous.
+        // The phases cover every piece from 0 to its width, and v² is continuous.
         let v_sq = [profile.p0[row], profile.p1[row]].map(|p| p.max(0.0));
         let v_sq = [v_sq[0] * ends[0].d, v_sq[1] * ends[1].d];
         match last {
@@ -73,8 +73,8 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
                 worst.ends = worst.ends.max((end.p - p).abs() / p.max(end.p).max(f64::MIN_POSITIVE));
             }
         }
-        // u is rounded: on a short arc, next to a cusp, and where the arc's axis hardly moves, this part of the
-        // figures is not seen.
+        // u is rounded: on a short phase, near a cusp, and where the axis of the phase hardly moves, this part of the
+        // figures is rounding.
         let longest = arc.left.iter().chain(&arc.right).fold(0.0, |most: f64, g| most.max(g.abs()));
         let shortest = ends[0].d.min(ends[1].d).sqrt();
         let axis = match profile.kind[row] {
@@ -114,7 +114,7 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
                 let limit = if radius > delta { 2.0 * radius * delta - delta * delta } else { delta * delta };
                 let ratio = v_sq / (speed * speed * limit);
                 worst.chord = worst.chord.max(ratio - 1.0 - grain);
-                // The planner keeps to a straight line that lies below the limit by up to this part.
+                // The planner keeps p below a straight line, which is below the limit by up to this fraction.
                 if ratio > 1.0 - 2e-3 {
                     nearest = 0.0;
                 }
@@ -129,7 +129,7 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
     worst
 }
 
-/// A place on an arc.
+/// A point of a phase.
 struct Place<const M: usize> {
     g: [f64; M],
     d: f64,
@@ -137,7 +137,7 @@ struct Place<const M: usize> {
     acceleration: [f64; M],
 }
 
-/// The law of one arc.
+/// The law of one phase.
 struct ArcLaw<'a, const M: usize> {
     profile: &'a Profile,
     row: usize,
@@ -146,7 +146,7 @@ struct ArcLaw<'a, const M: usize> {
     right: [f64; M],
     bend: [f64; M],
     twist: f64,
-    /// Where the constant acceleration starts from: u and v_k² there.
+    /// The start of the constant acceleration: u and v_k² there.
     anchor: (f64, f64),
 }
 
@@ -198,7 +198,7 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
             0 => {
                 let from = self.tangent(self.anchor.0)[k];
                 let p = (self.anchor.1 + value * (from + g[k]) * (u - self.anchor.0)) / (g[k] * g[k]);
-                // Without the difference value − c p.
+                // In a form without the difference value − c p, which cancels.
                 let acceleration = std::array::from_fn(|l| {
                     let twist = c[k] * g[l] - c[l] * g[k];
                     (g[l] * value - twist * p) / g[k]
@@ -228,7 +228,7 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
         Place { g, d, p, acceleration }
     }
 
-    /// Time by its definition: speed gained over acceleration, length over speed, or the integral of du/√p.
+    /// The time by its definition: gained speed over acceleration, length over speed, or the integral of du/√p.
     fn duration(&self) -> f64 {
         let row = self.row;
         let (u0, u1) = (self.profile.u0[row], self.profile.u1[row]);

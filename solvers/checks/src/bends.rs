@@ -10,7 +10,7 @@ pub struct Bend {
     pub width: f64,
 }
 
-/// A path that is straight but for its bends; pieces meet in the middle of each.
+/// A straight path with bends; a piece ends in the middle of each bend.
 #[derive(Clone, Debug)]
 pub struct Bends {
     knots: Vec<f64>,
@@ -21,13 +21,13 @@ pub struct Bends {
 }
 
 impl Bends {
-    /// Bends in rising order inside (0, length).
+    /// From bends in rising order of s inside (0, length).
     pub fn new(length: f64, bends: Vec<Bend>) -> Self {
         let knots = std::iter::once(0.0).chain(bends.iter().map(|bend| bend.s)).chain([length]).collect();
         Self { knots, bends, theta: 0.3, feed: f64::INFINITY }
     }
 
-    /// The same, beginning in another direction.
+    /// The same with another direction at the start.
     pub fn turned(length: f64, bends: Vec<Bend>, theta: f64) -> Self {
         Self { theta, ..Self::new(length, bends) }
     }

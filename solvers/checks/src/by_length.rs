@@ -87,7 +87,7 @@ impl<C: Curve<M>, const M: usize> Geometry<M> for ByLength<C, M> {
 
     fn at(&self, piece: usize, s: f64) -> PathPoint<M> {
         let (start, end) = (self.knots[piece], self.knots[piece + 1]);
-        // A knot belongs to the piece asked for.
+        // At a knot, the derivatives are those of the piece that is asked for.
         let inside = 1e-9 * (end - start);
         let t = self.parameter(piece, s.clamp(start + inside, end - inside));
         let [_, d1, d2, d3] = self.curve.at(t);
@@ -168,7 +168,7 @@ impl Nurbs {
         }
     }
 
-    /// Parameters where pieces meet.
+    /// The parameters at the ends of pieces.
     pub fn parameters(&self) -> Vec<f64> {
         let mut out = self.knots[self.degree..self.knots.len() - self.degree].to_vec();
         out.dedup();

@@ -1,4 +1,4 @@
-//! Random planning problems: paths as CAM systems write them, and paths made to break a planner.
+//! Random planning problems: paths like those of CAM systems, and adversarial ones.
 
 use feedplan_geometry::quadratic::Quadratic;
 use feedplan_geometry::spline::CompositeCurve;
@@ -26,7 +26,7 @@ impl Random {
         low + (high - low) * self.uniform()
     }
 
-    /// e to a power between these.
+    /// e to a random power between these two.
     pub fn exponential(&mut self, low: f64, high: f64) -> f64 {
         self.between(low, high).exp()
     }
@@ -49,7 +49,7 @@ impl Random {
     }
 }
 
-/// A planning problem that owns its arrays; one run.
+/// A planning problem of one run that owns its arrays.
 #[derive(Clone, Debug)]
 pub struct Case<const M: usize> {
     pub pieces: Vec<Quadratic<M>>,
@@ -102,7 +102,7 @@ impl<const M: usize> Case<M> {
         self.plan_elevated(0)
     }
 
-    /// The plan of its pieces as those of a higher degree.
+    /// The plan of the same pieces with an elevated degree.
     pub fn plan_elevated(&self, elevate: usize) -> Result<Profile, Fault> {
         if M <= 3 {
             Elevated::<3>::new(self, elevate).problem(self).fastest()
@@ -115,7 +115,7 @@ impl<const M: usize> Case<M> {
         self.plan().expect("a profile").time()
     }
 
-    /// The same path as the planner takes it: straight pieces are lines, cut where they turn back.
+    /// The same path with straight pieces as lines, cut where they reverse, as the planner needs them.
     pub fn regular(&self) -> Self {
         let mut curve = CompositeCurve::default();
         for piece in &self.pieces {
@@ -129,7 +129,7 @@ impl<const M: usize> Case<M> {
         other
     }
 
-    /// The path travelled the other way.
+    /// The path in the reverse direction.
     pub fn reversed(&self) -> Self {
         let mut other = self.clone();
         other.pieces.reverse();
@@ -191,7 +191,7 @@ impl<const M: usize> Case<M> {
         other
     }
 
-    /// Other parameters on the same curves.
+    /// The same curves with other parameters.
     pub fn reparametrised(&self, random: &mut Random) -> Self {
         let mut other = self.clone();
         for piece in &mut other.pieces {
@@ -201,13 +201,13 @@ impl<const M: usize> Case<M> {
     }
 }
 
-/// A short path with something wrong with it: exact zeros, ties, cusps, straight runs, corners, jumps of the
+/// A short adversarial path: exact zeros, ties, cusps, straight runs, corners, jumps of the
 /// parameter's speed, tangents and limits over many orders of magnitude, a low chord-error limit.
 pub fn random_case<const M: usize>(seed: u64) -> Case<M> {
     case_of_kinds(seed, 9)
 }
 
-/// The same without cusps that rounding can hardly tell from exact ones, and without axes that hardly move.
+/// The same without cusps that are exact up to rounding, and without axes that hardly move.
 pub fn milder_case<const M: usize>(seed: u64) -> Case<M> {
     case_of_kinds(seed, 7)
 }
@@ -241,7 +241,7 @@ fn case_of_kinds<const M: usize>(seed: u64, kinds: usize) -> Case<M> {
                 *knot = knot.map(|x| x * scale);
             }
         }
-        // Nearly a cusp: the next tangent is this one reversed, but for a little.
+        // Nearly a cusp: the next tangent is almost the reverse of this one.
         7 => {
             for i in 0..count {
                 if random.chance(0.5) {
@@ -275,7 +275,7 @@ fn case_of_kinds<const M: usize>(seed: u64, kinds: usize) -> Case<M> {
             }
         }
     }
-    // No piece without length.
+    // Every piece has a length.
     for (left, right) in &mut tangents {
         if left.iter().chain(right.iter()).all(|&x| x == 0.0) {
             left[0] = 1.0;

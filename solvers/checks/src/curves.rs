@@ -1,4 +1,4 @@
-//! Random problems on curves of any degree, polynomial and rational, most of them made to break a planner.
+//! Random problems on curves of any degree, polynomial and rational, most of them adversarial.
 
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
@@ -18,7 +18,7 @@ pub struct Piece<const M: usize> {
     pub width: f64,
 }
 
-/// A planning problem that owns its arrays; one run.
+/// A planning problem of one run that owns its arrays.
 #[derive(Clone, Debug)]
 pub struct CurveCase<const M: usize> {
     pub pieces: Vec<Piece<M>>,
@@ -66,7 +66,7 @@ impl<const M: usize> CurveCase<M> {
         problem.fastest()
     }
 
-    /// The path travelled the other way.
+    /// The path in the reverse direction.
     pub fn reversed(&self) -> Self {
         let mut other = self.clone();
         other.pieces.reverse();
@@ -92,8 +92,8 @@ impl<const M: usize> CurveCase<M> {
     }
 }
 
-/// A short path of curves with something wrong with it: cusps of any order and places next to one, pieces next to a
-/// point, doubled control points, reversals on a line, weights and units of any size, degrees up to 9.
+/// A short adversarial path of curves: cusps of any order and points near a cusp, pieces that are nearly a
+/// point, double control points, reversals on a line, weights and units of any size, degrees up to 9.
 pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
     let mut random = Random(seed);
     let count = 1 + random.below(4);
@@ -107,12 +107,12 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
     for i in 0..count {
         let degree = 2 + random.below(most - 1);
         let width = random.exponential(-2.0, 2.0);
-        // Tangents as a polynomial of degree − 1 in Bernstein form: smooth where two pieces meet, unless kinds say
+        // Tangents as a polynomial of degree − 1 in Bernstein form, smooth at the ends of pieces unless the kind says
         // otherwise.
         let mut rates: Vec<[f64; M]> = (0..degree).map(|_| random.normals()).collect();
         rates[0] = tangent.map(|x| x * width);
         match kind {
-            // Next to a cusp: tangents through a point next to the origin.
+            // Near a cusp: the tangents pass through a point near the origin.
             1 | 2 => {
                 let off = if kind == 1 { random.exponential(-36.0, -2.0) } else { 0.0 };
                 let order = 1 + random.below(3.min(degree - 1));
@@ -125,7 +125,7 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
                     .map(|&x| std::array::from_fn(|k| x * direction[k] + off * random.normal()))
                     .collect();
                 if kind == 2 && random.chance(0.5) && degree > order + 1 {
-                    // The direction changes in the cusp too.
+                    // The direction changes in the cusp as well.
                     let second: [f64; M] = random.normals();
                     let factors: Vec<[f64; 2]> = (0..=order).map(|_| [-place, 1.0 - place]).collect();
                     let across = product(&factors, degree - 1, &mut random);
@@ -135,7 +135,7 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
                 }
                 corner.fill(true);
             }
-            // Doubled control points.
+            // Double control points.
             3 => {
                 let doubled = 1 + random.below(degree - 1);
                 for _ in 0..doubled {
@@ -145,7 +145,7 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
                 }
                 corner.fill(true);
             }
-            // To and fro on a line.
+            // Reversals on a line.
             4 => {
                 let direction: [f64; M] = random.normals();
                 let off = if random.chance(0.5) { 0.0 } else { random.exponential(-36.0, -2.0) };
@@ -163,7 +163,7 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
                 }
                 corner.fill(true);
             }
-            // Pieces next to a point.
+            // Pieces that are nearly a point.
             6 => {
                 if random.chance(0.5) {
                     let size = random.exponential(-30.0, -2.0);
@@ -171,7 +171,7 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
                 }
                 corner.fill(true);
             }
-            // Whole numbers: ties and exact zeros.
+            // Integers make ties and exact zeros.
             7 => {
                 rates.iter_mut().for_each(|rate| *rate = rate.map(f64::round));
                 corner.fill(true);

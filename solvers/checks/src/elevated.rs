@@ -1,4 +1,4 @@
-//! A case of quadratic pieces as the planner takes it: as it is, or with its degree elevated.
+//! A case of quadratic pieces as a problem of the planner, with their degree or an elevated one.
 
 use feedplan_geometry::quadratic::{lerp, norm, sub};
 use feedplan_geometry::watch::Watch;
@@ -7,7 +7,7 @@ use feedplan_planner::problem::Problem;
 use super::cases::Case;
 use super::padded;
 
-/// The arrays of such a problem in P axes, of which those beyond the case's own rest.
+/// The arrays of such a problem in P axes; axes that the case does not have rest.
 pub struct Elevated<const P: usize> {
     control: Vec<[f64; P]>,
     offset: Vec<usize>,
@@ -16,13 +16,13 @@ pub struct Elevated<const P: usize> {
 }
 
 impl<const P: usize> Elevated<P> {
-    /// The pieces of a case, of degree 2 and so much more.
+    /// The pieces of a case, with `elevate` added to their degree 2.
     pub fn new<const M: usize>(case: &Case<M>, elevate: usize) -> Self {
         let mut control = vec![];
         let mut offset = vec![0];
         for piece in &case.pieces {
             let [a, b, c] = piece.control;
-            // A line stays one.
+            // A line stays a line.
             let bend = norm(&sub(&b, &lerp(&a, &c, 0.5)));
             let straight = bend <= 1e-15 * (norm(&a) + norm(&c));
             let mut points = if straight { vec![a, c] } else { vec![a, b, c] };

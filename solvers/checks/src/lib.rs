@@ -7,6 +7,7 @@ pub mod campaign;
 mod cases;
 pub mod curves;
 mod elevated;
+pub mod jerk;
 pub mod polylines;
 mod regular_path;
 pub mod wave;
@@ -38,19 +39,19 @@ macro_rules! for_axes {
     };
 }
 
-/// As many axes as cases for the kernels of curves have.
+/// The numbers of axes of cases for the kernels of curves.
 pub const FEW_AXES: [usize; 3] = [1, 2, 3];
 
-/// So many the kernels are compiled for, as from Python.
+/// The number of axes that kernels are compiled for, as in the Python module.
 pub const PADDED: usize = 3;
 
-/// The values of all axes, and another one for those that stand still.
+/// The values of all axes, with `still` for axes that rest.
 pub fn padded<const M: usize, const P: usize>(values: &[f64; M], still: f64) -> [f64; P] {
     assert!(M <= P, "{M} axes in {P}");
     std::array::from_fn(|k| values.get(k).copied().unwrap_or(still))
 }
 
-/// The same for one of `FEW_AXES`.
+/// `for_axes!` for one of `FEW_AXES`.
 #[macro_export]
 macro_rules! for_few_axes {
     ($count:expr, $m:ident, $call:expr) => {

@@ -1,4 +1,4 @@
-//! Random polylines, and measures of a fitted curve that know nothing of the fit.
+//! Random polylines, and measures of a fitted curve that are independent of the fit.
 
 use feedplan_geometry::spline::Piece;
 use feedplan_path::smooth_fit::polyline::Polyline;
@@ -75,7 +75,7 @@ pub fn dense<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>) -> f64 {
     worst
 }
 
-/// A linear congruence, its bits mixed.
+/// A linear congruential generator with mixed bits.
 pub struct Random(pub u64);
 
 impl Random {
@@ -110,7 +110,7 @@ pub fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Ve
     points
 }
 
-/// A random polyline that nowhere turns back: a walk, a zig-zag, noise on a curve, dense points, or all of them.
+/// A random polyline without reversals: a walk, a zigzag, noise on a curve, dense points, or all of them.
 pub fn random_polyline<const D: usize>(random: &mut Random) -> Vec<[f64; D]> {
     let chords = 2 + (150.0 * random.draw().powi(2)) as usize;
     let step = 10f64.powf(3.5 * random.draw() - 2.5);
@@ -135,7 +135,7 @@ pub fn random_polyline<const D: usize>(random: &mut Random) -> Vec<[f64; D]> {
                 .collect()
         }
     };
-    // Where it would turn back, points are left out.
+    // Points at reversals are left out.
     let mut kept: Vec<[f64; D]> = Vec::with_capacity(points.len());
     for point in points {
         if kept.last().is_none_or(|last| distance(last, &point) > 1e-9) {

@@ -1,20 +1,20 @@
-//! A path as the planner takes it: straight pieces are lines cut where they turn back, and no curve has a cusp inside.
+//! A path as the planner needs it: straight pieces are lines, cut where they reverse, and cusps are at ends of pieces.
 
 use feedplan_geometry::spline::regular::regular;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
-/// Pieces of such a path, one run.
+/// The pieces of such a path, in one run.
 pub struct RegularPath<const M: usize> {
     pub curve: CompositeCurve<M>,
-    /// The given piece that each of them is a part of.
+    /// For each piece, the given piece that it is a part of.
     pub source: Vec<usize>,
-    /// Greatest speeds at their ends, one more than pieces: 0 in cusps and where a line turns back.
+    /// Greatest speeds at the ends of pieces, one more than pieces: 0 in cusps and where a line reverses.
     pub junction: Vec<f64>,
 }
 
 impl<const M: usize> RegularPath<M> {
-    /// Each piece by itself, with the greatest speeds at the ends of the given pieces.
+    /// From the given pieces, each by itself, and the greatest speeds at their ends.
     pub fn new(given: &CompositeCurve<M>, speeds: &[f64]) -> Self {
         let each: Vec<_> = (0..given.len()).map(|i| i..i + 1).collect();
         let found = regular(given, &each, Watch::default());

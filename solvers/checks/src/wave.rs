@@ -1,4 +1,4 @@
-//! A space path without end: the two angles of its direction are sums of sines.
+//! A space path of any length: the two angles of its direction are sums of sines.
 
 use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 

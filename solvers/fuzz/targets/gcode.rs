@@ -1,4 +1,4 @@
-//! Any bytes end in moves of finite numbers, or in an error.
+//! Any bytes give moves of finite numbers, or an error.
 
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! The fit as a whole: every promise of `fit_points` on chains by hand, at random (proptest) and made to
-//! hurt, checked by dense sampling that shares nothing with the certificate.
+//! The fit as a whole: every property of `fit_points` on chains by hand, at random (proptest) and adversarial, checked
+//! by dense sampling that is independent of the certificate.
 
 use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 use feedplan_geometry::watch::Watch;
@@ -13,7 +13,7 @@ const OPTIONS: FitOptions = FitOptions {
     max_curvature: f64::INFINITY,
     corner_angle: std::f64::consts::FRAC_PI_6,
 };
-/// Straight pieces that the curve of a piece is sampled by.
+/// The number of chords that a piece is sampled by.
 const SAMPLES: usize = 64;
 
 fn to_segment<const M: usize>(p: &[f64; M], a: &[f64; M], b: &[f64; M]) -> f64 {
@@ -32,7 +32,7 @@ fn unit<const M: usize>(v: [f64; M]) -> [f64; M] {
     v.map(|value| value / length)
 }
 
-/// Everything that must hold of any fit.
+/// Checks all properties of a fit.
 fn check<const M: usize>(points: &[[f64; M]], pieces: &[FittedPiece<M>], options: &FitOptions) {
     let tolerance = options.tolerance;
     let last = points.len() - 1;
@@ -82,7 +82,7 @@ fn check<const M: usize>(points: &[[f64; M]], pieces: &[FittedPiece<M>], options
             .collect();
         for k in 0..=8 {
             let off = to_polyline(&lerp(&chord[0], &chord[1], k as f64 / 8.0), &curve);
-            // The samples cut what the curve bows between them.
+            // Chords between samples are inside of the curve by this.
             let bow = near.iter().fold(0.0_f64, |bow, piece| {
                 let [a, b, c] = &piece.piece.control;
                 let bend: [f64; M] = std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k]);
@@ -99,7 +99,7 @@ fn fitted<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> Vec<Fitt
     pieces
 }
 
-/// Cosines of the turns where splines meet.
+/// The cosines of the corners between splines.
 fn joints<const M: usize>(pieces: &[FittedPiece<M>]) -> Vec<f64> {
     pieces
         .windows(2)
@@ -189,7 +189,7 @@ fn a_corner_between_curves_jumps_once() {
     // tolerance leaves a free end.
     assert!(joints_there.len() == 1 && (joints_there[0] - 0.377).abs() < 0.06, "{joints_there:?}");
     assert_eq!(pieces.len(), 12);
-    // Without a threshold the corner is rounded where the tolerance allows it.
+    // Without a threshold, the corner is rounded as far as the tolerance allows.
     assert!(joints(&fitted(&points, &OPTIONS)).is_empty());
 }
 
@@ -204,7 +204,7 @@ fn chords_too_coarse_for_the_tolerance_stay() {
 
 #[test]
 fn a_bulge_between_one_and_two_tolerances_is_shared_and_stays_smooth() {
-    // Chords of 1 on a radius of 8: sagitta 0.0157.
+    // Chords of 1 mm on a radius of 8 mm have a sagitta of 0.0157 mm.
     let points: Vec<[f64; 2]> =
         (0..=50).map(|i| f64::from(i) / 8.0).map(|t| [8.0 * t.cos(), 8.0 * t.sin()]).collect();
     let pieces = fitted(&points, &OPTIONS);
@@ -237,7 +237,7 @@ fn the_unit_does_not_matter() {
         .collect();
     let options = FitOptions { max_chord: 2.0, max_curvature: 0.9, ..OPTIONS };
     let pieces = fit_points(&points, &options, Watch::default());
-    // A power of two scales without rounding.
+    // A factor that is a power of two scales without rounding.
     for scale in [1024.0, 1.0 / 1024.0] {
         let scaled: Vec<[f64; 3]> = points.iter().map(|p| p.map(|value| scale * value)).collect();
         let options = FitOptions {

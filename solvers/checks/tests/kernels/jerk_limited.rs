@@ -7,12 +7,13 @@ use std::time::Instant;
 use feedplan_checks::bends::{Bend, Bends};
 use feedplan_checks::by_length::{ByLength, Lemniscate, Nurbs, Trefoil};
 use feedplan_checks::campaign::seeds;
+use feedplan_checks::jerk::{certify, plan, stream};
 use feedplan_checks::wave::Wave;
 use feedplan_jerk::jerk_limited::{
-    certify, plan, stream, Effort, End, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile, SpeedCap,
+    Effort, End, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile, SpeedCap,
 };
 
-/// What a dense check may find: the planner's own tolerance and a little more.
+/// The excess that a dense check may find: a little more than the planner's tolerance.
 const HELD: f64 = 1e-6;
 
 /// A straight line along one axis, with a feed.
@@ -37,7 +38,7 @@ impl Geometry<1> for Line {
     }
 }
 
-/// From rest to rest, the same limits for all axes.
+/// The problem from rest to rest, with the same limits for all axes.
 fn problem<G: Geometry<M>, const M: usize>(geometry: &G, [v, a, j]: [f64; 3]) -> Problem<'_, G, M> {
     let limits = Limits { velocity: [[v; M]; 2], acceleration: [[a; M]; 2], jerk: [j; M] };
     Problem { geometry, limits, caps: &[], ends: [End::Rest; 2] }
@@ -49,7 +50,7 @@ fn planned<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Plan {
     plan(problem, &Effort::default()).expect("the path can be travelled")
 }
 
-/// The greatest excess of velocity, acceleration and jerk over the limits, `dense` places an interval and the ramps.
+/// The greatest excess of velocity, acceleration and jerk over the limits, at `dense` points of each interval and ramp.
 fn excess<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     profile: &Profile,
@@ -84,12 +85,12 @@ fn excess<G: Geometry<M>, const M: usize>(
 }
 
 fn assert_held<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, profile: &Profile) {
-    // 17 places an interval are none of the twelve that the planner itself looks at.
+    // None of 17 points in an interval is one of the twelve that the planner checks.
     let excess = excess(problem, profile, 17);
     assert!(excess.iter().all(|&part| part < HELD), "excess {excess:?}");
 }
 
-/// Time of a line from rest to rest by seven sections of constant jerk.
+/// The time of a line from rest to rest in seven sections of constant jerk.
 fn seven_sections(length: f64, [v, a, j]: [f64; 3]) -> f64 {
     let rise = |v: f64| if v * j <= a * a { 2.0 * (v / j).sqrt() } else { v / a + a / j };
     if v * rise(v) <= length {
@@ -131,7 +132,7 @@ fn lines_take_as_long_as_seven_sections() {
     }
 }
 
-/// An axis that slows down by another limit than it speeds up by.
+/// An axis with different limits for acceleration and deceleration.
 #[test]
 fn a_line_with_a_limit_for_each_direction_takes_as_long_as_its_sections() {
     let path = Line::new(100.0);
@@ -141,7 +142,7 @@ fn a_line_with_a_limit_for_each_direction_takes_as_long_as_its_sections() {
         problem.limits.velocity[1] = [1.0];
         let plan = planned(&problem);
         assert_held(&problem, &plan.profile);
-        // Lines of an even limit rise to the peak, and fall from it, in half of their ways.
+        // With the same limit for both, a line reaches its peak speed in the middle.
         let [_, _, j] = FAST;
         let rise = |v: f64, a: f64| if v * j <= a * a { 2.0 * (v / j).sqrt() } else { v / a + a / j };
         let (mut low, mut high) = (0.0, FAST[0]);
@@ -265,7 +266,7 @@ fn random_paths_hold_all_limits() {
     assert!(stopped <= 3, "{stopped} paths did not converge");
 }
 
-/// All of them, and no plan is slower than with the lesser limits of both directions.
+/// All limits hold, and no plan is slower than with the lesser limits of both directions.
 #[test]
 fn random_paths_hold_limits_that_differ_by_direction() {
     for seed in seeds(4) {
@@ -328,7 +329,7 @@ fn slalom(count: usize) -> Bends {
     Bends::new(s + 8.0, bends)
 }
 
-/// Limits under which stops are short: many windows on a short path.
+/// Limits with short stopping distances: many windows on a short path.
 const SHORT_STOPS: [f64; 3] = [50.0, 3000.0, 1e6];
 
 #[test]
@@ -364,7 +365,7 @@ fn finished_stretches_make_up_the_plan() {
     let problem = problem(&path, SHORT_STOPS);
     let mut stretches: Vec<Profile> = vec![];
     let effort = Effort { window: 400, ..Effort::default() };
-    // A hand-out has some windows for each thread.
+    // A part that is handed out has some windows for each thread.
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let plan = two.install(|| stream(&problem, &effort, |stretch| stretches.push(stretch.clone())));
     let plan = plan.expect("a plan");
@@ -390,7 +391,7 @@ fn a_feed_is_reached_and_kept() {
 
 #[test]
 fn speeds_at_single_places_are_kept() {
-    // From rest to 10 mm/s at the middle of each: as long as twice the way to rest over such a place, nearly.
+    // From rest to 10 mm/s in the middle of each cap: nearly twice the time from rest over such a cap to rest.
     let path = Line::new(60.0);
     let caps = [SpeedCap::new(20.0, 10.0), SpeedCap::new(40.0, 0.1)];
     let problem = Problem { caps: &caps, ..problem(&path, FAST) };

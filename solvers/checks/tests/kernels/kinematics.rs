@@ -1,4 +1,4 @@
-//! Recorded formulas by both of their evaluations: Taylor series and intervals of the planner, jets of the audit.
+//! Recorded formulas, evaluated by the Taylor series and intervals of the planner and by the jets of the audit.
 
 use feedplan_audit::joints::formula::{Formula, Jet};
 use feedplan_audit::EPS;
@@ -12,7 +12,7 @@ const UNARY: [i32; 8] = [1, 6, 7, 8, 9, 10, 13, 14];
 const BINARY: [i32; 5] = [2, 3, 4, 5, 12];
 const INPUTS: usize = 2;
 
-/// A formula of random operations, each on any earlier results.
+/// A formula of random operations on earlier results.
 fn formula(choices: &[(bool, usize, usize, usize, f64)]) -> (Vec<[i32; 3]>, Vec<f64>) {
     let (mut rows, mut constants) = (Vec::new(), Vec::new());
     for &(unary, op, a, b, constant) in choices {
@@ -58,14 +58,14 @@ proptest! {
         for k in 0..4 {
             let (value, error) = (jet.value[k], EPS * jet.error[k]);
             let bound = theirs.output(&bounds, 0)[k];
-            // Factors round as well.
+            // The factors are rounded as well.
             let slack = 4.0 * EPS * bound.magnitude() * factorial[k];
             let near = Interval { lo: bound.lo * factorial[k] - slack, hi: bound.hi * factorial[k] + slack };
             // Angles may be on another turn.
             if near.is_bounded() && value.is_finite() && error.is_finite() && k > 0 {
                 let series = theirs.output(&table, 0)[k] * factorial[k];
                 prop_assert!(near.lo <= series && series <= near.hi);
-                // The exact derivative is within the bounds and within the error of the audit's.
+                // The exact derivative is within the bounds and within the error of the audit's derivative.
                 prop_assert!(value + error >= near.lo && value - error <= near.hi, "{k}: {value} ± {error}, {near:?}");
             }
         }

@@ -1,4 +1,4 @@
-//! Tests of kernels from outside of their crates, in one binary: what they instantiate is compiled once.
+//! Tests of kernels from outside of their crates, in one binary, so that each kernel is compiled for them once.
 
 mod fit;
 mod gcode_fuzz;

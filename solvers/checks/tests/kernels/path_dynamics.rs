@@ -1,5 +1,5 @@
-//! From a curve to setpoints: path dynamics and profile together keep the limits of every axis, as third differences
-//! of the positions show. These share no formula with the kernels: the lengths come from quadrature.
+//! Path dynamics and profile together keep the limits of every axis, by third differences of positions. These share no
+//! formula with the kernels: lengths come from quadrature.
 
 use feedplan_checks::{seeds, Random};
 use feedplan_geometry::watch::Watch;
@@ -144,7 +144,7 @@ fn uses(control: &Control, weight: &[f64], shape: impl Fn(&Curve<2>) -> Shape<2>
     (worst, last.time + last.duration)
 }
 
-/// A curve of degree 3 to 6 that goes on along x and swings along y.
+/// A curve of degree 3 to 6 that advances along x and swings along y.
 fn random_curve(random: &mut Random) -> (Control, Vec<f64>) {
     let degree = 3 + random.below(4);
     let size = random.exponential(1.0, 4.0);

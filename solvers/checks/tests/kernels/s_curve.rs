@@ -1,11 +1,11 @@
-//! The two-pass jerk-limited profiler: profiles worked out by hand, random sequences of segments, numbers of any size.
+//! The two-pass jerk-limited profiler: profiles by hand, random sequences of segments, numbers of any size.
 
 use feedplan_checks::{seeds, Random};
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::s_curve::{plan, Limits, Profiler, Section, SectionKind, Segment};
 use proptest::prelude::*;
 
-/// A segment of a machine with 100 mm/s, 500 mm/s², 50 000 mm/s³.
+/// A segment with the limits 100 mm/s, 500 mm/s², 50 000 mm/s³.
 fn segment(length: f64) -> Segment {
     let limits = Limits { acceleration: 500.0, jerk: 50_000.0 };
     Segment { length, allowable: 100.0, desired: 100.0, limits, junction: f64::INFINITY }
@@ -37,7 +37,7 @@ fn seven_section_time(length: f64, speed: f64, acceleration: f64, jerk: f64) -> 
     2.0 * ramp(low) + if low > 0.0 { cruise / low } else { 0.0 }
 }
 
-/// The sections of every segment, as they leave the profiler.
+/// The sections of every segment in the order in which the profiler returns them.
 fn stream(segments: &[Segment], look_ahead: usize) -> Vec<Vec<Section>> {
     let mut profiler = Profiler::new(look_ahead);
     let (mut all, mut out) = (vec![], vec![]);
@@ -53,7 +53,7 @@ fn stream(segments: &[Segment], look_ahead: usize) -> Vec<Vec<Section>> {
     all
 }
 
-/// Every requirement on a profile; `close` is the relative size of roundings. The first one broken as a sentence.
+/// Checks every requirement on a profile; `close` is the relative size of rounding. The first broken one is a sentence.
 fn check(segments: &[Segment], stream: &[Vec<Section>], close: f64) -> Result<(), String> {
     let (mut time, mut position, mut speed, mut before) = (0.0, 0.0, 0.0, 0.0_f64);
     if stream.len() != segments.len() {
@@ -132,7 +132,7 @@ fn check(segments: &[Segment], stream: &[Vec<Section>], close: f64) -> Result<()
     Ok(())
 }
 
-/// Up to 40 segments: as a CAM system makes them, or of any size, or all alike.
+/// Up to 40 segments: like those of a CAM system, or of any size, or all equal.
 fn random_segments(random: &mut Random) -> Vec<Segment> {
     let count = 1 + random.below(40);
     let kind = random.below(4);
@@ -157,7 +157,7 @@ fn random_segments(random: &mut Random) -> Vec<Segment> {
         Segment { length, allowable, desired, limits, junction }
     };
     let first = one(random);
-    // Alike but for the speeds, or all alike.
+    // Equal except for the speeds, or all equal.
     (0..count)
         .map(|_| match kind {
             2 => Segment { allowable: first.allowable * random.between(0.3, 1.0), ..first },

@@ -9,7 +9,7 @@ use feedplan_setpoints::phase_motion::{Counts, Phase, PhaseMotion, PiecePath, St
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
 
-/// A curve of one piece, its degree raised: the same motion by the closed forms and by the general ones.
+/// A curve of one piece with its degree elevated: closed forms and general ones give the same motion.
 fn raised<const M: usize>(piece: &Quadratic<M>, by: usize) -> CompositeCurve<M> {
     let mut curve = CompositeCurve::default();
     elevate(&Piece { control: &piece.control, weights: &[], width: piece.width }, by, &mut curve);
@@ -95,7 +95,7 @@ fn any_part_of_the_stream_has_the_same_digits() {
         let sampler = sampler(1e-5);
         let whole = sampler.chunk(0..sampler.count(), interpolator, &mut None, Watch::default());
         assert!(whole.t.len() > 20_000);
-        // Onwards, with gaps, and back; with the state of the part before and without.
+        // Forward, with gaps, and back; with the state of the part before and without it.
         let mut state = None;
         for range in [0..1, 1..2, 4095..4097, 4097..4200, 12_345..20_001, 9_999..10_002] {
             for resume in [&mut None, &mut state] {
@@ -199,7 +199,7 @@ prop_compose! {
         let mut phase = phase(law, 0.0, (u0, u1), (v * v, v * v), (u1 - u0) / v);
         match law {
             PhaseLaw::AxisAcceleration => {
-                // Where x' vanishes no finite p has a speed.
+                // Where x' = 0, X has no speed at any finite p.
                 let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6));
                 let v1 = if v0 + v1 == 0.0 { 0.01 } else { v1 };
                 phase.duration = 2.0 * way / (v0 + v1);

@@ -3,11 +3,12 @@
 
 use feedplan_checks::by_length::{ByLength, Curve};
 use feedplan_checks::campaign::seeds;
+use feedplan_checks::jerk::plan;
 use feedplan_checks::polylines::{
     dense, derivatives, distance, length, random_polyline, to_segment, walk, Random,
 };
 use feedplan_geometry::watch::Watch;
-use feedplan_jerk::jerk_limited::{plan, Effort, End, Limits, Problem};
+use feedplan_jerk::jerk_limited::{Effort, End, Limits, Problem};
 use feedplan_path::smooth_fit::polyline::Polyline;
 use feedplan_path::smooth_fit::{smooth_fit, Smooth, SmoothOptions};
 
@@ -30,7 +31,7 @@ fn square(side: f64) -> Vec<[f64; 2]> {
     vec![[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]
 }
 
-/// Checks what holds for every curve: ends, joints, widths, chords, deviation.
+/// Checks the properties of every curve: ends, joints, widths, chords, deviation.
 fn check<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>, name: &str) {
     let tolerance = line.tolerance[0];
     let last = smooth.curve.len() - 1;
@@ -57,7 +58,7 @@ fn check<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>, name: &str) {
     assert!(found <= proven + 2e-3 * tolerance, "{name}: {found} found, {proven} proven");
 }
 
-/// The greatest jump of each derivative at joints without a stop, in parts of what it is around them.
+/// The greatest jump of each derivative at joints without a stop, relative to its size there.
 fn jumps<const D: usize>(smooth: &Smooth<D>) -> [f64; 5] {
     let mut worst = [0.0f64; 5];
     for i in 1..smooth.curve.len() {
@@ -67,7 +68,7 @@ fn jumps<const D: usize>(smooth: &Smooth<D>) -> [f64; 5] {
         }
         let (end, start) = (derivatives(&before, 1.0), derivatives(&after, 0.0));
         for order in 1..5 {
-            // What a relative error of one of the control points amounts to.
+            // The change of the derivative by a relative error of 1 in a control point.
             let unit = before.width.min(after.width).powi(-(order as i32));
             worst[order] = worst[order].max(distance(&end[order], &start[order]) / unit);
         }
@@ -80,7 +81,7 @@ fn a_line_is_reproduced_exactly() {
     let two = fit(&polyline(vec![[1.0, 2.0, 3.0], [4.0, 6.0, 3.0]], 0.01));
     assert_eq!((two.curve.len(), two.curve.width[0]), (1, 5.0));
     assert_eq!(two.curve.control, [[1.0, 2.0, 3.0], [4.0, 6.0, 3.0]]);
-    // Points on a line are one line; where they are told to, it is cut beside them.
+    // Points on a line make one line, which is cut beside a point if that is asked for.
     let many = polyline((0..=30).map(|i| [0.1 * i as f64, 0.2 * i as f64]).collect(), 0.01);
     assert_eq!(fit(&many).curve.len(), 1);
     let mut cut = vec![false; 31];
@@ -107,7 +108,7 @@ fn a_right_corner_is_symmetric_about_its_bisector() {
         let away = near.fold(f64::INFINITY, f64::min);
         assert!(away < 0.005, "{p:?} {away}");
     }
-    // It comes as near to the corner as it may, and no nearer.
+    // Its distance from the corner is at most the tolerance, and nearly that.
     let corner = points.iter().map(|p| distance(p, &[10.0, 0.0])).fold(f64::INFINITY, f64::min);
     assert!(corner > 0.08 && corner < 0.1, "{corner}");
 }
@@ -186,7 +187,7 @@ fn noise_on_a_circle_is_smoothed_and_leaves_the_radius() {
     check(&line, &smooth, "noise");
     let [mean, ..] = radii(&line, &smooth);
     assert!((mean - 8.0).abs() < 1e-3, "{mean}");
-    // A circle has 53 of 0.95 mm each; noise would ask for hundreds.
+    // A circle has 53 pieces of 0.95 mm each; noise would need hundreds.
     assert!(smooth.curve.len() < 250, "{}", smooth.curve.len());
 }
 
@@ -247,7 +248,7 @@ fn random_polylines_are_followed_within_their_tolerance() {
         random_polylines::<6>(5, count / 4),
     ];
     println!("left to their corners in places, of {count}: {rough:?}");
-    // Few are left to their corners anywhere.
+    // Few runs fall back to single corners.
     assert!(rough.iter().sum::<usize>() * 5 < count, "{rough:?}");
 }
 
@@ -268,7 +269,7 @@ fn what_is_no_polyline_to_speak_of_neither_fails_nor_hangs() {
     }
 }
 
-/// A fitted curve by its parameter.
+/// A fitted curve as a function of its parameter.
 struct Fitted(Smooth<2>, Vec<f64>);
 
 impl Curve<2> for Fitted {
@@ -280,7 +281,7 @@ impl Curve<2> for Fitted {
     }
 }
 
-/// The time of a jerk-limited plan from rest to rest under 100 mm/s, 500 mm/s², 50 000 mm/s³ an axis.
+/// The time of a jerk-limited plan from rest to rest under 100 mm/s, 500 mm/s², 50 000 mm/s³ for each axis.
 fn jerk_limited_time(line: &Polyline<2>) -> f64 {
     let smooth = fit(line);
     let mut knots = vec![0.0];

@@ -1,5 +1,5 @@
-//! The lower bound: the time itself where that is known by hand, limit by limit; never above the time of a plan, near
-//! it, and both whatever the cells begin with.
+//! The lower bound: equal to the time where that is known by hand, limit by limit; never above the time of a plan, and
+//! near it, with any intervals at the start.
 
 use rayon::prelude::*;
 
@@ -38,18 +38,18 @@ fn every_limit_counts() {
     let mut corner = Case::new(lines(), 1e3, [1e3; 2], [100.0; 2]);
     corner.junction[1] = 0.0;
     by_hand(&corner, 0.4);
-    // From rest to 20 in v², over a peak of 110: (2 √110 − √20)/100 for each line.
+    // v² from 0 to 20 over a peak of 110: (2 √110 − √20)/100 s for each line.
     corner.junction[1] = 20f64.sqrt();
     by_hand(&corner, 2.0 * (2.0 * 110f64.sqrt() - 20f64.sqrt()) / 100.0);
-    // Ends at 10 mm/s: the whole at 10 mm/s, with a feed of that.
+    // Ends at 10 mm/s and a feed of 10 mm/s: all at 10 mm/s.
     let mut flying = Case::new(lines(), 10.0, [1e3; 2], [100.0; 2]);
     (flying.start_speed, flying.end_speed) = (10.0, 10.0);
     by_hand(&flying, 0.2);
-    // The same by the axes' velocity.
+    // The same by axis velocities.
     flying.feed = vec![1e3; 2];
     flying.velocity = [10.0; 2];
     by_hand(&flying, 0.2);
-    // And without: up and down again on each line, but for the corner that is passed at any speed.
+    // Without both: up and down again on each line, with a corner that is passed at any speed.
     flying.velocity = [1e3; 2];
     by_hand(&flying, 2.0 * (300f64.sqrt() - 10.0) / 100.0);
 }
@@ -69,14 +69,14 @@ fn the_chord_error_counts() {
     assert!(bound > 2.0 / (8f64 * 10.2).sqrt() && bound > 3.0 * free, "{bound}, {free}");
 }
 
-/// Gaps of some plans, and the seeds of those that are proven to be too fast.
+/// The gaps of plans, and the seeds of plans that are faster than their bound.
 struct Gaps {
     least: f64,
     shares: [f64; 3],
     failures: Vec<u64>,
 }
 
-/// Over random cases with these seeds, each plan's own arcs for cells, or one cell a piece.
+/// The gaps over random cases with these seeds; the first intervals are the phases of the plan, or the pieces.
 fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
     let mut found: Vec<(f64, u64, bool)> = seeds
         .into_par_iter()
@@ -92,7 +92,7 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
                     bound(&case, &whole_pieces(&profile, &case))
                 };
                 let gap = 1.0 - bound / time;
-                // Next to a cusp rounding makes the durations of single arcs wrong.
+                // Near a cusp, rounding makes the durations of single phases wrong.
                 let is_sound = gap >= -1e-10 || -gap <= 2.0 * audit(&case, &profile, 1).duration;
                 Some((gap, seed, is_sound))
             })
@@ -107,7 +107,7 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
     }
 }
 
-/// One arc a piece.
+/// One phase on each piece.
 fn whole_pieces<const M: usize>(profile: &Profile, case: &Case<M>) -> Profile {
     let mut whole = Profile::default();
     for (i, piece) in case.pieces.iter().enumerate() {
@@ -128,7 +128,7 @@ fn the_bound_is_never_above_the_time_and_near_it() {
         found.least, found.shares[0], found.shares[1], found.shares[2]
     );
     assert!(found.failures.is_empty(), "above the time: seeds {:?}", found.failures);
-    // A chord error near the radii is planned with a margin of its own, which the bound shows.
+    // Where the chord error is near the radii, the plan has a margin to it, which widens the gap.
     assert!(found.shares[0] < 1e-5 && found.shares[1] < 1e-3, "{:?}", found.shares);
 }
 

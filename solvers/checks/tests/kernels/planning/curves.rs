@@ -1,9 +1,9 @@
-//! The planner for pieces of any degree on curves made to break it: it comes to an end, with times that are times.
+//! The planner for pieces of any degree on adversarial curves: it ends, and its times are finite.
 
 use feedplan_checks::curves::{random_curves, CurveCase, Piece};
 use feedplan_checks::{seeds, FEW_AXES};
 
-/// Rounding decides where the axes turn round: planning still comes to an end.
+/// Rounding decides where the axes reverse, and planning still ends.
 #[test]
 fn a_cubic_that_comes_back_on_its_own_way_is_planned() {
     let there = [-0.0008179203719107516, 4.482764973940271e-05, 0.004785619607813126];
@@ -13,12 +13,12 @@ fn a_cubic_that_comes_back_on_its_own_way_is_planned() {
     let piece = Piece { points, weights: vec![1.0; 4], width: 2.2850075 };
     let case = CurveCase::new(vec![piece], 9.07536759, [12.37519959, 7.97605913, 1.91222309], acceleration);
     let profile = case.plan().expect("a profile");
-    // x(t)/x₁ = 3 t − 6 t² + 4 t³ rises all the way, with x' = 0 in the middle; X is the slowest: a line of length x₁.
+    // x(t)/x₁ = 3 t − 6 t² + 4 t³ rises everywhere, with x' = 0 in the middle; X is slowest: a line of length x₁.
     let time = 2.0 * (there[0].abs() / acceleration[0]).sqrt();
     assert!((profile.time() / time - 1.0).abs() < 1e-9, "{} {time}", profile.time());
 }
 
-/// Cases that rounding makes too hard are told; they are a few in ten thousand.
+/// Cases that rounding makes infeasible are reported; they are a few in ten thousand.
 #[test]
 fn curves_made_to_break_the_planner_are_planned_in_finite_time() {
     let count = seeds(6_000).end;

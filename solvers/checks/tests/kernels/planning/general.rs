@@ -32,7 +32,7 @@ fn quadratics_of_elevated_degree_take_the_same_time() {
     );
 }
 
-/// Next to rest the guard must take an arc's way and tangent at one place.
+/// Near rest, the check must evaluate the distance and the tangent of a phase at the same point.
 #[test]
 fn the_guard_makes_no_alarm_of_its_own_next_to_rest() {
     for seed in [27_653, 47_526] {
@@ -44,7 +44,7 @@ fn the_guard_makes_no_alarm_of_its_own_next_to_rest() {
     }
 }
 
-/// Both kernels take the chord-error limit as straight lines below it, from turn to turn or over a whole piece.
+/// Both kernels replace the chord-error limit by straight lines below it, between turns or over a whole piece.
 #[test]
 fn with_a_chord_error_limit_the_times_agree_to_the_margin() {
     for seed in 0..600 {

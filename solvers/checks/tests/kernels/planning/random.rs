@@ -1,5 +1,5 @@
-//! Random and adversarial paths: every limit holds, some limit is active everywhere, and what does not matter to
-//! the path does not change its time.
+//! Random and adversarial paths: every limit holds, some limit is active everywhere, and changes that leave the path
+//! the same leave its time the same.
 
 use feedplan_checks::{audit, random_case, seeds, Audit, Case, Random};
 use feedplan_geometry::quadratic::Quadratic;
@@ -94,8 +94,8 @@ fn the_time_depends_on_the_path_alone() {
     );
 }
 
-/// Two right angles rounded by parabolas between axes of equal strength: on the parabolas the limit curve is level,
-/// and falls or rises by rounding alone.
+/// Two right angles rounded by parabolas, with equal limits for both axes: on the parabolas the limit curve is
+/// constant, and rounding alone makes it fall or rise.
 #[test]
 fn a_level_limit_curve_is_passed() {
     let (x, middle, end) = ([-31.9377, -31.9066, -31.8755], 0.0311, 0.2474);
@@ -107,7 +107,7 @@ fn a_level_limit_curve_is_passed() {
     ];
     let width = [119.93775, 0.0622, 0.0622, 0.2163];
     for nudge in 0..1000 {
-        // The places of the points in the last digits decide.
+        // The last digits of the points decide.
         let shift = 1e-9 * f64::from(nudge);
         let pieces = corners.iter().zip(width).map(|(control, width)| Quadratic {
             control: control.map(|[x, y]| [x + shift, y + 3.0 * shift]),

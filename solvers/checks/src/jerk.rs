@@ -1,0 +1,62 @@
+//! The jerk-limited planner on paths of any kind in up to three axes, compiled once for all tests.
+
+use crate::{padded, PADDED};
+use feedplan_jerk::jerk_limited::{
+    self, Certificate, Effort, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile,
+};
+
+/// A path of any kind, with axes that rest for those that it does not have.
+struct Path<'a>(Box<dyn Fn(usize, f64) -> PathPoint<PADDED> + Sync + 'a>, &'a [f64]);
+
+impl Geometry<PADDED> for Path<'_> {
+    fn knots(&self) -> &[f64] {
+        self.1
+    }
+
+    fn at(&self, piece: usize, s: f64) -> PathPoint<PADDED> {
+        self.0(piece, s)
+    }
+}
+
+/// Calls a function with the same problem on a path of any kind.
+fn with<G: Geometry<M>, const M: usize, T>(
+    problem: &Problem<G, M>,
+    call: impl FnOnce(&Problem<Path, PADDED>) -> T,
+) -> T {
+    let at = |piece, s| {
+        let PathPoint { first, second, third, speed_cap } = problem.geometry.at(piece, s);
+        let [first, second, third] = [first, second, third].map(|values| padded(&values, 0.0));
+        PathPoint { first, second, third, speed_cap }
+    };
+    let Limits { velocity, acceleration, jerk } = &problem.limits;
+    let limits = Limits {
+        velocity: velocity.map(|side| padded(&side, 1.0)),
+        acceleration: acceleration.map(|side| padded(&side, 1.0)),
+        jerk: padded(jerk, 1.0),
+    };
+    let geometry = Path(Box::new(at), problem.geometry.knots());
+    call(&Problem { geometry: &geometry, limits, caps: problem.caps, ends: problem.ends })
+}
+
+/// `jerk_limited::plan`.
+pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
+    stream(problem, effort, |_| {})
+}
+
+/// `jerk_limited::stream`.
+pub fn stream<G: Geometry<M>, const M: usize>(
+    problem: &Problem<G, M>,
+    effort: &Effort,
+    mut finished: impl FnMut(&Profile),
+) -> Result<Plan, Fault> {
+    with(problem, |problem| jerk_limited::stream(problem, effort, &mut finished as &mut dyn FnMut(&Profile)))
+}
+
+/// `jerk_limited::certify`.
+pub fn certify<G: Geometry<M>, const M: usize>(
+    problem: &Problem<G, M>,
+    profile: &Profile,
+    effort: &Effort,
+) -> Certificate {
+    with(problem, |problem| jerk_limited::certify(problem, profile, effort))
+}
