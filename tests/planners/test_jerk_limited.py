@@ -76,6 +76,19 @@ def test_published_curves_take_no_longer_than_known(curve: object, time: float) 
     assert assert_held(problem) <= time
 
 
+def test_a_feed_far_below_the_limits_is_held_in_few_arcs() -> None:
+    problem = build_problem(Path.from_curve(lemniscate(), feed=10.0), CURVES)
+    profile = plan(problem)
+    # From rest to the feed, and back, √(v/J) each is lost, with the jerk along the direction of the ends.
+    way = problem.derivatives(np.zeros(1, np.uint32), np.zeros(1), 1)[1][0]
+    jerk = 50_000.0 * np.linalg.norm(way) / np.abs(way).max()
+    assert profile.time == pytest.approx(problem.path.length / 10.0 + 2 * np.sqrt(10.0 / jerk), rel=1e-6)
+    held = profile.kind == ArcKind.FEED
+    assert held.sum() < 20 and len(profile) < 1000
+    assert profile.duration[held].sum() > 0.99 * profile.time
+    assert_held(problem)
+
+
 def test_the_relaxation_proves_the_lemniscate_and_more_than_the_second_order_bound() -> None:
     problem = build_problem(Path.from_curve(lemniscate(), feed=FREE), CURVES)
     profile = plan(problem)

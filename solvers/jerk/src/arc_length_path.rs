@@ -6,8 +6,10 @@
 //!
 //!   u' = D^(−1/2),   u'' = −D_u / (2 D²),   u''' = D^(−1/2) (D_u² / D³ − D_uu / (2 D²))
 //!
-//! Each piece has a table: between two rows u(s) is the quintic with their u, u' and u''. The stations of a profile are
-//! located to rounding, by Newton's method on the quadrature of √D.
+//! A part has a table once something inside it is asked for: between two rows u(s) is the quintic with their u, u' and
+//! u''. The stations of a profile are located to rounding, by Newton's method on the quadrature of √D.
+
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
@@ -75,9 +77,10 @@ struct Row {
     bend: f64,
 }
 
+/// What is known of a part without its table.
 #[derive(Clone, Debug)]
-struct Table<const M: usize> {
-    rows: Vec<Row>,
+struct Measures<const M: usize> {
+    length: f64,
     /// The direction of motion and the speed by the feed, where the direction is constant and s that of the axes.
     straight: Option<([f64; M], f64)>,
     /// Lengths between which derivatives are evaluated.
@@ -89,7 +92,8 @@ struct Table<const M: usize> {
 pub struct ArcLengthPath<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     pub parts: &'a [Part],
-    tables: Vec<Table<M>>,
+    measures: Vec<Measures<M>>,
+    tables: Vec<OnceLock<Vec<Row>>>,
     knots: Vec<f64>,
 }
 
@@ -267,88 +271,123 @@ impl Row {
     }
 }
 
-/// Halves the panels of a part until quadrature and quintic are accurate.
-struct Builder<'a, const M: usize> {
+/// Halves the panels of a part until its quadrature is accurate, for its length, or its quintics too, for its table.
+struct Halving<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
-    piece: usize,
-    size: f64,
+    part: &'a Part,
+    /// The length by one panel, and the greatest of some tangents.
+    whole: f64,
     fastest: f64,
-    rows: Vec<Row>,
 }
 
-impl<const M: usize> Builder<'_, M> {
+impl<'a, const M: usize> Halving<'a, M> {
+    fn new(problem: &'a Problem<'a, M>, part: &'a Part) -> Self {
+        let ([a, b], i) = (part.u, part.piece);
+        let at = |n: usize| a + (b - a) * n as f64 / SAMPLES as f64;
+        let inside = [[1, 2, 3, 4], [5, 6, 7, 8]].map(|some| speeds_sq(problem, i, some.map(at)));
+        let fastest = inside.into_iter().flatten().fold(speed_sq(problem, i, a), f64::max).sqrt();
+        Self { problem, part, whole: panel(problem, i, a, b), fastest }
+    }
+
+    /// The rounding of a length up to u: that of tangents is relative to the longest tangent, that of u to itself.
+    fn noise(&self, [a, b]: [f64; 2], rate: f64) -> f64 {
+        ROUNDING * ((b - a) * self.fastest + b / rate)
+    }
+
+    /// Whether the length of a panel by its halves is that by the whole, or too short to tell.
+    fn is_met(&self, length: f64, whole: f64, noise: f64) -> bool {
+        (length - whole).abs() <= QUADRATURE * length + noise || length <= SHORTEST * self.whole
+    }
+
+    /// The length between two parameters, with that of one panel.
+    fn length(&self, [a, b]: [f64; 2], whole: f64, depth: u32) -> f64 {
+        let middle = 0.5 * (a + b);
+        let halves = [[a, middle], [middle, b]];
+        let [left, right] = halves.map(|[a, b]| panel(self.problem, self.part.piece, a, b));
+        let length = left + right;
+        if depth == DEPTH || self.is_met(length, whole, self.noise([a, b], (b - a) / length)) {
+            return length;
+        }
+        self.length(halves[0], left, depth + 1) + self.length(halves[1], right, depth + 1)
+    }
+
+    fn table(&self) -> Vec<Row> {
+        let mut rows = vec![Row::new(self.problem, self.part.piece, self.part.u[0], 0.0)];
+        self.halve(&mut rows, self.part.u[1], self.whole, 0);
+        rows
+    }
+
     /// Appends rows for the panel from the last row to b.
-    fn halve(&mut self, b: f64, whole: f64, depth: u32) {
-        let from = self.rows[self.rows.len() - 1];
+    fn halve(&self, rows: &mut Vec<Row>, b: f64, whole: f64, depth: u32) {
+        let from = rows[rows.len() - 1];
         let middle = 0.5 * (from.u + b);
         let [left, right] =
-            [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.piece, a, b));
-        let half = Row::new(self.problem, self.piece, middle, from.s + left);
-        let end = Row::new(self.problem, self.piece, b, from.s + left + right);
+            [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.part.piece, a, b));
+        let half = Row::new(self.problem, self.part.piece, middle, from.s + left);
+        let end = Row::new(self.problem, self.part.piece, b, from.s + left + right);
         // On a symmetric part the quintic is right half-way and wrong on both sides; only its rate shows this.
         let odd = ODD * (end.s - from.s) * (from.rate_between(&end, half.s) - half.rate);
         let mut miss = (from.parameter_at(&end, half.s) - middle).abs().max(odd.abs()) / half.rate;
-        if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {
-            miss = left + right;
-        }
         let length = left + right;
-        // The rounding of tangents is relative to the longest tangent, that of u and s to themselves.
-        let noise = ROUNDING * ((b - from.u) * self.fastest + b / half.rate) + f64::EPSILON * end.s;
-        let met = (length - whole).abs() <= QUADRATURE * length + noise && miss <= QUINTIC * length + noise;
-        let met = met || length <= SHORTEST * self.size || self.rows.len() > MOST_ROWS;
-        if met || depth == DEPTH {
-            self.rows.extend([half, end]);
+        if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {
+            miss = length;
+        }
+        let noise = self.noise([from.u, b], half.rate) + f64::EPSILON * end.s;
+        let met = self.is_met(length, whole, noise)
+            && (miss <= QUINTIC * length + noise || length <= SHORTEST * self.whole);
+        if met || rows.len() > MOST_ROWS || depth == DEPTH {
+            rows.extend([half, end]);
         } else {
-            self.halve(middle, left, depth + 1);
-            self.halve(b, right, depth + 1);
+            self.halve(rows, middle, left, depth + 1);
+            self.halve(rows, b, right, depth + 1);
         }
     }
 }
 
-impl<const M: usize> Table<M> {
+impl<const M: usize> Measures<M> {
     fn new(problem: &Problem<M>, part: &Part) -> Self {
-        let [a, b] = part.u;
-        let whole = panel(problem, part.piece, a, b);
-        let first = Row::new(problem, part.piece, a, 0.0);
-        let samples = (0..=SAMPLES).map(|i| a + (b - a) * i as f64 / SAMPLES as f64);
-        let fastest = samples.map(|u| speed_sq(problem, part.piece, u)).fold(0.0, f64::max).sqrt();
-        let mut builder = Builder { problem, piece: part.piece, size: whole, fastest, rows: vec![first] };
-        builder.halve(b, whole, 0);
-        let rows = builder.rows;
-        let length = rows[rows.len() - 1].s;
+        let ([a, b], i) = (part.u, part.piece);
+        let halving = Halving::new(problem, part);
+        let length = halving.length(part.u, halving.whole, 0);
         let slowest = (b - a) / length / CUSP;
-        let inset = |row: &Row| if row.rate < slowest { 0.0 } else { INSET * length };
-        let inside = [inset(&rows[0]), length - inset(&rows[rows.len() - 1])];
+        let inset =
+            |u: f64| if speed_sq(problem, i, u).sqrt() * slowest > 1.0 { 0.0 } else { INSET * length };
         let straight = match problem.way {
             Some(_) => None,
             None => {
-                let (i, u) = (part.piece, 0.5 * (a + b));
-                let feed = problem.feed[i] * per_feed(problem, i, u, speed_sq(problem, i, u));
-                straight(&piece(problem, i), u).map(|direction| (direction, feed))
+                let u = 0.5 * (a + b);
+                straight(&piece(problem, i), u).map(|direction| {
+                    (direction, problem.feed[i] * per_feed(problem, i, u, speed_sq(problem, i, u)))
+                })
             }
         };
-        Self { rows, straight, inside }
-    }
-
-    fn row(&self, s: f64) -> usize {
-        self.rows[1..self.rows.len() - 1].partition_point(|row| row.s <= s)
+        Self { length, straight, inside: [inset(a), length - inset(b)] }
     }
 }
 
 impl<'a, const M: usize> ArcLengthPath<'a, M> {
     pub fn new(problem: &'a Problem<'a, M>, parts: &'a [Part]) -> Self {
-        let table = |part| {
+        let measures = |part| {
             problem.watch.check();
-            Table::new(problem, part)
+            Measures::new(problem, part)
         };
-        let tables: Vec<Table<M>> = parts.par_iter().with_min_len(16).map(table).collect();
+        let measures: Vec<Measures<M>> = parts.par_iter().with_min_len(16).map(measures).collect();
         let mut knots = vec![0.0];
         let mut total = 0.0;
-        for table in &tables {
-            total += table.rows[table.rows.len() - 1].s;
+        for own in &measures {
+            total += own.length;
             knots.push(total);
         }
-        Self { problem, parts, tables, knots }
+        Self { problem, parts, measures, tables: vec![OnceLock::new(); parts.len()], knots }
+    }
+
+    fn table(&self, part: usize) -> &[Row] {
+        self.tables[part].get_or_init(|| {
+            let mut rows = Halving::new(self.problem, &self.parts[part]).table();
+            let last = rows.len() - 1;
+            rows[last].s = self.measures[part].length;
+            rows
+        })
     }
 
     /// The length of all parts, in mm.
@@ -363,7 +402,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
 
     /// The parameter at the arc length s on a part, to rounding.
     pub fn locate(&self, part: usize, s: f64) -> f64 {
-        let (table, at) = (&self.tables[part], &self.parts[part]);
+        let at = &self.parts[part];
         if s <= self.knots[part] {
             return at.u[0];
         }
@@ -371,12 +410,17 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
             return at.u[1];
         }
         let x = s - self.knots[part];
-        let i = table.row(x);
-        let (from, to) = (&table.rows[i], &table.rows[i + 1]);
+        let [from, to] = around(self.table(part), x);
         let (mut low, mut high) = (from.u, to.u);
         let mut u = from.parameter_at(to, x);
+        // Lengths from the nearer row have the digits of a place next to an end of the part.
+        let ahead = to.s - x < x - from.s;
         for _ in 0..STEPS {
-            let miss = from.s + panel(self.problem, at.piece, from.u, u) - x;
+            let miss = if ahead {
+                to.s - panel(self.problem, at.piece, u, to.u) - x
+            } else {
+                from.s + panel(self.problem, at.piece, from.u, u) - x
+            };
             if miss > 0.0 {
                 high = u;
             } else {
@@ -408,7 +452,10 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
 
     /// The length between two parameters of a part; short lengths have all their digits.
     pub fn length_between(&self, part: usize, a: f64, b: f64) -> f64 {
-        let (rows, at) = (&self.tables[part].rows, self.parts[part].piece);
+        if [a, b] == self.parts[part].u {
+            return self.measures[part].length;
+        }
+        let (rows, at) = (self.table(part), self.parts[part].piece);
         let row = |u: f64| rows[1..rows.len() - 1].partition_point(|row| row.u <= u);
         let (i, j) = (row(a), row(b));
         if i == j {
@@ -421,9 +468,9 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
 
     /// The direction of all parts and the speed by their feed, if both are the same on all parts.
     pub fn line(&self) -> Option<([f64; M], f64)> {
-        let (direction, feed) = self.tables[0].straight?;
-        let alike = self.tables.iter().all(|table| {
-            table.straight.is_some_and(|(other, speed)| {
+        let (direction, feed) = self.measures[0].straight?;
+        let alike = self.measures.iter().all(|own| {
+            own.straight.is_some_and(|(other, speed)| {
                 speed == feed && (0..M).all(|k| (other[k] - direction[k]).abs() <= OFF_LINE)
             })
         });
@@ -437,7 +484,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
             .map(|i| {
                 problem.watch.check_at(i);
                 let s = self.knots[i];
-                let (before, after) = (self.at(i - 1, s), self.at(i, s));
+                let (before, after) = (self.end(i - 1, 1), self.end(i, 0));
                 let smooth = self.is_smooth(i);
                 let jump = |k: usize| (after.second[k] - before.second[k]).abs() / jerk[k];
                 let mut speed = self.corner(i);
@@ -470,6 +517,16 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
             Junction { cap, jumps: speed < f64::INFINITY }
         };
         passages.iter().zip(&jumps).enumerate().map(junction).collect()
+    }
+
+    /// Derivatives and speed cap at the start (0) or the end (1) of a part.
+    pub fn end(&self, part: usize, end: usize) -> PathPoint<M> {
+        let (own, at) = (&self.measures[part], &self.parts[part]);
+        if own.straight.is_none() && own.inside[end] == [0.0, own.length][end] {
+            path_point(self.problem, at.piece, at.u[end])
+        } else {
+            self.at(part, self.knots[part + end])
+        }
     }
 
     /// Whether a part and the part before it belong to one piece, which is smooth where they meet.
@@ -508,13 +565,19 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
 
     /// The direction of motion on a part where it is constant.
     pub fn direction(&self, part: usize) -> Option<[f64; M]> {
-        self.tables[part].straight.map(|(direction, _)| direction)
+        self.measures[part].straight.map(|(direction, _)| direction)
     }
 
     /// The greatest speed by the chord error at a curvature, in mm/s.
     pub fn chord_speed(&self, curvature: f64) -> f64 {
         chord_limit(self.problem, curvature)
     }
+}
+
+/// The rows of a table around a length.
+fn around(rows: &[Row], s: f64) -> [&Row; 2] {
+    let i = rows[1..rows.len() - 1].partition_point(|row| row.s <= s);
+    [&rows[i], &rows[i + 1]]
 }
 
 /// Curvature of the tool's path at u of piece `i`, in 1/mm.
@@ -576,13 +639,13 @@ impl<const M: usize> Geometry<M> for ArcLengthPath<'_, M> {
     }
 
     fn at(&self, part: usize, s: f64) -> PathPoint<M> {
-        let table = &self.tables[part];
-        if let Some((direction, speed_cap)) = table.straight {
+        let own = &self.measures[part];
+        if let Some((direction, speed_cap)) = own.straight {
             return PathPoint { first: direction, second: [0.0; M], third: [0.0; M], speed_cap };
         }
-        let x = (s - self.knots[part]).clamp(table.inside[0], table.inside[1]);
-        let i = table.row(x);
-        path_point(self.problem, self.parts[part].piece, table.rows[i].parameter_at(&table.rows[i + 1], x))
+        let x = (s - self.knots[part]).clamp(own.inside[0], own.inside[1]);
+        let [from, to] = around(self.table(part), x);
+        path_point(self.problem, self.parts[part].piece, from.parameter_at(to, x))
     }
 }
 

@@ -18,6 +18,7 @@
 //! | `intersample_check`, `window` | the limits between the collocation points |
 //! | `windows` | paths of any length |
 //! | `lower_bound` | a lower bound on the time on the same grid |
+//! | `held` | where the feed is held, and the stretches between such places |
 //! | `on_path` | the planner on the package's own paths |
 //! | `turns` | the accelerations with which lines turn back |
 //!
@@ -29,6 +30,7 @@ mod band;
 mod constraints;
 mod exact;
 mod grid;
+mod held;
 mod hermite;
 mod initial_plan;
 mod interior_point;
@@ -73,8 +75,8 @@ pub struct PathPoint<const M: usize> {
 
 /// A path of smooth pieces between knots.
 pub trait Geometry<const M: usize>: Sync {
-    /// Arc lengths of the ends of the pieces, in mm, strictly rising from 0. q' is continuous at all knots; q'' may
-    /// jump where the problem caps the speed, q''' anywhere.
+    /// Arc lengths of the ends of the pieces, in mm, strictly rising, from 0 where the path begins at rest. q' is
+    /// continuous at all knots; q'' may jump where the problem caps the speed, q''' anywhere.
     fn knots(&self) -> &[f64];
 
     /// Derivatives at the arc length s on a piece, which may be one of its ends.
@@ -193,14 +195,5 @@ pub struct Plan {
 
 /// The plan of least time.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
-    windows::solve(problem, effort, |_| {})
-}
-
-/// `plan` that hands out each part of the profile as soon as it is final, from start to end.
-pub fn stream<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    effort: &Effort,
-    finished: impl FnMut(&Profile),
-) -> Result<Plan, Fault> {
-    windows::solve(problem, effort, finished)
+    windows::solve(problem, effort)
 }

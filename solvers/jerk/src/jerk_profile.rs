@@ -1,8 +1,8 @@
 //! Profiles of limited jerk as columns: phases along the pieces of a path, in the order of the path, from sections of
 //! constant jerk (`s_curve`) or the spline w(s) of the jerk-limited planner.
 //!
-//! Two laws, of `feedplan.profile.PhaseLaw`: the jerk along the path is constant, or v² is a cubic of the arc length.
-//! Both stay what they are where a phase is cut at the end of a piece. Lengths in mm, times in s.
+//! Three laws, of `feedplan.profile.PhaseLaw`: the feed is held, the jerk along the path is constant, or v² is a cubic of
+//! the arc length. All stay what they are where a phase is cut at the end of a piece. Lengths in mm, times in s.
 
 use std::ops::Range;
 
@@ -15,6 +15,7 @@ use feedplan_planner::problem::{greater, lesser, Problem};
 
 const PATH_JERK: u8 = PhaseLaw::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = PhaseLaw::SpeedCubic as u8;
+pub const FEED: u8 = PhaseLaw::Feed as u8;
 /// A section shorter than this part of the time in which an axis reaches its greatest speed is rounding.
 const SHORTEST: f64 = 1e-9;
 /// The error that moves states falls by this part of each phase's length, which is too little to show in the phase.
@@ -316,6 +317,26 @@ impl JerkProfile {
         self.push_spans(problem, path, &spans);
     }
 
+    /// Appends the way between two lengths of a subrun at its feed, in mm/s.
+    pub fn push_held<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ArcLengthPath<M>,
+        [from, to]: [f64; 2],
+        feed: f64,
+    ) {
+        let state = State { s: 0.0, v: feed, a: 0.0 };
+        let mut part = path.part(from);
+        while part < path.parts.len() && path.knots()[part] < to {
+            problem.watch.check_at(part);
+            let u = [from, to].map(|s| path.locate(part, s));
+            let duration = path.length_between(part, u[0], u[1]) / feed;
+            let phase = Phase { kind: FEED, value: feed * feed, ends: [state; 2], duration };
+            self.push(problem, path.parts[part].piece, u, &phase);
+            part += 1;
+        }
+    }
+
     /// Appends sections that are cut at the knots. Arc lengths far along a path have too few digits for sections of
     /// some nanometres. So the sections of a part follow one another from both of its ends by their own lengths, and
     /// the longest section takes the rounding. The duration of each is corrected for the length between its parameters.
@@ -347,7 +368,7 @@ impl JerkProfile {
         }
     }
 
-    /// Appends a profile of the jerk-limited planner along a whole subrun.
+    /// Appends a profile of the jerk-limited planner on a part of a subrun.
     ///
     /// Phases near rest are so short that the rounding of u changes their lengths, and w'' by some hundred times as
     /// much. So the lengths of phases are measured between the rounded parameters, and each state is moved along its
@@ -369,11 +390,12 @@ impl JerkProfile {
             }
             let at = path.parts[part];
             let end = first + s[first..].partition_point(|&s| s <= knots[part + 1]) - 1;
-            let mut u = vec![at.u[0]];
+            let ends_of_part = [knots[part].max(ends[0]), knots[part + 1].min(ends[1])];
+            let [from, to] = ends_of_part.map(|s| path.locate(part, s));
+            let mut u = vec![from];
             u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
-            u.push(at.u[1]);
+            u.push(to);
             let lengths: Vec<f64> = u.windows(2).map(|u| path.length_between(part, u[0], u[1])).collect();
-            let ends_of_part = [knots[part], knots[part + 1]];
             let meeting = moved_from_start(&s[first..=end], ends_of_part);
             let mut states = moved_states(profile, first..end + 1, ends_of_part, meeting, &lengths);
             let count = states.len();

@@ -216,6 +216,9 @@ pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
 fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]) {
     let own = piece(problem, i);
     let mut points = piece_cusps(&own, CUSP);
+    if points.is_empty() {
+        return (points, [false; 2]);
+    }
     let line = problem.way.is_none() && straight(&own, 0.5 * own.width).is_some();
     let ends =
         [points.first().is_some_and(|&t| t < AT_END), points.last().is_some_and(|&t| t > 1.0 - AT_END)];
@@ -240,10 +243,13 @@ fn slow_points<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
             (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
         }
     };
+    let (least, greatest) = square.range();
+    if least >= SLOW * greatest {
+        return vec![];
+    }
     let mut turns = vec![0.0];
     square.derivative().sign_changes(&mut |t| turns.push(t));
     turns.push(1.0);
-    let greatest = square.range().1;
     let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
     let is_low = |n: usize| {
         let least = speeds[n];

@@ -7,7 +7,7 @@ use std::time::Instant;
 use feedplan_checks::bends::{Bend, Bends};
 use feedplan_checks::by_length::{ByLength, Lemniscate, Nurbs, Trefoil};
 use feedplan_checks::campaign::seeds;
-use feedplan_checks::jerk::{certify, plan, stream};
+use feedplan_checks::jerk::{certify, plan};
 use feedplan_checks::wave::Wave;
 use feedplan_jerk::jerk_limited::{
     Effort, End, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile, SpeedCap,
@@ -357,26 +357,6 @@ fn windows_agree_where_the_optimum_lies_on_limits_all_along() {
     let loss = windows.time / whole.time - 1.0;
     assert!(loss < 1e-6, "{loss:e}");
     assert_held(&problem, &windows.profile);
-}
-
-#[test]
-fn finished_stretches_make_up_the_plan() {
-    let path = slalom(60);
-    let problem = problem(&path, SHORT_STOPS);
-    let mut stretches: Vec<Profile> = vec![];
-    let effort = Effort { window: 400, ..Effort::default() };
-    // A part that is handed out has some windows for each thread.
-    let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
-    let plan = two.install(|| stream(&problem, &effort, |stretch| stretches.push(stretch.clone())));
-    let plan = plan.expect("a plan");
-    assert!(stretches.len() > 3, "{} stretches", stretches.len());
-    assert!(stretches.windows(2).all(|pair| pair[0].ends[1] == pair[1].ends[0]));
-    let time: f64 = stretches.iter().map(Profile::time).sum();
-    assert!((time / plan.time - 1.0).abs() < 1e-12);
-    assert!(stretches.iter().all(|stretch| {
-        let first = plan.profile.s.binary_search_by(|s| s.total_cmp(&stretch.s[0])).expect("a node");
-        plan.profile.speed_sq[first..][..stretch.s.len()] == stretch.speed_sq
-    }));
 }
 
 #[test]

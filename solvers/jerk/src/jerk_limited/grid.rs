@@ -1,7 +1,8 @@
 //! The stations of the spline, from the samples of the speed envelope and the speed caps: about equal in travel time
-//! where the speed changes, closer where the path turns, far apart elsewhere, and on every knot of the path.
+//! where the speed changes, closer where the path turns and an axis may limit the speed, far apart elsewhere, and on
+//! every knot of the path.
 
-use super::speed_envelope::{Change, EnvelopeSample, Slopes};
+use super::speed_envelope::{Change, EnvelopeSample, Slopes, ROUNDING};
 use std::ops::Range;
 
 use super::constraints::Constraints;
@@ -13,15 +14,16 @@ use feedplan_geometry::watch::Watch;
 const CHANGING: f64 = 0.02;
 /// A path that turns by less than this (in radians) over the length r/K counts as straight.
 const TURNING: f64 = 0.02;
-/// Lengths of intervals grow at most by this part of the distance along the path.
-const GROWTH: f64 = 0.5;
+/// Lengths of intervals grow at most by this part of the distance along the path, where the speed is that of one feed and
+/// elsewhere.
+const GROWTH: [f64; 2] = [3.0, 0.5];
 /// The longest interval, as a part of the length over which the path turns: about one radian of a circle. No interval
 /// is planned longer than the path.
 const LONGEST: f64 = 0.5;
 /// An interval that overlaps the reach of a cap by less than this part of the reach is outside (rounding).
 const CLOSE: f64 = 1e-6;
-/// Every path has at least this many intervals times the resolution.
-const FEWEST: f64 = 26.0;
+/// From rest to speed and from speed to rest there are at least this many intervals times the resolution.
+const FEWEST: f64 = 13.0;
 
 /// Arc lengths of the stations, the piece of each interval, and the speed caps at stations.
 #[derive(Clone, Debug, Default)]
@@ -50,7 +52,8 @@ impl Grid {
         for i in 1..samples.len() {
             whole += 0.5 * (density[i - 1] + density[i]) * (samples[i].s - samples[i - 1].s);
         }
-        let more = (FEWEST * resolution / whole).max(1.0);
+        let rests = ends.iter().filter(|kind| matches!(kind, WindowEnd::Rest { .. })).count();
+        let more = (FEWEST * rests as f64 * resolution / whole).max(1.0);
         let mut first = 0;
         for i in 1..samples.len() {
             let cap = next.next_if(|cap| cap.s <= samples[i].s);
@@ -151,11 +154,25 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
         let change = if r[i + 1] < r[i] { Change::Fall } else { Change::Rise };
         (r[i + 1] - r[i]).abs() > CHANGING * (slopes.reach(r[i], h, change) - r[i])
     };
+    // Where one feed sets the speed, it is constant however the path turns.
+    let even: Vec<bool> = (0..=last)
+        .map(|i| {
+            let near = &samples[i.saturating_sub(1)..=(i + 1).min(last)];
+            near.iter().all(|near| near.fed && (near.cap / samples[i].cap - 1.0).abs() < ROUNDING)
+        })
+        .collect();
+    let growth = |i: usize, j: usize| if even[i] && even[j] { GROWTH[0] } else { GROWTH[1] };
     let mut length: Vec<f64> = (0..=last)
         .map(|i| {
             let turning = samples[i].turning;
             let active = (i < last && changing(i)) || (i > 0 && changing(i - 1));
-            if active || turning * r[i] > TURNING * slopes.k {
+            if even[i] {
+                if active {
+                    slopes.length(r[i])
+                } else {
+                    f64::INFINITY
+                }
+            } else if active || turning * r[i] > TURNING * slopes.k {
                 1.0 / (1.0 / slopes.length(r[i]) + turning)
             } else {
                 f64::INFINITY
@@ -169,10 +186,10 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
         }
     }
     for i in 1..=last {
-        length[i] = length[i].min(length[i - 1] + GROWTH * (s[i] - s[i - 1]));
+        length[i] = length[i].min(length[i - 1] + growth(i, i - 1) * (s[i] - s[i - 1]));
     }
     for i in (1..=last).rev() {
-        length[i - 1] = length[i - 1].min(length[i] + GROWTH * (s[i] - s[i - 1]));
+        length[i - 1] = length[i - 1].min(length[i] + growth(i, i - 1) * (s[i] - s[i - 1]));
     }
     (0..=last)
         .map(|i| {

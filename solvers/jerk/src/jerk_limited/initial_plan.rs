@@ -1,20 +1,27 @@
-//! A first plan within all limits, in O(n), from the speed envelope r = w^(3/4): ln r, averaged over local time.
+//! A first plan within all limits, in O(n), from the speed envelope r = w^(3/4): ln r, smoothed over local time.
 //!
-//! ln r rises by at most 1 per unit of the local time τ = ∫ K ds/r (see `Slopes::length`). So its mean over τ ± δ, less
-//! δ, exceeds ln r nowhere, and is smooth enough for the limits of jerk.
+//! ln r rises by at most 1 per unit of the local time τ = ∫ K ds/r (see `Slopes::length`). So does its least value over
+//! τ ± δ. The mean of that over τ ± δ exceeds ln r nowhere, is equal to it where ln r is constant over τ ± 2 δ, and is
+//! smooth enough for the limits of jerk.
+
+use std::collections::VecDeque;
 
 use super::constraints::Constraints;
 use super::interior_point::WindowEnd;
 use super::speed_envelope::Slopes;
 
-/// δ: half the width of the mean, in local time.
+/// δ: half the width of the smoothing, in local time.
 const MEAN: f64 = 0.7;
 /// w at the end of a ramp, as a part of the greatest.
 const END: f64 = 0.8;
 /// The inner Bernstein coefficients of w differ from w by at most this part, so that they stay above 0.
 const STEEPEST: f64 = 0.9;
-/// The greatest use of the limits at the collocation points: it leaves room for the points between.
+/// The greatest use of the limits of acceleration and jerk at the collocation points: it leaves room for the points
+/// between. The limit of speed is used fully, but for rounding.
 pub const USE: f64 = 0.9;
+const FULL: f64 = 1.0 + 1e-9;
+/// Relative rounding of w.
+const ROUNDING: f64 = 1e-12;
 /// An interval that uses more is lowered to this use.
 const LOWERED: f64 = 0.8;
 
@@ -30,7 +37,7 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
     for i in 0..=last {
         let tau = mean.tau[i + 1];
         let (low, high) = (mean.at(tau - MEAN, &mut at[0]), mean.at(tau + MEAN, &mut at[1]));
-        let rho = (high.1 - low.1) / (2.0 * MEAN) - MEAN;
+        let rho = (high.1 - low.1) / (2.0 * MEAN);
         let slope = (high.0 - low.0) / (2.0 * MEAN);
         let w = (rho * 4.0 / 3.0).exp();
         // Long intervals limit the slope.
@@ -40,16 +47,24 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
         x.extend([w, (4.0 / 3.0 * w * slope / slopes.length(r[i])).max(-falls).min(rises)]);
     }
     for (end, kind) in ends.iter().enumerate() {
-        if let WindowEnd::Rest { ramp, greatest } = *kind {
-            let (at, sign) = if end == 0 { (0, 1.0) } else { (2 * last, -1.0) };
-            x[at] = x[at].min(END * greatest);
-            x[at + 1] = sign * ramp.slope() * x[at];
+        let (at, sign) = if end == 0 { (0, 1.0) } else { (2 * last, -1.0) };
+        match *kind {
+            WindowEnd::Rest { ramp, greatest } => {
+                x[at] = x[at].min(END * greatest);
+                x[at + 1] = sign * ramp.slope() * x[at];
+            }
+            // An end that holds the speed of its cap is met but for rounding.
+            WindowEnd::Fixed { w, slope } => {
+                if (x[at] / w - 1.0).abs() < ROUNDING {
+                    (x[at], x[at + 1]) = (w, slope);
+                }
+            }
         }
     }
     x
 }
 
-/// ln r and its integral over local time, continued beyond both ends.
+/// The least ln r over local times up to `MEAN` away, and its integral over local time, continued beyond both ends.
 struct Mean {
     tau: Vec<f64>,
     rho: Vec<f64>,
@@ -72,6 +87,7 @@ impl Mean {
         }
         tau.push(t + 2.0 * MEAN);
         rho.push(r[last].ln() - beyond[1]);
+        let rho = least(&tau, &rho);
         let mut sum = vec![0.0];
         for i in 1..tau.len() {
             sum.push(sum[i - 1] + 0.5 * (tau[i] - tau[i - 1]) * (rho[i] + rho[i - 1]));
@@ -91,13 +107,77 @@ impl Mean {
     }
 }
 
-/// The use of the limits by x on interval n, in terms of w: w divided by it meets the limits.
+/// The least value of a function up to `MEAN` to both sides of each of its points, between which it is linear.
+fn least(tau: &[f64], rho: &[f64]) -> Vec<f64> {
+    let between = |i: usize, at: f64| {
+        let part = (at - tau[i]) / (tau[i + 1] - tau[i]);
+        rho[i] + part * (rho[i + 1] - rho[i])
+    };
+    let last = tau.len() - 1;
+    // Points within reach that have no lower one after them.
+    let mut low: VecDeque<usize> = VecDeque::new();
+    let (mut from, mut to) = (0, 0);
+    (0..=last)
+        .map(|i| {
+            let [start, end] = [tau[i] - MEAN, tau[i] + MEAN];
+            while to <= last && tau[to] <= end {
+                while low.back().is_some_and(|&back| rho[back] >= rho[to]) {
+                    low.pop_back();
+                }
+                low.push_back(to);
+                to += 1;
+            }
+            while tau[from] < start {
+                from += 1;
+            }
+            while low.front().is_some_and(|&front| front < from) {
+                low.pop_front();
+            }
+            let mut value = low.front().map_or(rho[i], |&front| rho[front]);
+            if from > 0 {
+                value = value.min(between(from - 1, start));
+            }
+            if to <= last {
+                value = value.min(between(to - 1, end));
+            }
+            value
+        })
+        .collect()
+}
+
+/// The use of the limits by x on interval n, in terms of w, over what a first plan may use of them: w divided by it
+/// meets them.
 pub fn used<const M: usize>(rows: &Constraints<M>, x: &[f64], n: usize) -> f64 {
     let [v, a, j] = rows.utilisation(x, n);
-    (v * v).max(a).max(j.cbrt().powi(2))
+    (v * v / FULL).max(a.max(j.cbrt().powi(2)) / USE)
 }
 
 /// The factor on r that lowers an interval with this use to `LOWERED`.
 pub fn factor(used: f64) -> f64 {
-    (LOWERED / used).powf(0.75)
+    (LOWERED / (USE * used)).powf(0.75)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_value_nearby_is_that_of_a_scan() {
+        // Points at uneven distances, some further apart than the smoothing reaches.
+        let tau: Vec<f64> =
+            (0..60).map(|i| 0.3 * i as f64 + 0.25 * (i as f64).sin() + (i / 20) as f64).collect();
+        let rho: Vec<f64> = (0..60).map(|i| (1.7 * i as f64).sin()).collect();
+        let value = |at: f64| {
+            let i = tau.partition_point(|&tau| tau <= at).clamp(1, 59);
+            rho[i - 1] + (at - tau[i - 1]) / (tau[i] - tau[i - 1]) * (rho[i] - rho[i - 1])
+        };
+        for (i, found) in least(&tau, &rho).into_iter().enumerate() {
+            let scanned = (-2000..=2000)
+                .map(|n| tau[i] + MEAN * f64::from(n) / 2000.0)
+                .filter(|at| (tau[0]..=tau[59]).contains(at))
+                .map(value)
+                .fold(f64::INFINITY, f64::min);
+            assert!(found <= scanned + 1e-12 && found > scanned - 5e-3, "{found} for {scanned} at {i}");
+        }
+    }
 }

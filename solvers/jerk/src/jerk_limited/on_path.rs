@@ -1,8 +1,8 @@
 //! The jerk-limited planner on a path of the package, with the problem's limits and jerk limits [mm/s³]: a profile of
 //! phases over the pieces' parameters, and a lower bound on its time.
 //!
-//! Each subrun is planned along its arc length. Two more speed caps hold inside it: a corner is passed at its speed,
-//! and a junction where q'' jumps at the speed at which third differences of setpoints keep the limits of jerk
+//! Each subrun is planned along its arc length, but for where its feed is held (`held`). Two more speed caps hold inside
+//! it: a corner is passed at its speed, and a junction where q'' jumps at the speed at which third differences of setpoints keep the limits of jerk
 //! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
 //! the acceleration goes on (`turns`).
 
@@ -11,9 +11,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::arc_length_path::{speed_sq, ArcLengthPath, Junction, Part};
+use crate::jerk_limited::held::{caps_between, stretches, Between, Stretch};
 use crate::jerk_limited::turns::{lower, Line};
-use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile, Ramp};
-use crate::jerk_profile::{JerkProfile, SPEED_CUBIC};
+use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile, Ramp, SpeedCap};
+use crate::jerk_profile::{JerkProfile, FEED, SPEED_CUBIC};
 use crate::s_curve::{self, Segment};
 use crate::subruns::{chains, checked, over_chains, subruns, turns, Chain, Subrun};
 use feedplan_planner::problem::{along, Fault, Problem};
@@ -26,6 +27,11 @@ const CUTS: u32 = 12;
 const BELOW: f64 = 0.9999;
 /// How often subruns are planned that do not meet, and meet without acceleration at last.
 const ROUNDS: usize = 4;
+/// An error of the grid counts as a part of the time of the whole subrun. It falls with the square of the resolution r:
+/// where stretches are planned that are the part p of the length, r/√(1 + FINER (1/p − 1)), but not less than `LEAST`, adds to
+/// the error about this part of what r leaves of a subrun that is planned as a whole.
+const FINER: f64 = 0.05;
+const LEAST: f64 = 6.0;
 /// Bisection steps for the greatest speed that an end can have.
 const TRIALS: u32 = 12;
 
@@ -224,20 +230,20 @@ impl<const M: usize> Task<'_, M> {
         let mut phases = JerkProfile::default();
         let junctions = path.junctions(&self.limits.jerk);
         let caps = path.caps(&junctions);
-        let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps: &caps, ends };
         let moving = ends.iter().any(|end| matches!(end, End::Moving { .. }));
-        match jerk_limited::plan(&problem, self.effort) {
+        let own = stretches(self.problem, path, &self.limits, &junctions, ends);
+        match self.stretches(path, own, &junctions, &caps) {
             // The deadline came before the first iteration of all windows.
-            Ok(plan) if plan.iterations == 0.0 && self.effort.expired() => Ok(JerkProfile::unplanned()),
-            Ok(plan) => {
-                phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
-                phases.excess.push(plan.excess);
-                phases.stopped = !plan.converged && self.effort.expired();
-                for Junction { cap, jumps } in junctions {
-                    if jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {
-                        phases.kinks.push(path.parts[path.part(cap.s)].piece as u32);
-                    }
+            Ok(planned) if self.effort.expired() && planned.iter().all(|own| own.excess.is_empty()) => {
+                Ok(JerkProfile::unplanned())
+            }
+            Ok(planned) => {
+                let mut excess = 0.0;
+                for mut own in planned {
+                    excess += own.excess.drain(..).sum::<f64>();
+                    phases.append(own);
                 }
+                phases.excess.push(excess);
                 Ok(phases)
             }
             // A moving end has no plan before some iterations.
@@ -256,6 +262,99 @@ impl<const M: usize> Task<'_, M> {
         }
     }
 
+    /// The phases of all stretches. Those of one without an iteration before the deadline have no excess.
+    fn stretches(
+        &self,
+        path: &ArcLengthPath<M>,
+        own: Vec<Stretch>,
+        junctions: &[Junction],
+        caps: &[SpeedCap],
+    ) -> Result<Vec<JerkProfile>, jerk_limited::Fault> {
+        let planned = own.iter().filter(|stretch| stretch.held.is_none());
+        let share = planned.map(|stretch| stretch.ends[1] - stretch.ends[0]).sum::<f64>() / path.total();
+        let resolution = (self.effort.resolution / (1.0 + FINER * (1.0 / share - 1.0)).sqrt())
+            .max(LEAST.min(self.effort.resolution));
+        let effort = Effort { resolution, ..*self.effort };
+        let mut all: Vec<(Stretch, Option<JerkProfile>)> = own.into_iter().map(|own| (own, None)).collect();
+        loop {
+            let plan = |(stretch, phases): &(Stretch, Option<JerkProfile>)| match phases {
+                None => self.stretch(path, stretch, &effort, junctions, caps).map(Some),
+                Some(_) => Ok(None),
+            };
+            let planned: Vec<_> = all.par_iter().map(plan).collect();
+            let mut failed = vec![];
+            for (i, planned) in planned.into_iter().enumerate() {
+                match planned {
+                    Ok(Some(phases)) => all[i].1 = Some(phases),
+                    Ok(None) => {}
+                    Err(jerk_limited::Fault::NoPlan { .. }) if all.len() > 1 => failed.push(i),
+                    Err(fault) => return Err(fault),
+                }
+            }
+            if failed.is_empty() {
+                return Ok(all.into_iter().filter_map(|(_, phases)| phases).collect());
+            }
+            // Where the end of a stretch at its feed is too near, it is joined with the next ones.
+            for i in failed.into_iter().rev() {
+                let joined = i.saturating_sub(2)..(i + 3).min(all.len());
+                let (first, last) = (all[joined.start].0, all[joined.end - 1].0);
+                let ends = [first.ends[0], last.ends[1]];
+                let whole = Stretch { ends, states: [first.states[0], last.states[1]], held: None };
+                all.splice(joined, [(whole, None)]);
+            }
+        }
+    }
+
+    fn stretch(
+        &self,
+        path: &ArcLengthPath<M>,
+        stretch: &Stretch,
+        effort: &Effort,
+        junctions: &[Junction],
+        caps: &[SpeedCap],
+    ) -> Result<JerkProfile, jerk_limited::Fault> {
+        let Stretch { ends, states, held } = *stretch;
+        let watch = effort.watch.part((ends[1] - ends[0]) / path.total());
+        let mut phases = JerkProfile::default();
+        if let Some(feed) = held {
+            phases.push_held(self.problem, path, ends, feed);
+            watch.advance(1);
+            self.kinks(path, junctions, |_| feed * feed, ends, &mut phases);
+            return Ok(phases);
+        }
+        let problem = jerk_limited::Problem {
+            geometry: &Between::new(path, ends),
+            limits: self.limits,
+            caps: caps_between(caps, ends),
+            ends: states,
+        };
+        let plan = jerk_limited::plan(&problem, &Effort { watch, ..*effort })?;
+        phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
+        phases.stopped = !plan.converged && effort.expired();
+        if plan.iterations > 0.0 {
+            phases.excess.push(plan.excess);
+        }
+        self.kinks(path, junctions, |s| plan.profile.at(s)[0], ends, &mut phases);
+        Ok(phases)
+    }
+
+    /// Adds the pieces of the junctions between two lengths whose jump limits the speed; w is its square at a length.
+    fn kinks(
+        &self,
+        path: &ArcLengthPath<M>,
+        junctions: &[Junction],
+        w: impl Fn(f64) -> f64,
+        [from, to]: [f64; 2],
+        phases: &mut JerkProfile,
+    ) {
+        let first = junctions.partition_point(|junction| junction.cap.s <= from);
+        for Junction { cap, jumps } in junctions[first..].iter().take_while(|junction| junction.cap.s <= to) {
+            if *jumps && w(cap.s) >= HELD * cap.speed * cap.speed {
+                phases.kinks.push(path.parts[path.part(cap.s)].piece as u32);
+            }
+        }
+    }
+
     /// The lower bound of a subrun; None where its phases are no profile of this planner.
     fn certified(
         &self,
@@ -264,7 +363,7 @@ impl<const M: usize> Task<'_, M> {
         columns: &Columns,
         phases: Range<usize>,
     ) -> Option<f64> {
-        let is_cubic = |phase: &usize| columns.kind[*phase] == SPEED_CUBIC;
+        let is_cubic = |phase: &usize| matches!(columns.kind[*phase], SPEED_CUBIC | FEED);
         let first = phases.clone().find(is_cubic)?;
         let last = phases.clone().rev().find(is_cubic)?;
         if (first..last).any(|phase| columns.p1[phase] == 0.0) {
@@ -382,7 +481,7 @@ impl<const M: usize> Task<'_, M> {
         &self,
         path: &ArcLengthPath<M>,
         ends: [End; 2],
-        caps: &[jerk_limited::SpeedCap],
+        caps: &[SpeedCap],
     ) -> Result<JerkProfile, Fault> {
         let effort = Effort { deadline: None, tolerance: 1e-4, ..*self.effort };
         let speeds = ends.map(|end| match end {

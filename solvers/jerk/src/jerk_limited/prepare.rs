@@ -68,17 +68,17 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
             self.x = initial_plan::smooth(&self.grid.stations, &caps, slopes, &self.ends);
             let used = self.each(|rows, n, x| initial_plan::used(rows, x, n), 0.0);
             worst = used.iter().copied().fold(0.0, f64::max);
-            if worst <= initial_plan::USE {
+            if worst <= 1.0 {
                 return Ok(());
             }
             for n in 0..used.len() {
-                if used[n] > initial_plan::USE {
+                if used[n] > 1.0 {
                     let r = self.x[2 * n].max(self.x[2 * n + 2]).powf(0.75);
                     caps[n] = caps[n].min(2.0 * r) * initial_plan::factor(used[n]);
                 }
             }
         }
-        let scale = initial_plan::USE / worst;
+        let scale = 1.0 / worst;
         if scale == 0.0 || self.ends.iter().any(|kind| matches!(kind, WindowEnd::Fixed { .. })) {
             return Err(Fault::NoPlan { s: self.grid.stations[0] });
         }
@@ -144,10 +144,11 @@ fn rising(numbers: impl Iterator<Item = f64> + Clone) -> bool {
 fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), Fault> {
     let wrong = |what: String| Err(Fault::Input(what));
     let knots = problem.geometry.knots();
-    if knots.len() < 2 || knots[0] != 0.0 || !rising(knots.iter().copied()) {
-        return wrong(
-            "the knots of the path do not rise from 0 mm: give two or more, each above the last".into(),
-        );
+    if knots.len() < 2 || !rising(knots.iter().copied()) {
+        return wrong("the knots of the path do not rise: give two or more, each above the last".into());
+    }
+    if knots[0] != 0.0 && !matches!(problem.ends[0], End::Moving { .. }) {
+        return wrong(format!("a path from rest begins at {} mm: let it begin at 0", knots[0]));
     }
     let limits = &problem.limits;
     let Limits { velocity, acceleration, jerk } = limits;

@@ -6,8 +6,7 @@ use super::{rest_ramp, Fault, Geometry, Limits, PathPoint, SpeedCap};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, lesser, Both};
 
-/// Parts of the limits of speed, acceleration and jerk that the caps of r use.
-const SPEED: f64 = 0.9;
+/// Parts of the limits of acceleration and jerk that the caps of r use.
 const ACCELERATION: f64 = 0.4;
 const JERK: f64 = 0.25;
 /// K: the greatest slope of r, in √(J/|q'|). Constant jerk J has √4.5 = 2.12; the smoothing of `initial_plan` needs the
@@ -19,6 +18,8 @@ const RISE: f64 = 1.5 * 0.6 * 0.79;
 const CHANGE: f64 = 0.2;
 /// … with this range of depths.
 const DEPTH: std::ops::Range<u32> = 2..30;
+/// Relative rounding of r.
+pub const ROUNDING: f64 = 1e-9;
 /// Samples are at most this part of r/K apart.
 const SPACING: f64 = 0.25;
 
@@ -48,6 +49,8 @@ pub struct EnvelopeSample {
     pub cap: f64,
     /// 1/length over which the path turns or its curvature changes, in 1/mm.
     pub turning: f64,
+    /// Whether feed and chord error alone set the greatest r.
+    pub fed: bool,
 }
 
 impl<const M: usize> Limits<M> {
@@ -64,7 +67,7 @@ impl<const M: usize> Limits<M> {
     /// The greatest r at a point, if the slope of r is at most k.
     pub(super) fn envelope_cap(&self, point: &PathPoint<M>, k: f64) -> f64 {
         let tiny = f64::MIN_POSITIVE;
-        let mut cap = (SPEED * SPEED / self.per_speed_sq(point).max(tiny)).powf(0.75);
+        let mut cap = (1.0 / self.per_speed_sq(point).max(tiny)).powf(0.75);
         for axis in 0..M {
             let (second, third) = (point.second[axis].abs().max(tiny), point.third[axis].abs().max(tiny));
             let jerk = JERK * self.jerk[axis];
@@ -96,6 +99,13 @@ impl Slopes {
         }
     }
 
+    /// At least the slope k of every path of the axes that move.
+    pub fn steepest<const M: usize>(limits: &Limits<M>, moves: &[bool; M]) -> f64 {
+        // On every path some q' is at least 1/√M.
+        let most = (0..M).filter(|&k| moves[k]).map(|k| limits.jerk[k]).fold(0.0, f64::max);
+        SLOPE * (most * (M as f64).sqrt()).sqrt()
+    }
+
     /// The length over which r doubles at its greatest slope.
     #[inline]
     pub fn length(&self, r: f64) -> f64 {
@@ -106,6 +116,37 @@ impl Slopes {
     #[inline]
     pub fn reach(&self, r: f64, h: f64, change: Change) -> f64 {
         r + h * self.k.min(self.acceleration[change as usize] / r.cbrt()).min(r / self.shortest)
+    }
+
+    /// The distance from one r to a greater one at the greatest slopes.
+    pub fn distance(&self, [from, to]: [f64; 2], change: Change) -> f64 {
+        self.place(to, change) - self.place(from, change)
+    }
+
+    /// The greatest r at any distance h, starting from r.
+    pub fn far(&self, r: f64, h: f64, change: Change) -> f64 {
+        let (a, turn) = (self.acceleration[change as usize], self.turn(change));
+        let place = self.place(r, change) + h;
+        if place * self.k <= turn {
+            place * self.k
+        } else {
+            (turn.powf(4.0 / 3.0) + 4.0 / 3.0 * a * (place - turn / self.k)).powf(0.75)
+        }
+    }
+
+    /// The r above which the acceleration limits the slope.
+    fn turn(&self, change: Change) -> f64 {
+        (self.acceleration[change as usize] / self.k).powi(3)
+    }
+
+    /// The distance of an r from rest at the greatest slopes.
+    fn place(&self, r: f64, change: Change) -> f64 {
+        let (a, turn) = (self.acceleration[change as usize], self.turn(change));
+        if r <= turn {
+            r / self.k
+        } else {
+            turn / self.k + 0.75 * (r.powf(4.0 / 3.0) - turn.powf(4.0 / 3.0)) / a
+        }
     }
 
     /// The time from rest to a speed, or from it to rest if that takes longer.
@@ -178,12 +219,9 @@ pub fn sample_envelope<const M: usize>(
     let slopes = Slopes::new(limits, &greatest, knots[knots.len() - 1]);
     let sample = |piece: u32, s: f64| {
         let point = geometry.at(piece as usize, s);
-        EnvelopeSample {
-            s,
-            piece,
-            cap: limits.envelope_cap(&point, slopes.k),
-            turning: turning(limits, &point),
-        }
+        let cap = limits.envelope_cap(&point, slopes.k);
+        let fed = cap >= (1.0 - ROUNDING) * point.speed_cap.powf(1.5);
+        EnvelopeSample { s, piece, cap, turning: turning(limits, &point), fed }
     };
     let mut samples = vec![];
     let mut next_cap = caps.partition_point(|cap| cap.s <= from);
@@ -197,7 +235,7 @@ pub fn sample_envelope<const M: usize>(
             let cap = caps.get(next_cap).filter(|cap| cap.s <= end);
             let mut there = sample(piece, cap.map_or(end, |cap| cap.s));
             if let Some(cap) = cap {
-                there.cap = there.cap.min((SPEED * cap.speed).powf(1.5));
+                there.cap = there.cap.min(cap.speed.powf(1.5));
                 next_cap += 1;
             }
             halve(&sample, last, there, 0, &mut samples);
@@ -268,6 +306,7 @@ fn densify(
                 piece: a.piece,
                 cap: a.cap + part * (b.cap - a.cap),
                 turning: a.turning + part * (b.turning - a.turning),
+                fed: a.fed && b.fed,
             });
         }
     }

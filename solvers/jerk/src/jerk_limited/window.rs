@@ -21,6 +21,8 @@ const ROUNDS: usize = 10;
 const ROUGH: (f64, f64) = (1e-4, 0.97);
 /// Peaks that exceed the collocation points by more than this factor still move.
 const FIRM: f64 = 1.05;
+/// Iterations start from this multiple of the first plan, which may be on a limit.
+const INSIDE: f64 = 0.8;
 /// Parts of the way back to the first plan that are tried in order to be inside tightened limits …
 const BACK: [f64; 13] = [3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 /// … and the factor by which the start is farther back, so that it is not on a limit.
@@ -61,7 +63,7 @@ impl<const M: usize> Window<M> {
         let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
         let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
-        let mut attempts = vec![(x.to_vec(), rough)];
+        let mut attempts = vec![(inside(x), rough)];
         let mut times = vec![0; self.rows.intervals.len()];
         for round in 0..ROUNDS {
             let Some((y, report)) = self.attempt(ends, attempts, space, &mut verdict.iterations) else {
@@ -123,11 +125,11 @@ impl<const M: usize> Window<M> {
         y: &[f64],
         effort: &Effort<'e>,
     ) -> Vec<(Vec<f64>, Effort<'e>)> {
-        let inside = |z: &[f64]| {
+        let is_inside = |z: &[f64]| {
             (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
         };
-        let ways = ways_back(ends, x);
-        let is_near = |part: f64| ways.iter().find(|way| inside(&blend(way, y, part)));
+        let ways = ways_back(ends, inside(x));
+        let is_near = |part: f64| ways.iter().find(|way| is_inside(&blend(way, y, part)));
         let near = BACK.into_iter().find_map(|part| Some((part, is_near(part)?)));
         let Some((least, way)) = near else { return vec![] };
         BACK.into_iter()
@@ -144,7 +146,7 @@ impl<const M: usize> Window<M> {
         if !ends.iter().zip([0, x.len() - 2]).all(|(kind, at)| kind.is_met(x[at], x[at + 1])) {
             return None;
         }
-        let ways = ways_back(ends, x);
+        let ways = ways_back(ends, x.to_vec());
         let held = |part: f64| ways.iter().map(|way| blend(way, y, part)).find(|z| self.holds(z, HELD));
         let z = RETREATS.into_iter().find_map(held)?;
         let time = self.time(ends, &z);
@@ -206,10 +208,15 @@ pub fn ramps(ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
 
 /// Targets of the ways back from a plan: the first plan x, and standstill where both ends rest. On the way to x the
 /// jerk may rise, as it is a product of two numbers that both change; on the way to standstill every use falls.
-fn ways_back(ends: &[WindowEnd; 2], x: &[f64]) -> Vec<Vec<f64>> {
+fn ways_back(ends: &[WindowEnd; 2], x: Vec<f64>) -> Vec<Vec<f64>> {
     let rests = ends.iter().all(|kind| matches!(kind, WindowEnd::Rest { .. }));
     let standstill = rests.then(|| vec![0.0; x.len()]);
-    std::iter::once(x.to_vec()).chain(standstill).collect()
+    std::iter::once(x).chain(standstill).collect()
+}
+
+/// A plan strictly within all limits, from one that keeps them.
+fn inside(x: &[f64]) -> Vec<f64> {
+    x.iter().map(|x| INSIDE * x).collect()
 }
 
 /// y plus a part of the way to x.

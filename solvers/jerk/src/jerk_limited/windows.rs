@@ -21,18 +21,17 @@ use super::{Effort, Fault, Geometry, Plan, Problem, Profile};
 const REACH: (f64, usize) = (14.0, 80);
 /// Least travel time from cut to cut, in stop times of the first plan.
 const LONG: f64 = 36.0;
-/// Windows solved between two calls of `finished`, for each thread.
+/// Windows in memory, for each thread.
 const BATCH: usize = 2;
 /// Windows are blended over that part of their overlap where they agree best, of this many parts, else of fewer.
 const BLENDS: [usize; 4] = [8, 4, 2, 1];
 /// Greatest use of a limit by a blend: a little more than that of a window.
 const BLENDED: f64 = 1.0 + 5e-7;
 
-/// See `jerk_limited::stream`.
+/// See `jerk_limited::plan`.
 pub fn solve<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     effort: &Effort,
-    mut finished: impl FnMut(&Profile),
 ) -> Result<Plan, Fault> {
     let prepared = Prepared::new(problem, effort)?;
     let mut x = prepared.x.clone();
@@ -40,7 +39,6 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     let windows = run.windows();
     let watch = effort.watch.part(1.0 - PREPARING).each(windows.iter().map(Range::len).sum());
     let mut counts = Counts { converged: true, steps: 0.0, excess: 0.0 };
-    let mut done = 0;
     for first in (0..windows.len()).step_by(BATCH * rayon::current_num_threads()) {
         if effort.expired() {
             counts.converged = false;
@@ -67,13 +65,6 @@ pub fn solve<G: Geometry<M>, const M: usize>(
                 x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
             }
         }
-        // Stations before the next window are final.
-        let final_station = windows.get(batch.end).map_or(run.stations.len() - 1, |next| next.start);
-        finished(&run.profile(&x, done..final_station));
-        done = final_station;
-    }
-    if done + 1 < run.stations.len() {
-        finished(&run.profile(&x, done..run.stations.len() - 1));
     }
     for (kind, station) in prepared.ends.iter().zip([0, run.stations.len() - 1]) {
         if !kind.is_met(x[2 * station], x[2 * station + 1]) {
@@ -87,7 +78,7 @@ pub fn solve<G: Geometry<M>, const M: usize>(
         converged: counts.converged,
         excess: counts.excess,
         iterations: counts.steps / count as f64,
-        profile: run.profile(&x, 0..count),
+        profile: run.profile(&x),
     })
 }
 
@@ -232,18 +223,14 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         false
     }
 
-    /// The profile between two stations, with the ramps at the ends of the path.
-    fn profile(&self, x: &[f64], stations: Range<usize>) -> Profile {
+    /// The profile with its ramps.
+    fn profile(&self, x: &[f64]) -> Profile {
         let knots = self.prepared.problem.geometry.knots();
-        let start = if stations.start == 0 { 0.0 } else { self.stations[stations.start] };
-        let last = stations.end + 1 == self.stations.len();
-        let end = if last { knots[knots.len() - 1] } else { self.stations[stations.end] };
-        let x = &x[2 * stations.start..2 * stations.end + 2];
         Profile {
-            s: self.stations[stations.start..=stations.end].to_vec(),
+            s: self.stations.to_vec(),
             speed_sq: x.iter().step_by(2).copied().collect(),
             slope: x.iter().skip(1).step_by(2).copied().collect(),
-            ends: [start, end],
+            ends: [knots[0], knots[knots.len() - 1]],
             powers: self.prepared.ends.map(|end| end.ramp().power),
         }
     }

@@ -1,0 +1,439 @@
+//! Where a subrun holds its feed: a look ahead of the solver, at the cost of a few sums for each part.
+//!
+//! A part can be passed at its feed v if |q'| v ≤ V, |q''| v² ≤ A and |q'''| v³ ≤ J for every axis, by bounds on the
+//! derivatives that are proven over the whole piece. The speed envelope r = w^(3/4) (`speed_envelope`) over all parts
+//! says how far from slower places v is reached at the latest: it rises more slowly than the optimum. Between two such
+//! distances v is the optimum, and there is nothing to solve. What is left are stretches from one held feed to the
+//! next, which know nothing of one another.
+
+use rayon::prelude::*;
+
+use super::speed_envelope::{Change, Slopes, ROUNDING};
+use super::{End, Geometry, Limits, PathPoint, SpeedCap};
+use crate::arc_length_path::{path_point, piece, ArcLengthPath, Junction};
+use crate::path_limits::{bounded, Curve, Shape};
+use feedplan_geometry::quadratic::norm;
+use feedplan_geometry::spline::Piece;
+use feedplan_planner::problem::Problem;
+
+/// Bounds that are computed closely exceed the derivatives by about this part.
+const ACCURACY: f64 = 0.2;
+/// A stretch that is planned goes on at the held feed for this many lengths over which r doubles at its greatest slope:
+/// the optimum may slow down to gain acceleration before the feed rises, and the first plan is smoothed over as much.
+const MARGIN: f64 = 1.5;
+/// A stretch ends at a knot that is less than this part of the margin away.
+const NEAR: f64 = 0.5;
+/// Nor are there intervals of less than this part of that distance.
+const HARDLY: f64 = 0.05;
+/// Parts that one thread looks at together.
+const TOGETHER: usize = 64;
+
+/// The way between two lengths of a subrun in mm, with what is known at its ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretch {
+    pub ends: [f64; 2],
+    pub states: [End; 2],
+    /// The feed in mm/s, if it is the speed all the way.
+    pub held: Option<f64>,
+}
+
+/// A stretch as a path of its own, by the arc length of its subrun.
+pub struct Between<'a, const M: usize> {
+    path: &'a ArcLengthPath<'a, M>,
+    first: usize,
+    knots: Vec<f64>,
+}
+
+impl<'a, const M: usize> Between<'a, M> {
+    pub fn new(path: &'a ArcLengthPath<'a, M>, [from, to]: [f64; 2]) -> Self {
+        let first = path.part(from);
+        let inner = path.knots()[first + 1..].iter().copied().take_while(|&knot| knot < to);
+        let knots = std::iter::once(from).chain(inner).chain([to]).collect();
+        Self { path, first, knots }
+    }
+}
+
+impl<const M: usize> Geometry<M> for Between<'_, M> {
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, piece: usize, s: f64) -> PathPoint<M> {
+        self.path.at(self.first + piece, s)
+    }
+}
+
+/// What the look ahead knows of a part.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    length: f64,
+    /// The greatest r: that of the feed where it can be held.
+    cap: f64,
+    /// The feed that can be held; 0 for none.
+    feed: f64,
+    /// The part of acceleration and jerk that holding the feed leaves for changes of speed.
+    ease: f64,
+    /// Whether the envelope has the feed there, too.
+    easy: bool,
+}
+
+/// The stretches of a subrun, in order, those that hold their feed apart.
+pub fn stretches<const M: usize>(
+    problem: &Problem<M>,
+    path: &ArcLengthPath<M>,
+    limits: &Limits<M>,
+    junctions: &[Junction],
+    ends: [End; 2],
+) -> Vec<Stretch> {
+    let knots = path.knots();
+    let mut moving = [false; M];
+    for part in path.parts {
+        for (all, own) in moving.iter_mut().zip(moves(&piece(problem, part.piece))) {
+            *all |= own;
+        }
+    }
+    let slopes = Slopes::new(limits, &[directions(&moving); 2], path.total());
+    let steepest = Slopes::steepest(limits, &moving);
+    let shares = shares(path, junctions);
+    let look = |part: usize| {
+        problem.watch.check_at(part);
+        look(problem, path, limits, steepest, (part, shares[part]))
+    };
+    let looks: Vec<Look> = (0..path.parts.len()).into_par_iter().with_min_len(TOGETHER).map(look).collect();
+    let speeds = ends.map(|end| match end {
+        End::Moving { speed, .. } => speed,
+        End::Rest | End::Turn { .. } => 0.0,
+    });
+    let r = envelope(&looks, junctions, slopes, speeds);
+    let mut out: Vec<Stretch> = vec![];
+    let (mut from, mut state) = (0.0, ends[0]);
+    let mut first = 0;
+    while first < looks.len() {
+        let feed = looks[first].feed;
+        let mut end = first + 1;
+        while end < looks.len() && looks[end].feed == feed && junctions[end - 1].cap.speed >= feed {
+            end += 1;
+        }
+        if feed > 0.0 {
+            let most = feed.powf(1.5);
+            let own = &looks[first..end];
+            let left = reached(own.iter(), slopes, [r[first], most], Change::Rise);
+            let right = reached(own.iter().rev(), slopes, [r[end], most], Change::Fall);
+            let near = NEAR * MARGIN * slopes.length(most);
+            if let (Some(left), Some(right)) = (left, right) {
+                let at = [(knots[first] + left, near), (knots[end] - right, -near)];
+                let [start, stop] = at.map(|(s, near)| to_knot(&knots[first..=end], s, near));
+                if stop - start > near {
+                    let even = End::Moving { speed: feed, acceleration: 0.0 };
+                    out.push(Stretch { ends: [from, start], states: [state, even], held: None });
+                    out.push(Stretch { ends: [start, stop], states: [even; 2], held: Some(feed) });
+                    (from, state) = (stop, even);
+                }
+            }
+        }
+        first = end;
+    }
+    out.push(Stretch { ends: [from, path.total()], states: [state, ends[1]], held: None });
+    out
+}
+
+/// The speed caps of a path between two lengths, and those before and after that reach in: of the neighbours beyond.
+pub fn caps_between(caps: &[SpeedCap], [from, to]: [f64; 2]) -> &[SpeedCap] {
+    let reaches = |cap: &SpeedCap| cap.s + cap.reach > from && cap.s - cap.reach < to;
+    let mut first = caps.partition_point(|cap| cap.s < from);
+    while first > 0 && reaches(&caps[first - 1]) {
+        first -= 1;
+    }
+    let mut end = caps.partition_point(|cap| cap.s <= to);
+    while end < caps.len() && reaches(&caps[end]) {
+        end += 1;
+    }
+    &caps[first..end]
+}
+
+/// The part by which the limits of jerk are lower somewhere on each part.
+fn shares<const M: usize>(path: &ArcLengthPath<M>, junctions: &[Junction]) -> Vec<f64> {
+    let mut shares = vec![0.0_f64; path.parts.len()];
+    for Junction { cap, .. } in junctions.iter().filter(|junction| junction.cap.share > 0.0) {
+        let [first, last] = [cap.s - cap.reach, cap.s + cap.reach].map(|s| path.part(s));
+        for share in &mut shares[first..=last] {
+            *share = share.max(cap.share);
+        }
+    }
+    shares
+}
+
+fn look<const M: usize>(
+    problem: &Problem<M>,
+    path: &ArcLengthPath<M>,
+    limits: &Limits<M>,
+    k: f64,
+    (part, share): (usize, f64),
+) -> Look {
+    let (at, length) = (&path.parts[part], path.knots()[part + 1] - path.knots()[part]);
+    let i = at.piece;
+    let feed = problem.feed[i];
+    let own = piece(problem, i);
+    // A bound on r that the envelope's own parts of the limits leave.
+    let cap_of = |shape: &Shape<M>| {
+        let point = |sign: usize| PathPoint {
+            first: shape.first[sign],
+            second: shape.second[sign].map(|bend| if sign == 0 { bend } else { -bend }),
+            third: shape.third,
+            speed_cap: feed,
+        };
+        limits.envelope_cap(&point(0), k).min(limits.envelope_cap(&point(1), k))
+    };
+    let most = feed.powf(1.5);
+    let is_easy = |shape: &Shape<M>| share == 0.0 && cap_of(shape) >= (1.0 - ROUNDING) * most;
+    let points = || {
+        let samples = [0.0, 0.5, 1.0].map(|part| at.u[0] + part * (at.u[1] - at.u[0]));
+        samples.map(|u| path_point(problem, i, u))
+    };
+    let held = |shape: &Shape<M>| {
+        let [a, j] = uses(limits, shape, feed)?;
+        let j = j / (1.0 - share);
+        let fits = a <= 1.0 && j <= 1.0 && path.chord_speed(shape.curvature) >= feed;
+        fits.then(|| Look { length, cap: most, feed, ease: 1.0 - a.max(j), easy: is_easy(shape) })
+    };
+    let plain = feed.is_finite() && problem.tip.is_none() && problem.way.is_none();
+    if plain && problem.share(i).is_none() {
+        let rough = match path.direction(part) {
+            Some(direction) => Some(Shape::of(&direction, &[0.0; M], &[0.0; M])),
+            None => rough(&own),
+        };
+        if let Some(look) = rough.filter(|shape| is_easy(shape)).and_then(|shape| held(&shape)) {
+            return look;
+        }
+        let is_held =
+            |point: &PathPoint<M>| held(&Shape::of(&point.first, &point.second, &point.third)).is_some();
+        if path.direction(part).is_none() && points().iter().all(is_held) {
+            let curve = Curve { joints: own.control, tip: None, weight: own.weights };
+            if let Some(look) = held(&bounded(&curve, ACCURACY)) {
+                return look;
+            }
+        }
+    }
+    let caps = points().map(|point| limits.envelope_cap(&point, k));
+    let cap = caps.iter().fold(f64::INFINITY, |least, &cap| if cap >= 0.0 { least.min(cap) } else { 0.0 });
+    Look { length, cap, feed: 0.0, ease: 1.0, easy: false }
+}
+
+/// The use of the limits of acceleration and jerk at a constant speed; None where it is above that of an axis.
+fn uses<const M: usize>(limits: &Limits<M>, shape: &Shape<M>, v: f64) -> Option<[f64; 2]> {
+    let [mut a, mut j] = [0.0_f64; 2];
+    for k in 0..M {
+        for sign in 0..2 {
+            if shape.first[sign][k] * v > limits.velocity[sign][k] {
+                return None;
+            }
+            a = a.max(shape.second[sign][k] * v * v / limits.acceleration[sign][k]);
+        }
+        j = j.max(shape.third[k] * v * v * v / limits.jerk[k]);
+    }
+    (a.is_finite() && j.is_finite()).then_some([a, j])
+}
+
+/// Bounds on the derivatives of a polynomial piece that are the same for all axes that move, from the lengths of the coefficients of C', C''
+/// and C'''. With these at most a, b, c and C' at least d along the chord,
+///
+///   |q''| ≤ b/d²,   |q'''| ≤ c/d³ + 3 a b²/d⁵ + a² (5 a b² + a² c)/d⁷
+///
+/// by the formulas in the head of `arc_length_path`. None where C' may vanish.
+fn rough<const M: usize>(piece: &Piece<M>) -> Option<Shape<M>> {
+    if piece.is_rational() {
+        return None;
+    }
+    let degree = piece.degree();
+    let mut coefficients = [[0.0; M]; feedplan_geometry::spline::MAX_DEGREE + 1];
+    coefficients[..=degree].copy_from_slice(piece.control);
+    let chord: [f64; M] = std::array::from_fn(|k| piece.control[degree][k] - piece.control[0][k]);
+    let length = norm(&chord);
+    let mut least = f64::INFINITY;
+    let mut most = [0.0_f64; 3];
+    for order in 0..degree.min(3) {
+        let rate = (degree - order) as f64 / piece.width;
+        for n in 0..degree - order {
+            for k in 0..M {
+                coefficients[n][k] = rate * (coefficients[n + 1][k] - coefficients[n][k]);
+            }
+            if order == 0 {
+                let along: f64 = (0..M).map(|k| coefficients[n][k] * chord[k]).sum();
+                least = least.min(along / length);
+            }
+            most[order] = most[order].max(norm(&coefficients[n]));
+        }
+    }
+    let ([a, b, c], d) = (most, least);
+    if d.is_nan() || d <= 0.0 {
+        return None;
+    }
+    let second = b / (d * d);
+    let third =
+        c / d.powi(3) + 3.0 * a * b * b / d.powi(5) + a * a * (5.0 * a * b * b + a * a * c) / d.powi(7);
+    let first = directions(&moves(piece));
+    let all = |most: f64| first.map(|moves| most * moves);
+    Some(Shape { first: [first; 2], second: [all(second); 2], third: all(third), curvature: second })
+}
+
+/// Whether each axis moves on a piece.
+fn moves<const M: usize>(piece: &Piece<M>) -> [bool; M] {
+    std::array::from_fn(|k| piece.control.iter().any(|point| point[k] != piece.control[0][k]))
+}
+
+/// The greatest q' of each axis: 1 where it moves.
+fn directions<const M: usize>(moves: &[bool; M]) -> [f64; M] {
+    moves.map(|moves| if moves { 1.0 } else { 0.0 })
+}
+
+/// r at the knots: no greater than the parts and junctions allow, nor than it can be reached from its neighbours.
+fn envelope(looks: &[Look], junctions: &[Junction], slopes: Slopes, speeds: [f64; 2]) -> Vec<f64> {
+    let count = looks.len();
+    let mut r = vec![0.0; count + 1];
+    for (i, r) in r.iter_mut().enumerate() {
+        let junction = if i == 0 {
+            speeds[0]
+        } else if i == count {
+            speeds[1]
+        } else {
+            junctions[i - 1].cap.speed
+        };
+        let beside = looks[i.saturating_sub(1)].cap.min(looks[i.min(count - 1)].cap);
+        *r = beside.min(junction.powf(1.5));
+    }
+    for i in 0..count {
+        r[i + 1] = r[i + 1].min(slopes.far(r[i], looks[i].ease * looks[i].length, Change::Rise));
+    }
+    for i in (0..count).rev() {
+        r[i] = r[i].min(slopes.far(r[i + 1], looks[i].ease * looks[i].length, Change::Fall));
+    }
+    r
+}
+
+/// The distance from one end of some parts that hold a feed to where the envelope has reached it and goes on at it on
+/// easy parts for the margin; None where there is no such place.
+fn reached<'a>(
+    looks: impl Iterator<Item = &'a Look>,
+    slopes: Slopes,
+    [from, most]: [f64; 2],
+    change: Change,
+) -> Option<f64> {
+    let margin = MARGIN * slopes.length(most);
+    let mut missing = slopes.distance([from, most], change);
+    let (mut at, mut even) = (0.0, 0.0);
+    for look in looks {
+        let mut left = look.length;
+        if missing > look.ease * left {
+            missing -= look.ease * left;
+            at += left;
+            continue;
+        }
+        if missing > 0.0 {
+            let step = missing / look.ease;
+            (missing, at, left) = (0.0, at + step, left - step);
+        }
+        if look.easy && even + left >= margin {
+            return Some(at + margin - even);
+        }
+        (at, even) = (at + left, if look.easy { even + left } else { 0.0 });
+    }
+    None
+}
+
+/// The knot at most a distance ahead of s, or behind it for a negative one, or hardly on the other side; else s.
+fn to_knot(knots: &[f64], s: f64, distance: f64) -> f64 {
+    let [a, b] = [s - HARDLY * distance, s + distance];
+    let next = knots.partition_point(|&knot| knot < a.min(b));
+    knots.get(next).copied().filter(|&knot| knot <= a.max(b)).unwrap_or(s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arc_length_path::Part;
+    use proptest::prelude::*;
+
+    const LIMITS: Limits<2> =
+        Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
+
+    /// Pieces of one run from rest to rest, each of so many control points, by their feeds.
+    fn looked(control: &[[f64; 2]], feed: &[f64]) -> Vec<Stretch> {
+        let count = control.len() / feed.len();
+        let offset: Vec<usize> = (0..=feed.len()).map(|i| i * count).collect();
+        let problem = Problem {
+            control,
+            weight: &[],
+            offset: &offset,
+            width: &vec![1.0; feed.len()],
+            tip: None,
+            way: None,
+            feed_share: &[],
+            runs: &[0, feed.len()],
+            feed,
+            junction_speed: &vec![f64::INFINITY; feed.len() + 1],
+            max_velocity: LIMITS.velocity,
+            max_acceleration: LIMITS.acceleration,
+            chord_tolerance: f64::INFINITY,
+            period: 0.001,
+            start_speed: 0.0,
+            end_speed: 0.0,
+            watch: Default::default(),
+        };
+        let parts: Vec<Part> = (0..feed.len()).map(|piece| Part { piece, u: [0.0, 1.0] }).collect();
+        let path = ArcLengthPath::new(&problem, &parts);
+        stretches(&problem, &path, &LIMITS, &path.junctions(&LIMITS.jerk), [End::Rest; 2])
+    }
+
+    #[test]
+    fn lines_hold_their_feeds_between_stretches_that_change_them() {
+        let control = [[0.0, 0.0], [100.0, 0.0], [100.0, 0.0], [200.0, 0.0], [200.0, 0.0], [200.5, 0.0]];
+        let found = looked(&control, &[50.0, 20.0, 80.0]);
+        let held: Vec<Option<f64>> = found.iter().map(|stretch| stretch.held).collect();
+        // The last line is too short for its feed.
+        assert_eq!(held, [None, Some(50.0), None, Some(20.0), None]);
+        assert!(found.windows(2).all(|pair| pair[0].ends[1] == pair[1].ends[0]));
+        assert_eq!((found[0].ends[0], found[4].ends[1]), (0.0, 200.5));
+        // From rest to 50 mm/s takes at least √(50³/50 000) = 1.58 mm, with half the margin beyond.
+        let [_, at] = found[0].ends;
+        assert!((1.6..15.0).contains(&at), "{at} mm to 50 mm/s");
+    }
+
+    #[test]
+    fn a_bend_too_sharp_for_its_feed_is_planned() {
+        // A straight start and end, and a quarter of a turn of about a millimetre between.
+        let bend = |r: f64| {
+            [
+                [[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [60.0, 0.0]],
+                [[60.0, 0.0], [60.0 + 0.55 * r, 0.0], [60.0 + r, 0.45 * r], [60.0 + r, r]],
+                [[60.0 + r, r], [60.0 + r, r + 20.0], [60.0 + r, r + 40.0], [60.0 + r, r + 60.0]],
+            ]
+            .concat()
+        };
+        let held =
+            |r: f64| looked(&bend(r), &[50.0; 3]).iter().filter(|stretch| stretch.held.is_some()).count();
+        assert_eq!(held(1.0), 2);
+    }
+
+    proptest! {
+        #[test]
+        fn rough_bounds_are_bounds(
+            bends in prop::collection::vec(prop::array::uniform2(-0.3..0.3f64), 6),
+            degree in 1..=5usize,
+        ) {
+            let mut control = vec![[0.0; 2]];
+            for bend in &bends[..degree] {
+                let last = control[control.len() - 1];
+                control.push([last[0] + 1.0 + bend[0], last[1] + bend[1]]);
+            }
+            let piece = Piece { control: &control, weights: &[], width: 2.0 };
+            let bound = rough(&piece).expect("a bound");
+            let close = bounded(&Curve { joints: &control, tip: None, weight: &[] }, 0.01);
+            for k in 0..2 {
+                for sign in 0..2 {
+                    prop_assert!(close.second[sign][k] <= 1.02 * bound.second[sign][k] + 1e-9);
+                }
+                prop_assert!(close.third[k] <= 1.02 * bound.third[k] + 1e-9);
+            }
+        }
+    }
+}
