@@ -40,16 +40,7 @@ fn with<G: Geometry<M>, const M: usize, T>(
 
 /// `jerk_limited::plan`.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
-    stream(problem, effort, |_| {})
-}
-
-/// `jerk_limited::stream`.
-pub fn stream<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    effort: &Effort,
-    mut finished: impl FnMut(&Profile),
-) -> Result<Plan, Fault> {
-    with(problem, |problem| jerk_limited::stream(problem, effort, &mut finished as &mut dyn FnMut(&Profile)))
+    with(problem, |problem| jerk_limited::plan(problem, effort))
 }
 
 /// `jerk_limited::certify`.
