@@ -119,10 +119,15 @@ impl<const M: usize> Auditor<'_, M> {
         self.duration(i, elapsed, width_rounding, line, tally);
     }
 
-    /// The recorded duration against the audit's own. A rounding of u0 or u1 changes the width, and with it the time, by the
-    /// share `width_rounding`.
+    /// The recorded duration against the audit's own. A rounding of u0 or u1 changes the width by the share
+    /// `width_rounding`, and the time by at least this share; at a slow end by the time in which the motion covers the
+    /// rounding there.
     fn duration(&self, i: usize, elapsed: f64, width_rounding: f64, line: i32, tally: &mut Tally<M>) {
-        let error = (self.phases.duration[i] - elapsed).abs() / elapsed - ROUNDINGS * width_rounding;
+        let phases = self.phases;
+        let slowest = phases.p0[i].min(phases.p1[i]).sqrt();
+        let rounding = width_rounding * (phases.u1[i] - phases.u0[i]);
+        let at_end = if slowest > 0.0 { rounding / (slowest * elapsed) } else { 0.0 };
+        let error = (phases.duration[i] - elapsed).abs() / elapsed - ROUNDINGS * width_rounding.max(at_end);
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[i], line);
     }
 
