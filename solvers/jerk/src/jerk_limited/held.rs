@@ -234,8 +234,8 @@ fn uses<const M: usize>(limits: &Limits<M>, shape: &Shape<M>, v: f64) -> Option<
     (a.is_finite() && j.is_finite()).then_some([a, j])
 }
 
-/// Bounds on the derivatives of a polynomial piece that are the same for all axes that move, from the lengths of the coefficients of C', C''
-/// and C'''. With these at most a, b, c and C' at least d along the chord,
+/// Bounds on the derivatives of a polynomial piece, the same for all axes that move, from the lengths of the
+/// coefficients of C', C'' and C'''. With these at most a, b, c and C' at least d along the chord,
 ///
 ///   |q''| ≤ b/d²,   |q'''| ≤ c/d³ + 3 a b²/d⁵ + a² (5 a b² + a² c)/d⁷
 ///

@@ -1,8 +1,9 @@
 //! The jerk-limited planner on a path of the package, with the problem's limits and jerk limits [mm/s³]: a profile of
 //! phases over the pieces' parameters, and a lower bound on its time.
 //!
-//! Each subrun is planned along its arc length, but for where its feed is held (`held`). Two more speed caps hold inside
-//! it: a corner is passed at its speed, and a junction where q'' jumps at the speed at which third differences of setpoints keep the limits of jerk
+//! Each subrun is planned along its arc length, except where its feed is held (`held`). Two more speed caps hold inside
+//! it: a corner is passed at its speed, and a junction where q'' jumps at the speed at which third differences of
+//! setpoints keep the limits of jerk
 //! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
 //! the acceleration goes on (`turns`).
 
@@ -27,9 +28,9 @@ const CUTS: u32 = 12;
 const BELOW: f64 = 0.9999;
 /// How often subruns are planned that do not meet, and meet without acceleration at last.
 const ROUNDS: usize = 4;
-/// An error of the grid counts as a part of the time of the whole subrun. It falls with the square of the resolution r:
-/// where stretches are planned that are the part p of the length, r/√(1 + FINER (1/p − 1)), but not less than `LEAST`, adds to
-/// the error about this part of what r leaves of a subrun that is planned as a whole.
+/// The error of the grid counts as a part of the time of the whole subrun, and falls with the square of the resolution
+/// r. Where the planned stretches are the part p of the length, their resolution is r/√(1 + FINER (1/p − 1)), and at
+/// least `LEAST`: the error grows by about `FINER` over that of a subrun that is planned as a whole.
 const FINER: f64 = 0.05;
 const LEAST: f64 = 6.0;
 /// Bisection steps for the greatest speed that an end can have.
