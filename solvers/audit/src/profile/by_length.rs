@@ -53,7 +53,8 @@ impl<const M: usize> Looker<'_, M> {
     /// `share` is that of the phase in its piece, of so many `turns`.
     pub fn phase(&self, [u0, u1]: [f64; 2], share: f64, turns: usize, tally: &mut Tally<M>) {
         let [from, to] = [u0, u1].map(|u| self.motion.passage(u).1.v);
-        let change = (to - from).abs() / from.max(to);
+        // At most 1, as speeds are positive; a profile of rubbish has any numbers.
+        let change = ((to - from).abs() / from.max(to)).min(1.0);
         let wanted = (PLACES * turns as f64 * share).max(SPEEDS * change);
         let count = (wanted.ceil() as usize).max(LEAST);
         let mut last: [Option<Use<M>>; 2] = [None; 2];
