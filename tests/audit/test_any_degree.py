@@ -70,7 +70,9 @@ def test_the_same_plan_in_another_form_measures_the_same(part: Any, other: Any) 
     for name in ("velocity", "acceleration"):
         for axis in "XYZ":
             assert theirs.check(name, axis).worst == pytest.approx(mine.check(name, axis).worst, rel=1e-6)
-    for name in ("feed", "chord", "deviation"):
+    # Lines of several feeds reach them: rounding decides which one is named.
+    assert theirs.check("feed").ratio == pytest.approx(mine.check("feed").ratio, rel=1e-6)
+    for name in ("chord", "deviation"):
         assert theirs.check(name).worst == pytest.approx(mine.check(name).worst, rel=1e-6)
 
 
