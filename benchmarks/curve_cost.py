@@ -16,6 +16,7 @@ from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
+from feedplan.profile import SpeedProfile
 
 NAME = "curve-cost"
 SEED = 1
@@ -89,7 +90,7 @@ def _row(name: str, problem: Problem, cost: float, of_quadratics: float) -> dict
     return {
         "path": name,
         "pieces": pieces,
-        "arcs a piece": len(plan_bang_bang(problem).piece) / pieces,
+        "phases a piece": len(SpeedProfile.of(plan_bang_bang(problem))) / pieces,
         "CPU per piece [µs]": 1e6 * cost / pieces,
         "ratio": cost / pieces / of_quadratics,
     }

@@ -39,6 +39,7 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
         "against-copp",
         "against-toppra",
         "end-to-end",
+        "faster-path",
         "zhang-comparison",
         "interpolators",
         "kinematics-cost",

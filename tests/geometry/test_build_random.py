@@ -97,24 +97,26 @@ def test_the_path_does_not_depend_on_the_number_of_threads(make_program: Any) ->
     import subprocess
     import sys
 
+    # Three runs of thousands of pieces, with gentle and sharp turns.
     script = """
 import hashlib, numpy as np
-from feedplan import _solvers
-from feedplan.geometry.moves import Moves, Rules
+from feedplan.geometry.build import build_path
+from feedplan.machine.machine import Machine
+from feedplan.program.read import read_program
 random = np.random.default_rng(3)
 n = 20000
 heading = np.cumsum(random.normal(size=n) * random.choice([0.02, 2.0], size=n))
 target = np.cumsum(np.stack([np.cos(heading), np.sin(heading)], axis=1) * 0.3, axis=0)
-moves = Moves(
-    "p", np.zeros(2), np.ones(n, np.uint8), target, random.choice([10.0, 20.0], size=n),
-    np.arange(n, dtype=np.int32), np.full(n, 0.01), np.full(n, 0.005), np.arange(n) % 7001 == 7000,
-    np.ones(n, bool))
-rules = Rules(
-    np.full(2, 500.0), np.full(2, 3000.0),
-    np.array([[-np.inf, np.inf]] * 2), False, 1e-3, 5.0, 2e4, 1e3, 0.48, "rounded")
-(curve, *rest), summary, _, _ = _solvers.build_path(moves, rules)
-columns = [curve.control_points, curve.offsets, curve.width, *rest]
-print(summary, hashlib.sha256(b"".join(column.tobytes() for column in columns)).hexdigest())
+lines = [
+    f"G1 X{x:.6f} Y{y:.6f} F{feed}" + ("\\nG4 P0.1" if i % 7001 == 7000 else "")
+    for i, ((x, y), feed) in enumerate(zip(target, random.choice([600, 1200], size=n)))
+]
+machine = Machine.load("mill")
+program = read_program("G21 G90 G64 P0.01\\n" + "\\n".join(lines) + "\\nM2\\n", machine)
+path = build_path(program, machine)
+columns = [path.curve.control_points, path.curve.offsets, path.curve.width, path.runs, path.line]
+content = b"".join(np.ascontiguousarray(column).tobytes() for column in columns)
+print(len(path), hashlib.sha256(content).hexdigest())
 """
     results = {
         subprocess.run(

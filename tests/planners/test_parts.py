@@ -22,7 +22,7 @@ CORNERS = f"G21 G90 G64 P0.01\nF3000\nG1 {ROWS}\nG2 X40 Y10 R30\nG61.1 G1 X50\nY
 TIP = (
     "G21 G90 G94 G64 P0.01 F2000\nT1 M6 G43.4 H1\nG0 X0 Y0 Z20 A0 C0\n"
     + "\n".join(f"G1 X{2 * k} Y{k % 5} A{3 * (k % 7)} C{5 * k}" for k in range(1, 8))
-    + "\nG0 Z40\nG1 X0 Y0 Z20 A0 C0\nG49\nM2\n"
+    + "\nG0 Z40\nG4 P0.1\nG1 X0 Y0 Z20 A0 C0\nG49\nM2\n"
 )
 
 
