@@ -76,7 +76,7 @@ def test_a_job_outlives_its_worker_and_a_server_its_end(
     cluster: LocalCluster, tmp_path: Path, server: Server
 ) -> None:
     own = Server(tmp_path, *cluster.options)
-    medium = b"\n".join(long_part().splitlines()[:250]) + b"\nM2\n"
+    medium = b"\n".join(long_part().splitlines()[:1000]) + b"\nM2\n"
     fields = {"method": "jerk-limited", "options": '{"accuracy": 0.05}'}
     job = own.submit(medium, **fields).json["id"]
     wait_for(lambda: own.get(f"/v1/jobs/{job}").json["stage"] == "plan")
