@@ -75,7 +75,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
     for k in range(len(problem.axes)):
         slope, way = mesh.slope[:, :, k], mesh.way[:, :, k]
         size = np.abs(slope)
-        steady = (slope * np.sign(way[-1]) > 0.0).all(axis=0) & (by_axis | mesh.by_length)
+        steady = (slope * np.sign(way[-1]) > 0.0).all(axis=0) & by_axis
         steady &= size.max(axis=0) < _VARIES * size.min(axis=0)
         if not steady.any():
             continue
@@ -86,14 +86,12 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
             own[0], own[-1] = start, end
             other = _Motion(own, (a - mesh.bend[:, :, k] * own) / slope)
             others = other.worst(problem, mesh)
-            better = steady & ((others < worst) | (mesh.by_length & (size[0] > 0.5)))
+            better = steady & (others < worst)
             time = 2.0 * np.abs(way[-1]) / (size[0] * np.sqrt(start) + size[-1] * np.sqrt(end))
         motion, worst = motion.where(better, other), np.where(better, others, worst)
         kind[better], axis[better] = PhaseLaw.AXIS_ACCELERATION, k
         value, duration = np.where(better, a, value), np.where(better, time, duration)
     ends = np.stack([start, end])
-    if mesh.by_length.any():
-        ends = _by_parameter(problem, mesh, ends, axis, value)
     acceleration, speed = motion.acceleration(mesh), motion.speed(mesh)
     used = np.maximum(problem.use("acceleration", acceleration).max(axis=2), speed.max(axis=2))
     # Each direction by itself, because the used share of a limit has a kink where the sign changes.
@@ -144,22 +142,6 @@ class _Motion:
 
     def where(self, better: NDArray[np.bool_], other: _Motion) -> _Motion:
         return _Motion(np.where(better, other.p, self.p), np.where(better, other.s, self.s))
-
-
-def _by_parameter(problem: Problem, mesh: Mesh, ends: Array, axis: NDArray[np.uint8], value: Array) -> Array:
-    """p at both ends of the cells, of which those meshed over the length hold v²."""
-    ends = ends.copy()
-    cells = np.flatnonzero(mesh.by_length)
-    k = axis[cells].astype(np.int64)
-    for side in (0, 1):
-        values = problem.derivatives(mesh.piece[cells], mesh.ends[side, cells], 2)
-        square, bend = (values[1] ** 2).sum(axis=1), values[2][np.arange(len(cells)), k]
-        speed_sq = ends[side, cells]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # From rest in a cusp a = q'' p; passed at a speed p has no bound.
-            limit = np.where(speed_sq > 0.0, np.inf, np.abs(value[cells] / bend))
-            ends[side, cells] = np.where(square > 0.0, speed_sq / square, limit)
-    return ends
 
 
 def profile(problem: Problem, parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:

@@ -4,9 +4,7 @@ A subrun is a part of a run without a stop inside. Its cells never reach over th
 has two values at a knot: each side has cells of its own. Each cell has q', q'' and the greatest p at
 `PLACES`, which include both ends.
 
-A piece is meshed over its own parameter u. The exception is a straight piece with a cusp (q' = 0) at an end:
-there p grows without bound if the tool does not stop, so the piece is meshed over its length, and q' has a
-constant size. In any other cusp p is finite: the tool stops there, and the subrun ends.
+A piece is meshed over its own parameter u. In a cusp (q' = 0) the tool stops, and the subrun ends.
 """
 
 from __future__ import annotations
@@ -31,10 +29,8 @@ PLACES = np.concatenate(
     [[0.0], 0.5 + 0.5 * np.sort(legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))), [1.0]]
 )
 
-# q' below the first share of its size on the piece is a cusp. A straight piece leaves its chord by less than
-# the second share of the chord, which is rounding.
+# q' below this share of its size on the piece is a cusp.
 _CUSP = 1e-9
-_STRAIGHT = 1e-12
 
 
 def _integration() -> Array:
@@ -75,19 +71,17 @@ class Subrun:
 class Mesh:
     """The n cells of a subrun.
 
-    Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,) of the variable that it
-    is meshed over, `by_length` (n,) whether that is the length. At PLACES: `slope` q' and `bend` q''
-    (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's and the
-    chord error's limit that is used, squared, per p, `way` (places, n, joints) of the joints from the start
-    of the cell. `gain` (n,) is p at the start of the cell over p at the end of the cell before, and `cap`
-    (n + 1,) the greatest p in the stations, at the end of the cell before (of the cell after in the first
-    station). `fixed` holds p at both ends of the subrun where it is given.
+    Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,). At PLACES: `slope` q' and
+    `bend` q'' (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's
+    and the chord error's limit that is used, squared, per p, `way` (places, n, joints) of the joints from the
+    start of the cell. `gain` (n,) is p at the start of the cell over p at the end of the cell before, and
+    `cap` (n + 1,) the greatest p in the stations, at the end of the cell before (of the cell after in the
+    first station). `fixed` holds p at both ends of the subrun where it is given.
     """
 
     piece: Numbers
     ends: Array
     width: Array
-    by_length: NDArray[np.bool_]
     slope: Array
     bend: Array
     speed: Array
@@ -115,11 +109,9 @@ def subruns(problem: Problem) -> Iterator[list[Subrun]]:
     middle = problem.derivatives(pieces, 0.5 * width, 1)[1]
     size = np.maximum(np.linalg.norm(middle, axis=1), np.maximum(*_norms(start, end)))
     still = [norm <= _CUSP * size for norm in _norms(start, end)]
-    straight = _straight_to_cusp(problem)
     stop = np.array(problem.junction_speed) == 0.0
     for piece in range(1, count):
-        cusp = [still[1][piece - 1] and not straight[piece - 1], still[0][piece] and not straight[piece]]
-        stop[piece] |= any(cusp)
+        stop[piece] |= still[1][piece - 1] or still[0][piece]
     runs = problem.path.runs
     for run in range(len(runs) - 1):
         result = []
@@ -133,7 +125,7 @@ def subruns(problem: Problem) -> Iterator[list[Subrun]]:
                 problem.start_speed if first == 0 else 0.0,
                 problem.end_speed if last == count else 0.0,
             ]
-            at_cusp = [still[0][first] and not straight[first], still[1][last - 1] and not straight[last - 1]]
+            at_cusp = [still[0][first], still[1][last - 1]]
             known = [None if cusp else speed**2 for cusp, speed in zip(at_cusp, speeds, strict=True)]
             result.append(Subrun(int(first), int(last), known[0], known[1]))
         yield result
@@ -141,27 +133,6 @@ def subruns(problem: Problem) -> Iterator[list[Subrun]]:
 
 def _norms(*vectors: Array) -> list[Array]:
     return [np.linalg.norm(vector, axis=1) for vector in vectors]
-
-
-def _straight_to_cusp(problem: Problem) -> NDArray[np.bool_]:
-    """Which pieces are straight, do not turn back, and have a cusp at an end (n,)."""
-    curve = problem.path.curve
-    result = np.zeros(len(curve), dtype=bool)
-    if problem.words:
-        return result
-    points, offsets = curve.control_points, curve.offsets
-    steps = np.diff(points, axis=0)
-    chord = points[offsets[1:] - 1] - points[offsets[:-1]]
-    length = np.linalg.norm(chord, axis=1)
-    short = np.linalg.norm(steps, axis=1)
-    for i in np.flatnonzero(length > 0.0):
-        own = slice(int(offsets[i]), int(offsets[i + 1]) - 1)
-        if short[own][[0, -1]].min() > _CUSP * length[i]:
-            continue
-        along = steps[own] @ (chord[i] / length[i])
-        beside = np.linalg.norm(steps[own] - along[:, None] * (chord[i] / length[i]), axis=1)
-        result[i] = (along >= 0.0).all() and beside.max() <= _STRAIGHT * length[i]
-    return result
 
 
 @dataclass(frozen=True)
@@ -211,21 +182,12 @@ def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
     """
     piece, lower, upper = cuts.piece, cuts.lower, cuts.upper
     local = lower + (upper - lower) * PLACES[:, None]
-    straight = _straight_to_cusp(problem)[piece]
     whole = problem.path.width[piece]
     u = whole * local
     width = whole * (upper - lower)
-    if straight.any():
-        length = _lengths(problem)[piece]
-        u[:, straight] = _at_length(problem, piece[straight], local[:, straight])
-        width = np.where(straight, length * (upper - lower), width)
     slope, bend = _derivatives(problem, piece, u)
     square = _speed_square(problem, piece, u, slope)
     chord = _chord_speed_square(problem, piece, u)
-    if straight.any():
-        way = _chords(problem)[piece[straight]]
-        slope[:, straight] = way / np.linalg.norm(way, axis=1)[:, None]
-        bend[:, straight], square[:, straight] = 0.0, 1.0
     limits = [problem.use("velocity", slope) ** 2]
     counted = square
     if problem.feed_share is not None:
@@ -250,7 +212,7 @@ def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
         fixed.append(p)
     ends = np.stack([u[0], u[-1]])
     ends[:, :] = np.where(np.stack([lower, upper]) == 1.0, whole, ends)
-    return Mesh(piece, ends, width, straight, slope, bend, per_p, way, gain, cap, (fixed[0], fixed[1]))
+    return Mesh(piece, ends, width, slope, bend, per_p, way, gain, cap, (fixed[0], fixed[1]))
 
 
 def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | None = None) -> InfeasibleError:
@@ -264,30 +226,6 @@ def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | No
         line,
         reachable,
     )
-
-
-def _chords(problem: Problem) -> Array:
-    curve = problem.path.curve
-    return curve.control_points[curve.offsets[1:] - 1] - curve.control_points[curve.offsets[:-1]]
-
-
-def _lengths(problem: Problem) -> Array:
-    return np.asarray(np.linalg.norm(_chords(problem), axis=1))
-
-
-def _at_length(problem: Problem, piece: Numbers, share: Array) -> Array:
-    """u on straight pieces (m,) where these shares (places, m) of their length are passed."""
-    curve = problem.path.curve
-    many, chord = np.tile(piece, len(share)), np.tile(_chords(problem)[piece], (len(share), 1))
-    begin, square = curve.control_points[curve.offsets[many]], (chord**2).sum(axis=1)
-    low, high = np.zeros(share.size), curve.width[many]
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        passed = ((curve.evaluate(many, middle)[0] - begin) * chord).sum(axis=1) / square
-        below = passed < share.ravel()
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    u = np.where(share.ravel() == 1.0, curve.width[many], np.where(share.ravel() == 0.0, 0.0, high))
-    return np.asarray(u.reshape(share.shape))
 
 
 def _derivatives(problem: Problem, piece: Numbers, u: Array) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@
 //! Cauchy's estimate on a disc without singularities of f. Near a singularity equal panels would be many, so panels are
 //! halved towards it, and each has a bound of its own.
 
+use crate::elementary::Elementary;
 use crate::quadratic::{dot, Quadratic};
 use crate::tolerance::NO_CURVATURE;
 
@@ -212,7 +213,7 @@ pub fn table_size(width: f64, disc: &Disc, error: f64) -> f64 {
         return f64::INFINITY;
     }
     let exponent = 1.0 / (2 * N) as f64;
-    (width / disc.radius * (K * width * disc.bound / error).powf(exponent)).max(1.0)
+    (width / disc.radius * (K * width * disc.bound / error).power(exponent)).max(1.0)
 }
 
 /// Appends the table of f over [a, b] to `nodes`, with an error of at most `error` at each u. Returns the proven bound: it

@@ -7,6 +7,7 @@
 //! Every operation on numbers rounds as IEEE 754 says, and no product is fused with a sum: results are the same on every
 //! level, bit for bit.
 
+use crate::elementary::Elementary;
 use fearless_simd::{f64x4, ExtractToken, Simd, SimdBase, SimdFloat, SimdInto};
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
@@ -208,7 +209,7 @@ impl LogProduct {
     pub fn ln(&self) -> f64 {
         let exponents: i64 = self.exponent.iter().sum();
         let mantissas: f64 = self.mantissa.iter().product();
-        exponents as f64 * std::f64::consts::LN_2 + mantissas.ln()
+        exponents as f64 * std::f64::consts::LN_2 + mantissas.natural_log()
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod arc_length;
 pub mod conic;
+pub mod elementary;
 mod instances;
 pub mod inverse_length;
 pub mod lanes;

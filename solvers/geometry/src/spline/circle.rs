@@ -10,6 +10,7 @@
 //! With n points in all |Z − f| ≤ max|f⁽ⁿ⁾|/n! · Tⁿ/2ᵈ⁻¹. From f''' = 4/(1 + τ²)², whose poles ±i are at least 1 away from
 //! any real τ, |f⁽ⁿ⁾|/n! ≤ 2/(n(n − 2)), n ≥ 3. At d = 2 the axis is (Z₀ + Z₂)/2 in the middle.
 
+use crate::elementary::Elementary;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::bezier::elevate;
@@ -55,7 +56,7 @@ impl<const M: usize> Turn<M> {
         let mut count = self.quarters();
         let mut bound = self.axial_error(rise, degree, count);
         while bound > tolerance {
-            count = (count * 0.99 * (bound / tolerance).powf(1.0 / (degree + 1 + degree % 2) as f64))
+            count = (count * 0.99 * (bound / tolerance).power(1.0 / (degree + 1 + degree % 2) as f64))
                 .ceil()
                 .max(count + 1.0);
             if count.is_nan() || count > MAX_PIECES {
@@ -92,7 +93,7 @@ impl<const M: usize> Turn<M> {
         let theta = self.sweep.abs() / count;
         let (t, n) = ((0.25 * theta).tan(), (degree + 1 + degree % 2) as f64);
         let derivative = 2.0 / (n * (n - 2.0));
-        rise / count * (2.0 / theta) * derivative * t.powf(n) / (degree as f64 - 1.0).exp2()
+        rise / count * (2.0 / theta) * derivative * t.power(n) / (degree as f64 - 1.0).exp2()
     }
 
     /// The turn in `count` equal quadratic pieces.

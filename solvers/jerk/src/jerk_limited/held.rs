@@ -6,6 +6,7 @@
 //! distances v is the optimum, and there is nothing to solve. What is left are stretches from one held feed to the
 //! next, which know nothing of one another.
 
+use feedplan_geometry::elementary::Elementary;
 use rayon::prelude::*;
 
 use super::speed_envelope::{Change, Slopes, ROUNDING};
@@ -115,7 +116,7 @@ pub fn stretches<const M: usize>(
             end += 1;
         }
         if feed > 0.0 {
-            let most = feed.powf(1.5);
+            let most = feed.power(1.5);
             let own = &looks[first..end];
             let left = reached(own.iter(), slopes, [r[first], most], Change::Rise);
             let right = reached(own.iter().rev(), slopes, [r[end], most], Change::Fall);
@@ -184,7 +185,7 @@ fn look<const M: usize>(
         };
         limits.envelope_cap(&point(0), k).min(limits.envelope_cap(&point(1), k))
     };
-    let most = feed.powf(1.5);
+    let most = feed.power(1.5);
     let is_easy = |shape: &Shape<M>| share == 0.0 && cap_of(shape) >= (1.0 - ROUNDING) * most;
     let points = || {
         let samples = [0.0, 0.5, 1.0].map(|part| at.u[0] + part * (at.u[1] - at.u[0]));
@@ -299,7 +300,7 @@ fn envelope(looks: &[Look], junctions: &[Junction], slopes: Slopes, speeds: [f64
             junctions[i - 1].cap.speed
         };
         let beside = looks[i.saturating_sub(1)].cap.min(looks[i.min(count - 1)].cap);
-        *r = beside.min(junction.powf(1.5));
+        *r = beside.min(junction.power(1.5));
     }
     for i in 0..count {
         r[i + 1] = r[i + 1].min(slopes.far(r[i], looks[i].ease * looks[i].length, Change::Rise));

@@ -4,6 +4,7 @@
 //! τ ± δ. The mean of that over τ ± δ exceeds ln r nowhere, is equal to it where ln r is constant over τ ± 2 δ, and is
 //! smooth enough for the limits of jerk.
 
+use feedplan_geometry::elementary::Elementary;
 use std::collections::VecDeque;
 
 use super::constraints::Constraints;
@@ -39,7 +40,7 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
         let (low, high) = (mean.at(tau - MEAN, &mut at[0]), mean.at(tau + MEAN, &mut at[1]));
         let rho = (high.1 - low.1) / (2.0 * MEAN);
         let slope = (high.0 - low.0) / (2.0 * MEAN);
-        let w = (rho * 4.0 / 3.0).exp();
+        let w = (rho * 4.0 / 3.0).exponential();
         // Long intervals limit the slope.
         let steepest = |h: f64| 3.0 * STEEPEST * w / h;
         let falls = if i < last { steepest(stations[i + 1] - stations[i]) } else { f64::INFINITY };
@@ -78,15 +79,16 @@ impl Mean {
             WindowEnd::Rest { .. } => 2.0 * MEAN,
             WindowEnd::Fixed { .. } => 0.0,
         });
-        let (mut tau, mut rho) = (vec![-2.0 * MEAN, 0.0], vec![r[0].ln() - beyond[0], r[0].ln()]);
+        let (mut tau, mut rho) =
+            (vec![-2.0 * MEAN, 0.0], vec![r[0].natural_log() - beyond[0], r[0].natural_log()]);
         let mut t = 0.0;
         for i in 1..=last {
             t += (stations[i] - stations[i - 1]) / slopes.length(0.5 * (r[i - 1] + r[i]));
             tau.push(t);
-            rho.push(r[i].ln());
+            rho.push(r[i].natural_log());
         }
         tau.push(t + 2.0 * MEAN);
-        rho.push(r[last].ln() - beyond[1]);
+        rho.push(r[last].natural_log() - beyond[1]);
         let rho = least(&tau, &rho);
         let mut sum = vec![0.0];
         for i in 1..tau.len() {
@@ -154,7 +156,7 @@ pub fn used<const M: usize>(rows: &Constraints<M>, x: &[f64], n: usize) -> f64 {
 
 /// The factor on r that lowers an interval with this use to `LOWERED`.
 pub fn factor(used: f64) -> f64 {
-    (LOWERED / (USE * used)).powf(0.75)
+    (LOWERED / (USE * used)).power(0.75)
 }
 
 #[cfg(test)]

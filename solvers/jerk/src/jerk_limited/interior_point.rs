@@ -7,6 +7,7 @@
 //!
 //! Symbols: λ multipliers, μ mean complementarity λ s per row, σ centring, T time.
 
+use feedplan_geometry::elementary::Elementary;
 use std::time::Instant;
 
 use fearless_simd::{dispatch, Level, Simd};
@@ -329,7 +330,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             if row.slack <= 0.0 {
                 return None;
             }
-            logarithm += row.slack.ln();
+            logarithm += row.slack.natural_log();
         }
         Some(logarithm)
     }

@@ -1,5 +1,6 @@
 //! What the solver starts from: the checked problem, its grid, the known ends, and a first plan within all limits.
 
+use feedplan_geometry::elementary::Elementary;
 use rayon::prelude::*;
 
 use super::constraints::Constraints;
@@ -60,7 +61,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let limits = &self.problem.limits;
         let mut caps =
             self.each(|rows, n, _| rows.intervals[n].envelope_cap(limits, slopes.k), f64::INFINITY);
-        let fastest = caps.iter().copied().fold(0.0, f64::max).powf(2.0 / 3.0);
+        let fastest = caps.iter().copied().fold(0.0, f64::max).power(2.0 / 3.0);
         self.stop_time = slopes.stop_time(fastest);
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
@@ -73,7 +74,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
             }
             for n in 0..used.len() {
                 if used[n] > 1.0 {
-                    let r = self.x[2 * n].max(self.x[2 * n + 2]).powf(0.75);
+                    let r = self.x[2 * n].max(self.x[2 * n + 2]).power(0.75);
                     caps[n] = caps[n].min(2.0 * r) * initial_plan::factor(used[n]);
                 }
             }

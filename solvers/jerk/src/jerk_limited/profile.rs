@@ -3,6 +3,7 @@
 
 use super::hermite;
 use super::rest_ramp::Ramp;
+use feedplan_geometry::elementary::Elementary;
 
 /// w at the stations. At rest, a ramp joins the end of the path and the nearest station.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,9 +64,9 @@ impl Profile {
 /// w, w', w'' at a distance from rest on a ramp with w = `greatest` at its end.
 fn on_ramp(distance: f64, ramp: Ramp, greatest: f64, sign: f64) -> [f64; 3] {
     let part = distance / ramp.length;
-    let w = greatest * part.powf(ramp.power);
-    let slope = ramp.power * greatest / ramp.length * part.powf(ramp.power - 1.0);
-    let bend = (ramp.power - 1.0) * ramp.slope() / ramp.length * greatest * part.powf(ramp.power - 2.0);
+    let w = greatest * part.power(ramp.power);
+    let slope = ramp.power * greatest / ramp.length * part.power(ramp.power - 1.0);
+    let bend = (ramp.power - 1.0) * ramp.slope() / ramp.length * greatest * part.power(ramp.power - 2.0);
     [w, sign * slope, bend]
 }
 

@@ -2,6 +2,7 @@
 //! where the path turns back, constant acceleration c/2, w = c s. Its length follows from the derivatives and limits at
 //! the end of the path, the greatest c from all points of the ramp.
 
+use feedplan_geometry::elementary::Elementary;
 use std::ops::Range;
 
 use super::{Geometry, Limits, PathPoint, SpeedCap};
@@ -99,9 +100,9 @@ pub fn greatest<const M: usize>(
             let x = (t * t * t).max(f64::MIN_POSITIVE);
             let point = geometry.at(piece, if end == 0 { x } else { total - x });
             // w/c, w'/c; then w^(3/2), √w w' and √w w'', all over c^(3/2).
-            let (w, w1) = (x.powf(power), sign * power * x.powf(power - 1.0));
-            let (cubed, crossed) = (x.powf(1.5 * power), sign * power * x.powf(1.5 * power - 1.0));
-            let bend = power * (power - 1.0) * x.powf(1.5 * power - 2.0);
+            let (w, w1) = (x.power(power), sign * power * x.power(power - 1.0));
+            let (cubed, crossed) = (x.power(1.5 * power), sign * power * x.power(1.5 * power - 1.0));
+            let bend = power * (power - 1.0) * x.power(1.5 * power - 2.0);
             let mut c = 1.0 / (limits.per_speed_sq(&point) * w);
             for k in 0..M {
                 let (q1, q2, q3) = (point.first[k], point.second[k], point.third[k]);
@@ -132,16 +133,16 @@ pub fn greatest<const M: usize>(
     for cap in caps {
         let x = from_rest(cap);
         if x <= ramp {
-            c = c.min(cap.speed * cap.speed / x.powf(power));
+            c = c.min(cap.speed * cap.speed / x.power(power));
         }
     }
-    c * ramp.powf(power) * (1.0 - 1e-9)
+    c * ramp.power(power) * (1.0 - 1e-9)
 }
 
 /// Appends points (t, greatest c) from the first to the second of a pair.
 fn halve(at: &impl Fn(f64) -> (f64, f64), [a, b]: [(f64, f64); 2], depth: u32, points: &mut Vec<(f64, f64)>) {
     let middle = at(0.5 * (a.0 + b.0));
-    let changes = (middle.1 * middle.1 / (a.1 * b.1)).ln().abs() > CHANGE && b.0 - a.0 > APART * b.0;
+    let changes = (middle.1 * middle.1 / (a.1 * b.1)).natural_log().abs() > CHANGE && b.0 - a.0 > APART * b.0;
     if depth < DEPTH.start || (changes && depth < DEPTH.end) {
         halve(at, [a, middle], depth + 1, points);
         halve(at, [middle, b], depth + 1, points);

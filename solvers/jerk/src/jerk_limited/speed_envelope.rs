@@ -3,6 +3,7 @@
 
 use super::interior_point::WindowEnd;
 use super::{rest_ramp, Fault, Geometry, Limits, PathPoint, SpeedCap};
+use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, lesser, Both};
 
@@ -67,13 +68,13 @@ impl<const M: usize> Limits<M> {
     /// The greatest r at a point, if the slope of r is at most k.
     pub(super) fn envelope_cap(&self, point: &PathPoint<M>, k: f64) -> f64 {
         let tiny = f64::MIN_POSITIVE;
-        let mut cap = (1.0 / self.per_speed_sq(point).max(tiny)).powf(0.75);
+        let mut cap = (1.0 / self.per_speed_sq(point).max(tiny)).power(0.75);
         for axis in 0..M {
             let (second, third) = (point.second[axis].abs().max(tiny), point.third[axis].abs().max(tiny));
             let jerk = JERK * self.jerk[axis];
             let acceleration = self.acceleration[usize::from(point.second[axis] < 0.0)][axis];
             cap = cap
-                .min((ACCELERATION * acceleration / second).powf(0.75))
+                .min((ACCELERATION * acceleration / second).power(0.75))
                 .min((jerk / third).sqrt())
                 .min(jerk / (2.0 * second * k));
         }
@@ -130,7 +131,7 @@ impl Slopes {
         if place * self.k <= turn {
             place * self.k
         } else {
-            (turn.powf(4.0 / 3.0) + 4.0 / 3.0 * a * (place - turn / self.k)).powf(0.75)
+            (turn.power(4.0 / 3.0) + 4.0 / 3.0 * a * (place - turn / self.k)).power(0.75)
         }
     }
 
@@ -145,7 +146,7 @@ impl Slopes {
         if r <= turn {
             r / self.k
         } else {
-            turn / self.k + 0.75 * (r.powf(4.0 / 3.0) - turn.powf(4.0 / 3.0)) / a
+            turn / self.k + 0.75 * (r.power(4.0 / 3.0) - turn.power(4.0 / 3.0)) / a
         }
     }
 
@@ -174,7 +175,7 @@ impl Slopes {
         for (kind, station) in ends.iter().zip([0, r.len() - 1]) {
             r[station] = r[station].min(match *kind {
                 WindowEnd::Rest { ramp, .. } => self.k * ramp.length,
-                WindowEnd::Fixed { w, .. } => w.powf(0.75),
+                WindowEnd::Fixed { w, .. } => w.power(0.75),
             });
         }
     }
@@ -220,7 +221,7 @@ pub fn sample_envelope<const M: usize>(
     let sample = |piece: u32, s: f64| {
         let point = geometry.at(piece as usize, s);
         let cap = limits.envelope_cap(&point, slopes.k);
-        let fed = cap >= (1.0 - ROUNDING) * point.speed_cap.powf(1.5);
+        let fed = cap >= (1.0 - ROUNDING) * point.speed_cap.power(1.5);
         EnvelopeSample { s, piece, cap, turning: turning(limits, &point), fed }
     };
     let mut samples = vec![];
@@ -235,7 +236,7 @@ pub fn sample_envelope<const M: usize>(
             let cap = caps.get(next_cap).filter(|cap| cap.s <= end);
             let mut there = sample(piece, cap.map_or(end, |cap| cap.s));
             if let Some(cap) = cap {
-                there.cap = there.cap.min(cap.speed.powf(1.5));
+                there.cap = there.cap.min(cap.speed.power(1.5));
                 next_cap += 1;
             }
             halve(&sample, last, there, 0, &mut samples);
@@ -264,7 +265,7 @@ fn halve(
 ) {
     let middle = sample(a.piece, 0.5 * (a.s + b.s));
     let turning = (middle.turning - 0.5 * (a.turning + b.turning)).abs();
-    let changes = (middle.cap * middle.cap / (a.cap * b.cap)).ln().abs() > CHANGE
+    let changes = (middle.cap * middle.cap / (a.cap * b.cap)).natural_log().abs() > CHANGE
         || turning > CHANGE * a.turning.max(b.turning);
     let deeper = depth < DEPTH.start || (changes && depth < DEPTH.end && b.s - a.s > 1e-9 * b.s);
     if deeper {

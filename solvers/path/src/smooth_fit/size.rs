@@ -8,6 +8,7 @@
 //! intervals. Neighbours differ little: |h'| ≤ GRADE.
 
 use super::polyline::{angle, Polyline};
+use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::sub;
 
 /// C: the turn over an interval times its length, in tolerances.
@@ -69,7 +70,7 @@ impl Grade {
         let crossing = 0.5 * (start + end + GRADE * length);
         let peak = crossing.min(most).max(start).max(end);
         let flat = (length - (peak - start) / GRADE - (peak - end) / GRADE).max(0.0);
-        let parts = [(peak / start).ln() / GRADE, flat / peak, (peak / end).ln() / GRADE];
+        let parts = [(peak / start).natural_log() / GRADE, flat / peak, (peak / end).natural_log() / GRADE];
         Self { length, start, end, peak, parts }
     }
 
@@ -81,11 +82,11 @@ impl Grade {
     fn place(&self, value: f64) -> f64 {
         let [rise, flat, _] = self.parts;
         let s = if value <= rise {
-            self.start * (GRADE * value).exp_m1() / GRADE
+            self.start * (GRADE * value).exponential_less_1() / GRADE
         } else if value <= rise + flat {
             (self.peak - self.start) / GRADE + (value - rise) * self.peak
         } else {
-            self.length - self.end * (GRADE * (self.total() - value)).exp_m1() / GRADE
+            self.length - self.end * (GRADE * (self.total() - value)).exponential_less_1() / GRADE
         };
         s.clamp(0.0, self.length)
     }

@@ -9,6 +9,7 @@ use crate::bang_bang::chord::SpeedLine;
 use crate::bang_bang::tolerance::{AT_KINK, SAME_CUT};
 use crate::problem::ChordLimit;
 use crate::AxisBits;
+use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::dot;
 
 /// Distance of the tangents of the chord-error limit; see `ChordLimit::lines_below`.
@@ -51,10 +52,11 @@ impl ChordLimit {
             Tangent { t, value: share - self.slow_sq, slope: share * 3.0 * dot(&g, &c) / d }
         };
         let step = |t: f64| ((t - least) / width).asinh() / STEP;
-        let even = (step(0.0).ceil() as i64..=step(1.0).floor() as i64).map(|i| (i as f64 * STEP).sinh());
+        let even =
+            (step(0.0).ceil() as i64..=step(1.0).floor() as i64).map(|i| (i as f64 * STEP).hyperbolic_sine());
         // The limit has a kink where ρ = δ.
         let least_radius = c_sq * width * width * (c_sq * width * width).sqrt() / piece.cross;
-        let kink = ((self.tolerance / least_radius).powf(2.0 / 3.0) - 1.0).max(0.0).sqrt();
+        let kink = ((self.tolerance / least_radius).power(2.0 / 3.0) - 1.0).max(0.0).sqrt();
         let mut contacts: Vec<f64> = even.chain([-kink, kink]).map(|tau| least + width * tau).collect();
         contacts.retain(|t| (SAME_CUT..1.0 - SAME_CUT).contains(t));
         contacts.sort_by(f64::total_cmp);

@@ -6,6 +6,7 @@
 use super::piece::Piece;
 use super::quotient::{Denominator, Quotient};
 use crate::bang_bang::tolerance::NEAR_TURN;
+use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::dot;
 
 /// The limits of the axes, and numbers that the passes often need.
@@ -256,7 +257,7 @@ fn atanh_over(x_sq: f64) -> f64 {
         odd.iter().rev().fold(0.0, |sum, n| sum * x_sq + 1.0 / n)
     } else if x_sq < 1.0 {
         let x = x_sq.sqrt();
-        0.5 * ((1.0 + x) / (1.0 - x)).ln() / x
+        0.5 * ((1.0 + x) / (1.0 - x)).natural_log() / x
     } else {
         // The tangent reverses, so d² is 0.
         0.0
