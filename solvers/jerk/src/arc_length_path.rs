@@ -438,16 +438,25 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
 
     /// The parameter at a distance in mm from another one, ahead or back, to its own digits; its arc length is about s.
     pub fn parameter_beside(&self, part: usize, from: f64, distance: f64, s: f64) -> f64 {
-        let (at, u) = (&self.parts[part], self.locate(part, s));
-        let passed = self.length_between(part, from.min(u), from.max(u)).copysign(u - from);
-        let next = u + (distance - passed) / speed_sq(self.problem, at.piece, u).sqrt();
-        // Next to a cusp the step may be infinite.
-        let [low, high] = if distance > 0.0 { [from, at.u[1]] } else { [at.u[0], from] };
-        if next.is_finite() {
-            next.clamp(low, high)
-        } else {
-            u
+        let at = &self.parts[part];
+        let [mut low, mut high] = if distance > 0.0 { [from, at.u[1]] } else { [at.u[0], from] };
+        let mut u = self.locate(part, s).clamp(low, high);
+        // Next to a cusp one step of Newton's method is not enough: |C'| changes within the digits of s.
+        for _ in 0..STEPS {
+            let miss = self.length_between(part, from.min(u), from.max(u)).copysign(u - from) - distance;
+            if miss > 0.0 {
+                high = u;
+            } else {
+                low = u;
+            }
+            let step = miss / speed_sq(self.problem, at.piece, u).sqrt();
+            let next = u - step;
+            u = if next >= low && next <= high { next } else { 0.5 * (low + high) };
+            if step.abs() <= 1e-15 * at.u[1] {
+                break;
+            }
         }
+        u
     }
 
     /// The length between two parameters of a part; short lengths have all their digits.
