@@ -385,7 +385,10 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         self.tables[part].get_or_init(|| {
             let mut rows = Halving::new(self.problem, &self.parts[part]).table();
             let last = rows.len() - 1;
-            rows[last].s = self.measures[part].length;
+            // All rows share what the lengths differ by: the last panel alone may be shorter than a turn.
+            let (length, sum) = (self.measures[part].length, rows[last].s);
+            rows.iter_mut().for_each(|row| row.s *= length / sum);
+            rows[last].s = length;
             rows
         })
     }
