@@ -179,7 +179,7 @@ def spent(work: Callable[[], Any], until: float = 0.0) -> float:
 def test_a_signal_ends_native_work_long_before_it_is_done(file: Path, machine: Machine) -> None:
     path = build_path(read_program(file, machine), machine, corners=Corners.SMOOTH)
     problem = build_problem(path, machine)
-    longer = read_gcode(wave(50_000), machine)
+    longer = read_gcode(wave(400_000), machine)
     for work in (
         lambda: build_path(longer, machine, corners=Corners.SMOOTH),
         lambda: planner("jerk-limited")(problem),
