@@ -78,8 +78,8 @@ def account(
     progress: Listener | None = None,
 ) -> Account:
     """The account of a profile on its path; `jerk` is true if the profile's method limits jerk."""
-    path, motion = problem.path, tool_motion(problem)
-    lengths = motion.lengths(part(progress, 0.0, 0.5))
+    path, motion = problem.path, tool_motion(problem, part(progress, 0.0, 0.5))
+    lengths = motion.lengths
     tell(progress, 0.5)
     time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
     moments = activity(problem, profile, motion, jerk, part(progress, 0.5, 0.95))

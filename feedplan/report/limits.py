@@ -6,7 +6,7 @@ p = (du/dt)².
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -25,7 +25,6 @@ Floats = NDArray[np.float64]
 _SAMPLES = 400_000
 _SAMPLES_AT_ONCE = 10_000
 _SAMPLES_PER_PHASE = 33
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True)
@@ -68,22 +67,9 @@ def limit_samples(
     # Denser towards both ends: the speed changes most next to a stop.
     fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     step = max(1, _SAMPLES_AT_ONCE // count)
-    start = 0.0
     for first in range(0, len(drawn), step):
-        block = _sample(problem, profile, motion, states, drawn[first : first + step], fraction, start)
-        start = float(block.length[-1])
-        yield block
+        yield _sample(problem, profile, motion, states, drawn[first : first + step], fraction)
         tell(report, min(first + step, len(drawn)) / len(drawn))
-
-
-def _integral(
-    slope: Callable[[NDArray[np.int64], Floats], Floats], piece: NDArray[np.int64], u0: Floats, u1: Floats
-) -> Floats:
-    """Integral of a slope over u between two parameters of a piece, by Gauss–Legendre with eight nodes."""
-    total = np.zeros(len(piece))
-    for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-        total += weight * slope(piece, np.minimum(u0 + 0.5 * (1.0 + node) * (u1 - u0), u1))
-    return np.asarray(0.5 * (u1 - u0) * total)
 
 
 def _sample(
@@ -93,7 +79,6 @@ def _sample(
     states: Sampler,
     phases: NDArray[np.int64],
     fraction: Floats,
-    start: float,
 ) -> LimitSamples:
     count = len(fraction)
     u0, u1 = profile.u0[phases], profile.u1[phases]
@@ -104,17 +89,12 @@ def _sample(
     piece = profile.piece[phase].astype(np.int64)
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
     slope = motion.slope(piece, u)
-    before = np.concatenate((u[:1], u[:-1]))
-    before[::count] = u[::count]
-    within = np.cumsum(_integral(motion.slope, piece, before, u).reshape(-1, count), axis=1)
-    # Summed phase by phase, so that rounding errors of the samples do not add up.
-    length = (start + np.cumsum(within[:, -1]) - within[:, -1])[:, None] + within
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         velocity = states.along(piece.astype(np.uint32), u)[2]
         joint = np.linalg.norm(tangent, axis=1)
         feed = _quotient(problem.feed[piece], np.sqrt(feed_square(problem, piece, u)))
         return LimitSamples(
-            length=length.ravel(),
+            length=motion.drawn_length(piece, u),
             speed=slope * parameter_speed(tangent, velocity),
             acceleration=slope
             * np.sqrt(limit_curve(tangent, second, problem.max_acceleration, problem.min_acceleration)),

@@ -34,11 +34,13 @@ _ROUNDINGS = 64.0
 
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
-    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0; `turns` (n,)
-    is true for pieces on which only rotary axes and joints move. `share` (n, axes) is the weight of each
-    axis, None if all are 1. `units` are those of the length if the tool moves, and if it turns alone."""
+    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0, and `table`
+    their lengths; `turns` (n,) is true for pieces on which only rotary axes and joints move. `share`
+    (n, axes) is the weight of each axis, None if all are 1. `units` are those of the length if the tool
+    moves, and if it turns alone."""
 
     curve: CompositeCurve
+    table: CurveLength | None
     share: Floats | None
     turns: NDArray[np.bool_]
     units: tuple[str, str] = ("mm", "deg")
@@ -57,17 +59,34 @@ class ToolMotion:
         """Derivative of the length by u at parameters (m,) [mm or deg]."""
         return np.asarray(np.linalg.norm(self.curve.evaluate(piece, u, 1)[1], axis=1))
 
-    def lengths(self, progress: Listener | None = None) -> Floats:
+    @cached_property
+    def lengths(self) -> Floats:
         """Length of each piece (n,): [deg] if it turns, else [mm]."""
-        table = CurveLength(self.curve, progress=progress)
-        return np.diff(table.length(np.arange(len(self.curve)), self.curve.width), prepend=0.0)
+        return np.diff(self._way(np.arange(len(self.curve)), self.curve.width), prepend=0.0)
+
+    def drawn_length(self, piece: NDArray[np.integer], u: Floats) -> Floats:
+        """Length of the drawn pieces from the start of the path to parameters (m,) of such pieces."""
+        return np.asarray(self._way(piece, u) - self._left_out[piece])
+
+    @cached_property
+    def _left_out(self) -> Floats:
+        """Length (n,) of the pieces up to each that are not drawn."""
+        return np.cumsum(np.where(self.drawn, 0.0, self.lengths))
+
+    def _way(self, piece: NDArray[np.integer], u: Floats) -> Floats:
+        return np.zeros(len(u)) if self.table is None else self.table.length(piece, u)
 
 
-def tool_motion(problem: Problem) -> ToolMotion:
+def tool_motion(problem: Problem, progress: Listener | None = None) -> ToolMotion:
     """The tool's motion along a problem's path."""
+
+    def motion(curve: CompositeCurve, share: Floats | None, turns: NDArray[np.bool_]) -> ToolMotion:
+        table = CurveLength(curve, progress=progress) if len(curve) else None
+        return ToolMotion(curve, table, share, turns, problem.way_units)
+
     curve, axes = problem.path.curve, problem.path.axes
     if set(axes) <= set(_GROUPS[0]):
-        return ToolMotion(curve, None, np.zeros(len(curve), dtype=bool), problem.way_units)
+        return motion(curve, None, np.zeros(len(curve), dtype=bool))
     points, first = curve.control_points, curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
     rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
@@ -78,4 +97,4 @@ def tool_motion(problem: Problem) -> ToolMotion:
     scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
     share = member[counts] * scale
     points = points * np.repeat(share, np.diff(curve.offsets), axis=0)
-    return ToolMotion(replace(curve, control_points=points), share, counts == len(_GROUPS), problem.way_units)
+    return motion(replace(curve, control_points=points), share, counts == len(_GROUPS))
