@@ -23,7 +23,7 @@ from feedplan.constraints.problem import build_problem
 from feedplan.geometry.build import build_path
 from feedplan.lower_bound import lower_bound
 from feedplan.plan_folder import write_plan
-from feedplan.planners import bound_of, corners, limits_jerk, planner
+from feedplan.planners import corners, limits_jerk, planner
 from feedplan.program.read import read_program
 from feedplan.progress import Listener, part
 from feedplan.setpoints import setpoints
@@ -75,9 +75,6 @@ def _stages(program: Path, machine: Machine, method: str, output: Path) -> Itera
     yield keep("plan", lambda progress: planner(method)(problem, progress=progress))  # type: ignore[call-arg]
     profile = made["plan"]
     yield keep("bound", lambda progress: lower_bound(problem, profile, progress))
-    own = bound_of(method)
-    if own is not None:
-        yield keep("own bound", lambda progress: own(problem, profile, progress=progress))
     plan = Plan(made["read"], machine, problem, profile, method, made["bound"], {"plan": 0.0})
 
     def audited(progress: Listener) -> Any:

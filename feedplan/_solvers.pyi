@@ -19,8 +19,8 @@ from feedplan.program.program import Program
 
 __all__ = [
     "Curve", "CurveLength", "JointSetpointAudit", "Moves", "PlanError", "Problem", "Profile", "Sampler",
-    "SetpointAudit", "__version__", "audit_joints", "audit_plan", "bound_jerk_limited", "build_path",
-    "csv_rows", "feed_between", "fit_points", "insert_knot", "joint_constants", "joint_derivatives",
+    "SetpointAudit", "__version__", "audit_joints", "audit_plan", "build_path", "csv_rows", "feed_between",
+    "fit_points", "insert_knot", "joint_constants", "joint_derivatives",
     "joint_enclosures", "joint_interpolants", "joint_path", "joint_positions", "look_ahead", "lower_bound",
     "path_segments", "plan_bang_bang", "plan_jerk_limited", "plan_s_curve", "profile_of_sections",
     "read_gcode",
@@ -43,16 +43,10 @@ def plan_jerk_limited(
     jerk: _Floats,
     resolution: float,
     tolerance: float,
+    proves: bool,
     time_limit: float | None = None,
     progress: _Progress = None,
-) -> tuple[Profile, bool, _Floats]: ...
-def bound_jerk_limited(
-    problem: _Problem | Part,
-    jerk: _Floats,
-    profile: SpeedProfile,
-    time_limit: float | None = None,
-    progress: _Progress = None,
-) -> _Floats: ...
+) -> tuple[Profile, bool, _Floats, _Floats]: ...
 def plan_s_curve(
     problem: _Problem,
     jerk: _Floats,

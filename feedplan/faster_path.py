@@ -245,4 +245,7 @@ def _joined_profile(taken: list[tuple[Path, SpeedProfile, slice]]) -> SpeedProfi
         pieces += last - first
     joined: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}
     excess = [profile.excess for _, profile, _ in taken]
-    return SpeedProfile(**joined, runs=np.concatenate(runs), excess=max(excess))
+    bounds = [profile.run_bounds[own] for _, profile, own in taken]
+    return SpeedProfile(
+        **joined, runs=np.concatenate(runs), excess=max(excess), run_bounds=np.concatenate(bounds)
+    )

@@ -38,7 +38,6 @@ from feedplan.outputs import FORMAT
 from feedplan.planners import (
     Elsewhere,
     MethodName,
-    bound_of,
     corners,
     given_options,
     goes_elsewhere,
@@ -63,11 +62,8 @@ from feedplan.today import Today, beside_plan
 from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
 
-# How far the stage `plan` is when the profile is there, and the bound that is known for all methods.
-PLANNING, BOUND = 0.6, 0.8
-# Where a method's own bound leaves at most this gap, the bound for all methods is left out: it gains little,
-# and can cost half of a jerk-limited plan.
-CLOSE = 1e-3
+# How far the stage `plan` is when the profile is there, if it does not come with its bound.
+PLANNING = 0.6
 # How far an audit is when the times of the setpoints are laid out.
 LAID_OUT = 0.02
 
@@ -458,10 +454,11 @@ def plan(
     with _timed(compute, "plan"):
         problem = stated(followed)
         report("plan", 0.0)
+        planned = 1.0 if grid_error(method) else PLANNING
         others = {} if elsewhere is None else {"elsewhere": elsewhere}
         solve = partial(solve, **others)
         # Equal parts of the progress for each plan.
-        each = PLANNING / (1 + rounds if refits else 1)
+        each = planned / (1 + rounds if refits else 1)
         turns = count()
 
         def solved(problem: Problem) -> SpeedProfile:
@@ -495,18 +492,10 @@ def plan(
             best, gain = faster(Followed(followed, problem, profile), max_jerk, follow, stated, rounds)
             followed, problem, profile = best.path, best.problem, best.profile
     with _timed(compute, "bound"):
+        least = profile.lower_bound
+        if math.isnan(least):
+            least = lower_bound(problem, profile, part(share, planned, 1.0))
         settings = {**options_of(method), **given}
-        # A method's own bound takes what is left of a time limit.
-        first = bound_of(method) is None or time_limit is not None
-        least = lower_bound(problem, profile, part(share, PLANNING, BOUND)) if first else 0.0
-        left = time_limit if limit is None else limit.left
-        known = bound_of(
-            method, **{name: left if name == "time_limit" else own for name, own in given.items()}
-        )
-        if known is not None:
-            least = max(least, known(problem, profile, progress=part(share, BOUND, 1.0), **others))
-        if not first and least < (1.0 - CLOSE) * profile.time:
-            least = max(least, lower_bound(problem, profile, part(share, 1.0, 1.0)))
         wanted = settings.get("accuracy", 0.0)
         short = shortfalls(
             profile,

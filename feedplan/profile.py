@@ -33,7 +33,7 @@ class PhaseLaw(IntEnum):
 OF_PHASES = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
 OF_PIECES = ("slowed", "kinked")
 _DTYPES = {
-    **dict.fromkeys(("value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"), np.float64),
+    **dict.fromkeys(("value", "u0", "u1", "p0", "p1", "duration", "a0", "a1", "run_bounds"), np.float64),
     **dict.fromkeys(("piece", "slowed", "kinked"), np.uint32),
     **dict.fromkeys(("kind", "axis"), np.uint8),
     "runs": np.int64,
@@ -59,7 +59,8 @@ class SpeedProfile(OfNative[Profile]):
     it has one.
     `kinked` (m,) pieces at whose start a jump of curvature holds the speed.
     `stopped`: a time limit ended the planning early. `excess`: how far the planner itself takes the time to
-    be above the least on its grid [s], an estimate and no proof; NaN where it does not say.
+    be above the least on its grid [s], an estimate and no proof; NaN where it does not say. `run_bounds` (r,)
+    or empty: the time of each run that the planner proves no profile to beat [s], NaN where it proves none.
     PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
     All arrays are read-only. Raises InputError where those of the phases differ in length.
     """
@@ -80,6 +81,7 @@ class SpeedProfile(OfNative[Profile]):
     kinked: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
     stopped: bool = False
     excess: float = math.nan
+    run_bounds: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         for name, dtype in _DTYPES.items():
@@ -99,6 +101,11 @@ class SpeedProfile(OfNative[Profile]):
     def time(self) -> float:
         """Time in motion, dwells not counted [s]."""
         return float(self.duration.sum())
+
+    @property
+    def lower_bound(self) -> float:
+        """A time in motion that the planner proves no profile to beat [s]; NaN where it proves none."""
+        return min(math.fsum(self.run_bounds), self.time) if len(self.run_bounds) else math.nan
 
     @property
     def run_times(self) -> NDArray[np.float64]:

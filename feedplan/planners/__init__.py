@@ -6,12 +6,11 @@ The method `bang-bang` is the module `bang_bang`; modules that begin with an und
 - `plan(problem: Problem, …) -> SpeedProfile`; options are keyword arguments, each with a default.
 - `CORNERS`, a `feedplan.geometry.corners.Corners`, if the method is for another path than the rounded one.
 - `LIMITS_JERK = True` if its profiles keep the jerk limits of the axes; the audit then checks them.
-- `lower_bound(problem, profile, …)` with the same options, if the method has a lower bound of its own beside
-  `feedplan.lower_bound`; and `GRID_ERROR`, if that bound is above the least time by up to this many times the
-  accuracy, which finer grids would gain.
+- `GRID_ERROR` if its profiles come with a lower bound of their own (`SpeedProfile.lower_bound`): finer grids
+  may gain this many times the accuracy.
 
-`plan` and `lower_bound` may take more keyword arguments: `PROGRESS` to report how far they are, `RESERVE` to
-announce the work after the plan (`planners.jerk_limited`), `ELSEWHERE` to plan runs on other computers.
+`plan` may take more keyword arguments: `PROGRESS` to report how far it is, `RESERVE` to announce the work
+after the plan (`planners.jerk_limited`), `ELSEWHERE` to plan runs on other computers.
 """
 
 from __future__ import annotations
@@ -85,17 +84,8 @@ def given_options(method: str, options: Mapping[str, Any], others: Iterable[str]
     return {name: value for name, value in options.items() if value is not None}
 
 
-def bound_of(method: str, **options: Any) -> Callable[..., float] | None:
-    """A method's own lower bound of the time [s], from one of its profiles and the same options.
-
-    None for most methods; raises as `planner`.
-    """
-    bound: Callable[..., float] | None = getattr(_module(method), "lower_bound", None)
-    return None if bound is None else partial(bound, **given_options(method, options))
-
-
 def grid_error(method: str) -> float:
-    """How many times the accuracy finer grids would gain on a method's own bound, 0 for most."""
+    """How many times the accuracy finer grids would gain on a method's own bound, 0 without one."""
     return float(getattr(_module(method), "GRID_ERROR", 0.0))
 
 

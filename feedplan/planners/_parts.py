@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -120,18 +120,10 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
     )
 
 
-def part_of_profile(profile: SpeedProfile, part: Part) -> SpeedProfile:
-    """The arcs of a part, as the native bound takes them."""
-    runs = profile.runs[part.run : part.end_run + 1]
-    own = {name: getattr(profile, name)[runs[0] : runs[-1]] for name in OF_PHASES}
-    none = {name: np.empty(0, np.uint32) for name in OF_PIECES}
-    return replace(profile, **{**own, **none, "piece": own["piece"] - part.first, "runs": runs - runs[0]})
-
-
-def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, NDArray[np.float64]]]) -> SpeedProfile:
+def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, Floats]]) -> SpeedProfile:
     """The profile of the whole from those of the parts, and the excess of their runs."""
     profiles, excess = zip(*planned, strict=True)
-    names = (*OF_PHASES, *OF_PIECES)
+    names = (*OF_PHASES, *OF_PIECES, "run_bounds")
     columns: dict[str, list[Any]] = {name: [getattr(each, name) for each in profiles] for name in names}
     for name in ("piece", *OF_PIECES):
         columns[name] = [column + part.first for part, column in zip(own, columns[name], strict=True)]

@@ -38,7 +38,7 @@ def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:
     """Each run by the profile that takes the least time for it, by the first of those that take the same.
 
     A profile has no arcs of a run that it does not plan; one profile plans all of them. The result says
-    nothing of how it was planned (`stopped`, `excess`).
+    nothing of how it was planned (`stopped`, `excess`, `run_bounds`).
     """
     times = np.stack([profile.run_times for profile in profiles])
     planned = np.stack([np.diff(profile.runs) > 0 for profile in profiles])
@@ -56,4 +56,6 @@ def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:
             columns[name].append(pieces[np.isin(pieces, own)])
         runs.append(runs[-1] + len(own))
     joined = {name: np.concatenate(parts) for name, parts in columns.items()}
-    return replace(profiles[0], **joined, runs=np.array(runs), stopped=False, excess=math.nan)
+    return replace(
+        profiles[0], **joined, runs=np.array(runs), stopped=False, excess=math.nan, run_bounds=np.empty(0)
+    )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import PlanError, bound_jerk_limited, plan_jerk_limited
+from feedplan._solvers import PlanError, plan_jerk_limited
 from feedplan.arguments import number
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError
@@ -20,14 +20,7 @@ from feedplan.geometry.corners import Corners
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits, lowered_limits
-from feedplan.planners._parts import (
-    Elsewhere,
-    Part,
-    fault_of,
-    joined,
-    part_of_profile,
-    parts,
-)
+from feedplan.planners._parts import Elsewhere, Part, fault_of, joined, parts
 from feedplan.planners._runs import fastest_runs
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part
@@ -79,12 +72,15 @@ def plan(
         time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
     limits = jerk_limits(problem)
     resolution = max(RESOLUTION * (1e-4 / accuracy) ** 0.5, LEAST_RESOLUTION)
-    whole = partial(_kept, problem, limits, resolution, GAP * accuracy, elsewhere)
+    proven = 1.0 - GRID_ERROR * accuracy
+    whole = partial(_kept, problem, limits, resolution, GAP * accuracy, proven, elsewhere)
     if time_limit is None:
         return whole(None, progress)
     end = time.perf_counter() + time_limit
     try:
-        first = _kept(problem, limits, FIRST_RESOLUTION, FIRST_GAP, None, None, part(progress, 0.0, FIRST))
+        first = _kept(
+            problem, limits, FIRST_RESOLUTION, FIRST_GAP, 0.0, None, None, part(progress, 0.0, FIRST)
+        )
     except InfeasibleError:
         # A coarse grid may miss a speed at an end that can just be had.
         return whole(None, part(progress, FIRST, 1.0))
@@ -102,50 +98,28 @@ def plan(
     return replace(fastest_runs(found), stopped=True)
 
 
-def lower_bound(
-    problem: Problem,
-    profile: SpeedProfile,
-    *,
-    accuracy: float = 1e-4,
-    time_limit: float | None = None,
-    progress: Listener | None = None,
-    elsewhere: Elsewhere | None = None,
-) -> float:
-    """A bound [s] on the time of every profile, from one planned with the same accuracy, if that is of use.
-
-    The convex relaxation of the problem on the profile's own grid proves its bound; what finer grids may
-    gain, measured to be less than twice the accuracy, is taken off. It is 0 for a profile that was stopped,
-    whose grid is not of that accuracy, and without time.
-    """
-    if profile.stopped or time_limit == 0:
-        return 0.0
-    limits = jerk_limits(problem)
-    own = _parts_of(problem, elsewhere) if time_limit is None else []
-    if elsewhere is None or len(own) < 2:
-        bounds = bound_jerk_limited(problem, limits, profile, time_limit, progress)
-    else:
-        given = [(each, limits, part_of_profile(profile, each)) for each in own]
-        bounds = np.concatenate(elsewhere.map(bound_part, given, progress))
-    # The exact sum, whatever the parts.
-    return (1.0 - GRID_ERROR * accuracy) * min(math.fsum(bounds), profile.time)
-
-
 def _kept(
     problem: Problem,
     limits: NDArray[np.float64],
     resolution: float,
     gap: float,
+    proven: float,
     elsewhere: Elsewhere | None,
     end: float | None,
     progress: Listener | None,
 ) -> SpeedProfile:
-    """The plan by a time of the clock; again with lower limits where the joints miss those of jerk."""
+    """The plan by a time of the clock; again with lower limits where the joints miss those of jerk.
+
+    Its lower bounds are the part `proven` of those on its grid; without that part it has none.
+    """
     once = 0.5 if problem.words else 1.0
-    profile = _planned(problem, limits, resolution, gap, elsewhere, end, part(progress, 0.0, once))
+    profile = _planned(problem, limits, resolution, gap, proven, elsewhere, end, part(progress, 0.0, once))
     lowered = lowered_limits(problem, limits, profile)
     if lowered is None:
         return profile
-    return _planned(problem, lowered, resolution, gap, elsewhere, end, part(progress, once, 1.0))
+    again = _planned(problem, lowered, resolution, gap, 0.0, elsewhere, end, part(progress, once, 1.0))
+    # What no plan within the limits can beat, no plan within lower ones can.
+    return again.with_others(run_bounds=profile.run_bounds)
 
 
 def _planned(
@@ -153,24 +127,29 @@ def _planned(
     limits: NDArray[np.float64],
     resolution: float,
     gap: float,
+    proven: float,
     elsewhere: Elsewhere | None,
     end: float | None,
     progress: Listener | None,
 ) -> SpeedProfile:
     own = _parts_of(problem, elsewhere) if end is None else []
     if elsewhere is not None and len(own) > 1:
-        given = [(each, limits, resolution, gap) for each in own]
+        given = [(each, limits, resolution, gap, proven > 0) for each in own]
         planned = elsewhere.map(plan_part, given, progress)
         for each, (found, fault) in zip(own, planned, strict=True):
             if found is None:
                 raise error_of(problem, fault_of(each, fault))
-        return joined(own, [found for found, _ in planned])
-    left = None if end is None else max(end - time.perf_counter(), 0.0)
-    try:
-        native, stopped, excess = plan_jerk_limited(problem, limits, resolution, gap, left, progress)
-    except PlanError as fault:
-        raise error_of(problem, fault) from None
-    return SpeedProfile.of(native, stopped=stopped, excess=math.fsum(excess))
+        profile = joined(own, [found for found, _ in planned])
+    else:
+        left = None if end is None else max(end - time.perf_counter(), 0.0)
+        try:
+            native, stopped, excess, bounds = plan_jerk_limited(
+                problem, limits, resolution, gap, proven > 0, left, progress
+            )
+        except PlanError as fault:
+            raise error_of(problem, fault) from None
+        profile = SpeedProfile.of(native, stopped=stopped, excess=math.fsum(excess), run_bounds=bounds)
+    return profile.with_others(run_bounds=proven * profile.run_bounds if proven else np.empty(0))
 
 
 def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
@@ -179,18 +158,11 @@ def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
 
 
 def plan_part(
-    part: Part, limits: NDArray[np.float64], resolution: float, gap: float, progress: Listener
-) -> tuple[Any, tuple[Any, ...]]:
+    part: Part, limits: NDArray[np.float64], resolution: float, gap: float, proves: bool, progress: Listener
+) -> tuple[tuple[SpeedProfile, NDArray[np.float64]] | None, tuple[Any, ...]]:
     """The profile of a part and the excess of each of its runs, or None and what the fault tells."""
     try:
-        native, _, excess = plan_jerk_limited(part, limits, resolution, gap, None, progress)
-        return (SpeedProfile.of(native), excess), ()
+        native, _, excess, bounds = plan_jerk_limited(part, limits, resolution, gap, proves, None, progress)
+        return (SpeedProfile.of(native, run_bounds=bounds), excess), ()
     except PlanError as fault:
         return None, fault.args
-
-
-def bound_part(
-    part: Part, limits: NDArray[np.float64], profile: SpeedProfile, progress: Listener
-) -> NDArray[np.float64]:
-    """The bound of each stretch of a part."""
-    return bound_jerk_limited(part, limits, profile, None, progress)

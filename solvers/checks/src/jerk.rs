@@ -1,9 +1,7 @@
 //! The jerk-limited planner on paths of any kind in up to three axes, compiled once for all tests.
 
 use crate::{padded, PADDED};
-use feedplan_jerk::jerk_limited::{
-    self, Certificate, Effort, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile,
-};
+use feedplan_jerk::jerk_limited::{self, Effort, Fault, Geometry, Limits, PathPoint, Plan, Problem};
 
 /// A path of any kind, with axes that rest for those that it does not have.
 struct Path<'a>(Box<dyn Fn(usize, f64) -> PathPoint<PADDED> + Sync + 'a>, &'a [f64]);
@@ -41,13 +39,4 @@ fn with<G: Geometry<M>, const M: usize, T>(
 /// `jerk_limited::plan`.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     with(problem, |problem| jerk_limited::plan(problem, effort))
-}
-
-/// `jerk_limited::certify`.
-pub fn certify<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    profile: &Profile,
-    effort: &Effort,
-) -> Certificate {
-    with(problem, |problem| jerk_limited::certify(problem, profile, effort))
 }

@@ -17,8 +17,8 @@
 //! | `interior_point`, `newton`, `band` | the primal-dual interior-point method on one window |
 //! | `intersample_check`, `window` | the limits between the collocation points |
 //! | `windows` | paths of any length |
-//! | `lower_bound` | a lower bound on the time on the same grid |
 //! | `held` | where the feed is held, and the stretches between such places |
+//! | `speed_limit`, `lower_bound` | speeds that no motion exceeds; a lower bound on the time on the same grid |
 //! | `on_path` | the planner on the package's own paths |
 //! | `turns` | the accelerations with which lines turn back |
 //!
@@ -47,6 +47,7 @@ mod relaxed;
 mod rest_ramp;
 mod sides;
 mod speed_envelope;
+mod speed_limit;
 mod turns;
 mod window;
 mod windows;
@@ -56,7 +57,6 @@ use std::time::Instant;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::Both;
 
-pub use lower_bound::{certify, Certificate};
 pub use profile::Profile;
 pub use rest_ramp::Ramp;
 
@@ -115,15 +115,30 @@ impl SpeedCap {
 pub enum End {
     Rest,
     /// At rest for no time where the path turns back, with an acceleration away from the end of at most this in mm/s²,
-    /// above 0.
+    /// above 0. The lower bound holds for all accelerations up to the greatest.
     Turn {
         acceleration: f64,
+        greatest: f64,
     },
     /// A speed above 0 in mm/s and an acceleration along the path in mm/s². Only some iterations lead to a plan.
     Moving {
         speed: f64,
         acceleration: f64,
     },
+    /// The speed in mm/s, above 0, that is held beyond the end. The lower bound holds for every motion beyond it.
+    Held {
+        speed: f64,
+    },
+}
+
+impl End {
+    /// In mm/s.
+    pub fn speed(&self) -> f64 {
+        match *self {
+            Self::Moving { speed, .. } | Self::Held { speed } => speed,
+            Self::Rest | Self::Turn { .. } => 0.0,
+        }
+    }
 }
 
 pub struct Problem<'a, G, const M: usize> {
@@ -147,6 +162,8 @@ pub struct Effort<'a> {
     pub deadline: Option<Instant>,
     /// Paths of more intervals than this are solved in overlapping windows of about this many intervals.
     pub window: usize,
+    /// Whether a lower bound is computed too.
+    pub proves: bool,
     /// Takes the progress and may cancel the work.
     pub watch: Watch<'a>,
 }
@@ -159,6 +176,7 @@ impl Default for Effort<'_> {
             max_iterations: 400,
             deadline: None,
             window: 4000,
+            proves: false,
             watch: Watch::default(),
         }
     }
@@ -184,6 +202,8 @@ pub struct Plan {
     pub profile: Profile,
     /// In s.
     pub time: f64,
+    /// A lower bound on the time, in s, as `lower_bound` proves it; NaN without proof.
+    pub lower_bound: f64,
     /// Whether every window reached its optimum.
     pub converged: bool,
     /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.

@@ -51,6 +51,8 @@ pub struct JerkProfile {
     pub kinks: Vec<u32>,
     /// The planner's estimate of the time above the least time, in s, of each subrun that it planned, in order.
     pub excess: Vec<f64>,
+    /// A lower bound on the time of each run, in s, if the planner was asked for it; NaN without proof.
+    pub lower_bound: Vec<f64>,
     /// Whether a deadline stopped the planner.
     pub stopped: bool,
     /// Time of the phases that were left out at the start of a piece, in s.
@@ -169,6 +171,7 @@ impl JerkProfile {
         self.a1.append(&mut other.a1);
         self.kinks.append(&mut other.kinks);
         self.excess.append(&mut other.excess);
+        self.lower_bound.append(&mut other.lower_bound);
         self.stopped |= other.stopped;
     }
 

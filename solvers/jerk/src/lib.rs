@@ -28,9 +28,6 @@ instances! {
         /// The fastest profile that the effort finds.
         fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<JerkProfile, Fault>
             = jerk_limited::on_path::plan;
-        /// A lower bound [s] on the time of each subrun, on the stations of a profile.
-        fn jerk_limited_bound(&self, jerk: &[f64; M], columns: &jerk_limited::on_path::Columns, effort: &Effort)
-            -> Result<Vec<f64>, Fault> = jerk_limited::on_path::certified;
         /// The two-pass profile; each subrun takes the cutting that gives the least time.
         fn s_curve(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize, effort: &Effort)
             -> Result<JerkProfile, Fault> = s_curve::on_path::plan;

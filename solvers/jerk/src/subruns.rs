@@ -103,8 +103,12 @@ pub fn over_chains<const M: usize>(
         let own: Vec<JerkProfile> = planned.by_ref().take(run.len()).collect();
         if own.iter().any(JerkProfile::is_unplanned) {
             all.stopped = true;
+            all.lower_bound.push(f64::NAN);
         } else {
+            let first = all.lower_bound.len();
             own.into_iter().for_each(|phases| all.append(phases));
+            let least = all.lower_bound.drain(first..).sum();
+            all.lower_bound.push(least);
         }
         all.runs.push(all.len() as i64);
     }

@@ -13,7 +13,6 @@ use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
-use feedplan_jerk::jerk_limited::on_path;
 use feedplan_jerk::jerk_limited::Effort;
 use feedplan_jerk::s_curve::on_path::Cutting;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
@@ -38,62 +37,34 @@ fn deadline(time_limit: Option<f64>) -> Option<Instant> {
     Instant::now().checked_add(limit)
 }
 
-/// The profile; whether a time limit stopped the planner, and how far it takes the time of each part that it planned to be
-/// above the least, in s.
-type Planned<'py> = (Profile, bool, Bound<'py, PyArray1<f64>>);
+/// The profile; whether a time limit stopped the planner; how far it takes the time of each part that it planned to be
+/// above the least, in s; a lower bound in s of the time of each run, NaN without proof.
+type Planned<'py> = (Profile, bool, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
 /// arcs.
 #[pyfunction]
-#[pyo3(signature = (problem, jerk, resolution, tolerance, time_limit=None, progress=None))]
+#[pyo3(signature = (problem, jerk, resolution, tolerance, proves, time_limit=None, progress=None))]
+#[allow(clippy::too_many_arguments)]
 fn plan_jerk_limited<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
     resolution: f64,
     tolerance: f64,
+    proves: bool,
     time_limit: Option<f64>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Planned<'py>> {
-    let effort = Effort { resolution, tolerance, deadline: deadline(time_limit), ..Effort::default() };
+    let effort =
+        Effort { resolution, tolerance, proves, deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.axes(), M, {
         let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
         let plan = |watch: Watch| problem::Problem { watch, ..problem }.jerk_limited(&jerk, &effort);
         let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
-        let (stopped, excess) = (arcs.stopped, PyArray1::from_slice(py, &arcs.excess));
-        Ok((arcs.into(), stopped, excess))
-    })
-}
-
-/// A lower bound in s of the time of each stretch on the grid of a profile of `plan_jerk_limited`.
-#[pyfunction]
-#[pyo3(signature = (problem, jerk, profile, time_limit=None, progress=None))]
-fn bound_jerk_limited<'py>(
-    py: Python<'py>,
-    problem: Of<Problem>,
-    jerk: PyReadonlyArray1<'py, f64>,
-    profile: Of<Profile>,
-    time_limit: Option<f64>,
-    progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let columns = on_path::Columns {
-        piece: &profile.piece,
-        kind: &profile.kind,
-        u0: &profile.u0,
-        u1: &profile.u1,
-        p0: &profile.p0,
-        p1: &profile.p1,
-        a0: &profile.a0,
-        a1: &profile.a1,
-        duration: &profile.duration,
-    };
-    let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
-    with_padded_axes!(problem.axes(), M, {
-        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
-        let bound =
-            |watch: Watch| problem::Problem { watch, ..problem }.jerk_limited_bound(&jerk, &columns, &effort);
-        let bounds = run(py, progress.as_ref(), bound)?.map_err(|fault| to_exception(&fault))?;
-        Ok(PyArray1::from_vec(py, bounds))
+        let [excess, bounds] = [&arcs.excess, &arcs.lower_bound].map(|part| PyArray1::from_slice(py, part));
+        let stopped = arcs.stopped;
+        Ok((arcs.into(), stopped, excess, bounds))
     })
 }
 
@@ -192,7 +163,6 @@ fn to_cuttings(pairs: &[(f64, f64)]) -> Vec<Cutting> {
 /// Adds the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plan_jerk_limited, module)?)?;
-    module.add_function(wrap_pyfunction!(bound_jerk_limited, module)?)?;
     module.add_function(wrap_pyfunction!(plan_s_curve, module)?)?;
     module.add_function(wrap_pyfunction!(path_segments, module)?)?;
     module.add_function(wrap_pyfunction!(profile_of_sections, module)?)

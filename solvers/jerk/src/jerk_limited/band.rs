@@ -1,8 +1,8 @@
 //! LDLᵀ factor of the Newton matrix, a symmetric banded matrix: two unknowns (w, w') per station, coupled with those of
 //! the neighbouring stations.
 //!
-//! The matrix is scaled to a unit diagonal. The two unknowns of an end are either tied to each other (w' = k w, where
-//! the path is at rest beyond the ramp) or take given steps (where w and w' are given).
+//! The matrix is scaled to a unit diagonal. The two unknowns of an end are tied to each other (w' = k w, where the path
+//! is at rest beyond the ramp), take given steps (where w and w' are given), or are free.
 
 /// How the unknowns of an end may change.
 #[derive(Clone, Copy, Debug)]
@@ -11,6 +11,7 @@ pub enum EndCondition {
     Slope(f64),
     /// dw and dw' are given with each right-hand side.
     Given,
+    Free,
 }
 
 /// Added to the unit diagonal, as rounding may take this much from it.
@@ -121,6 +122,7 @@ impl Band {
                     *o = [0.0; 4];
                     self.diagonal[station] = [1.0, 0.0, 1.0];
                 }
+                EndCondition::Free => {}
             }
         }
     }
@@ -151,6 +153,7 @@ impl Band {
                     self.work[next][1] -= pull[1];
                     self.work[station] = d;
                 }
+                EndCondition::Free => {}
             }
         }
         self.substitute();
@@ -163,6 +166,7 @@ impl Band {
             match condition {
                 EndCondition::Slope(k) => out[2 * station + 1] = k * out[2 * station],
                 EndCondition::Given => out[2 * station..2 * station + 2].copy_from_slice(&ends[end]),
+                EndCondition::Free => {}
             }
         }
     }
@@ -242,6 +246,12 @@ mod tests {
         assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
         // The two equations of an end add up along its slope.
         assert!((left[0] + 2.0 * left[1]).abs() < 1e-11 && (left[8] - 3.0 * left[9]).abs() < 1e-11);
+    }
+
+    #[test]
+    fn free_ends_solve_their_equations() {
+        let (_, left) = solved([EndCondition::Free; 2], [[0.0; 2]; 2]);
+        assert!(left.iter().all(|left| left.abs() < 1e-11), "{left:?}");
     }
 
     #[test]

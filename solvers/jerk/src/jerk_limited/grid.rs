@@ -7,8 +7,7 @@ use std::ops::Range;
 
 use super::constraints::Constraints;
 use super::interior_point::WindowEnd;
-use super::{Geometry, Problem, Profile, SpeedCap};
-use feedplan_geometry::watch::Watch;
+use super::{Geometry, Problem, SpeedCap};
 
 /// r counts as changing where it uses more than this part of its greatest slope.
 const CHANGING: f64 = 0.02;
@@ -93,20 +92,6 @@ impl Grid {
         }
         self.stations.push(samples[samples.len() - 1].s);
         self.pieces.resize(self.stations.len() - 1, samples[0].piece);
-    }
-
-    /// The grid of a profile on a path with these knots and caps.
-    pub fn of(profile: &Profile, knots: &[f64], caps: &[SpeedCap], watch: Watch) -> Self {
-        let stations = profile.s.clone();
-        let piece = |(n, pair): (usize, &[f64])| {
-            watch.check_at(n);
-            knots.partition_point(|&knot| knot <= 0.5 * (pair[0] + pair[1])) as u32 - 1
-        };
-        let pieces = stations.windows(2).enumerate().map(piece).collect();
-        let station = |s: f64| stations.binary_search_by(|station| station.total_cmp(&s)).ok();
-        let speeds = caps.iter().filter_map(|cap| Some((station(cap.s)?, cap.speed))).collect();
-        let jerk_factor = jerk_factor(&stations, caps);
-        Self { stations, pieces, caps: speeds, jerk_factor }
     }
 
     /// The constraints on a range of intervals.
@@ -205,6 +190,7 @@ mod tests {
     use super::super::speed_envelope::sample_envelope;
     use super::super::{Limits, PathPoint};
     use super::*;
+    use feedplan_geometry::watch::Watch;
 
     struct Line;
 

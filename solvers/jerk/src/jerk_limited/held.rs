@@ -101,11 +101,7 @@ pub fn stretches<const M: usize>(
         look(problem, path, limits, steepest, (part, shares[part]))
     };
     let looks: Vec<Look> = (0..path.parts.len()).into_par_iter().with_min_len(TOGETHER).map(look).collect();
-    let speeds = ends.map(|end| match end {
-        End::Moving { speed, .. } => speed,
-        End::Rest | End::Turn { .. } => 0.0,
-    });
-    let r = envelope(&looks, junctions, slopes, speeds);
+    let r = envelope(&looks, junctions, slopes, ends.map(|end| end.speed()));
     let mut out: Vec<Stretch> = vec![];
     let (mut from, mut state) = (0.0, ends[0]);
     let mut first = 0;
@@ -125,7 +121,7 @@ pub fn stretches<const M: usize>(
                 let at = [(knots[first] + left, near), (knots[end] - right, -near)];
                 let [start, stop] = at.map(|(s, near)| to_knot(&knots[first..=end], s, near));
                 if stop - start > near {
-                    let even = End::Moving { speed: feed, acceleration: 0.0 };
+                    let even = End::Held { speed: feed };
                     out.push(Stretch { ends: [from, start], states: [state, even], held: None });
                     out.push(Stretch { ends: [start, stop], states: [even; 2], held: Some(feed) });
                     (from, state) = (stop, even);

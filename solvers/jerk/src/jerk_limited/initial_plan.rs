@@ -60,6 +60,7 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
                     (x[at], x[at + 1]) = (w, slope);
                 }
             }
+            WindowEnd::Free => {}
         }
     }
     x
@@ -77,7 +78,7 @@ impl Mean {
         let last = stations.len() - 1;
         let beyond = ends.map(|kind| match kind {
             WindowEnd::Rest { .. } => 2.0 * MEAN,
-            WindowEnd::Fixed { .. } => 0.0,
+            WindowEnd::Fixed { .. } | WindowEnd::Free => 0.0,
         });
         let (mut tau, mut rho) =
             (vec![-2.0 * MEAN, 0.0], vec![r[0].natural_log() - beyond[0], r[0].natural_log()]);

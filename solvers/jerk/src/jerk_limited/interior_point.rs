@@ -28,6 +28,8 @@ pub enum WindowEnd {
     Rest { ramp: Ramp, greatest: f64 },
     /// w and w' are given.
     Fixed { w: f64, slope: f64 },
+    /// w and w' may have any values within the limits.
+    Free,
 }
 
 impl WindowEnd {
@@ -35,14 +37,14 @@ impl WindowEnd {
     pub fn ramp(&self) -> Ramp {
         match *self {
             Self::Rest { ramp, .. } => ramp,
-            Self::Fixed { .. } => Ramp { length: 0.0, power: Ramp::JERK },
+            Self::Fixed { .. } | Self::Free => Ramp { length: 0.0, power: Ramp::JERK },
         }
     }
 
     /// Whether a spline that ends with these values meets this end.
     pub fn is_met(&self, end_w: f64, end_slope: f64) -> bool {
         match *self {
-            Self::Rest { .. } => true,
+            Self::Rest { .. } | Self::Free => true,
             Self::Fixed { w, slope } => (end_w, end_slope) == (w, slope),
         }
     }
@@ -152,6 +154,12 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         effort: &Effort,
     ) -> Report {
         dispatch!(self.level, simd => self.improve(simd, rows, ends, x, effort))
+    }
+
+    /// A step, without regard to the limits, that balances the multipliers of a solution; see `newton`.
+    pub fn settle(&mut self, rows: &Constraints<M>, ends: &[WindowEnd; 2], x: &mut [f64]) -> bool {
+        let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
+        dispatch!(self.level, simd => self.balance(simd, rows, conditions, x))
     }
 
     #[inline(always)]
@@ -280,7 +288,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     ) -> Option<f64> {
         let last = self.ends;
         self.ends = std::array::from_fn(|end| match ends[end] {
-            WindowEnd::Fixed { .. } => None,
+            WindowEnd::Fixed { .. } | WindowEnd::Free => None,
             WindowEnd::Rest { ramp, greatest } => {
                 let station = end * rows.intervals.len();
                 Some(EndRow { station, ramp, greatest, slack: 1.0, dual: 0.0, step: 0.0 })
@@ -360,13 +368,14 @@ fn end_condition(kind: &WindowEnd, sign: f64) -> EndCondition {
     match kind {
         WindowEnd::Rest { ramp, .. } => EndCondition::Slope(sign * ramp.slope()),
         WindowEnd::Fixed { .. } => EndCondition::Given,
+        WindowEnd::Free => EndCondition::Free,
     }
 }
 
 /// The steps of (w, w') that are missing at given ends.
 fn missing(ends: &[WindowEnd; 2], x: &[f64]) -> [[f64; 2]; 2] {
     std::array::from_fn(|end| match ends[end] {
-        WindowEnd::Rest { .. } => [0.0; 2],
+        WindowEnd::Rest { .. } | WindowEnd::Free => [0.0; 2],
         WindowEnd::Fixed { w, slope } => {
             let at = end * (x.len() - 2);
             [w - x[at], slope - x[at + 1]]

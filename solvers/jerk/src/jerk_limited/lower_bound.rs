@@ -1,164 +1,298 @@
-//! A lower bound on the time, by duality, from a profile and the problem that it solves.
+//! A lower bound on the time, by duality, from the multipliers that the interior point leaves on each window.
 //!
-//! The relaxation of `relaxed` is convex: for any multipliers λ ≥ 0 the minimum of the Lagrangian is a lower bound on
-//! its minimum, and so on the least time. The Lagrangian is convex in w: from its value and slope g at some w₀ it is at
-//! least
+//! The true problem and its relaxation (`relaxed`, y eliminated) have the same Lagrangian: with weights c of the time and
+//! multipliers λ ≥ 0 of the rows
 //!
-//!   L(w₀) + Σ g (w − w₀)   with each unknown at the end of its box where the term is least,
+//!   Λ(w) = Σ (c − Σ λ_jerk) w^(−1/2) + terms that are linear in w.
 //!
-//! with boxes from the limits of speed and acceleration at the stations. So the bound holds for all multipliers; those
-//! near the optimum, where g vanishes, make it close. They come from overlapping windows: the effect of a window's end
-//! decays with the travel time from it.
+//! Where the multipliers of jerk add up to at most c at each collocation point, Λ is convex in w and at least its tangent
+//! at any w₀ > 0. For every w within the limits
+//!
+//!   time ≥ Λ(w) ≥ Λ(w₀) + Σ g (w − w₀) ≥ Λ(w₀) + Σ (least g (w − w₀) in the box of w),   g the gradient at w₀,
+//!
+//! with boxes of w and w' at the stations that follow from the limits of speed and acceleration. So the bound holds for
+//! all such multipliers and all w₀, within the limits or not; it is close where g vanishes. The multipliers are those of
+//! the plan. Where they add up to more than c, the relaxation has another solution, which is sought from a point far
+//! inside the limits, under the speeds of `speed_limit`.
+//!
+//! The sums divide into those of windows without their overlaps (`Part`). Only at the stations where two of them meet
+//! does g have a term from each side; both are added before the box is used (`join`).
 //!
 //! The bound is that of the problem on its grid: splines, limits at collocation points, the time by the 3/8 rule.
 
 use std::ops::Range;
 
 use fearless_simd::{dispatch, Simd};
-use rayon::prelude::*;
 
 use super::constraints::{Constraints, RowLayout};
-use super::grid::Grid;
+use super::exact::Exact;
 use super::hermite::{local, MASS};
-use super::interior_point::{self, InteriorPoint, Outcome, WindowEnd};
+use super::interior_point::{Effort, InteriorPoint, Outcome, WindowEnd};
 use super::model::{fall, pace, project};
-use super::prepare;
 use super::relaxed::Relaxed;
-use super::window::ramps;
-use super::{Effort, Geometry, Problem, Profile};
+use super::speed_limit;
 use crate::lanes::{Lanes, Register};
 
-/// Windows overlap by this many intervals to both sides, and are at least twice as long.
-const HALO: usize = 400;
-/// The relaxation starts at this multiple of the plan, strictly inside the limits.
-const INSIDE: f64 = 0.97;
-
-/// A lower bound on the time, and the gap of a plan.
-#[derive(Clone, Copy, Debug)]
-pub struct Certificate {
-    /// In s.
-    pub least_time: f64,
-    /// (time − least_time)/time.
-    pub gap: f64,
+/// How the solution of the relaxation begins and ends.
+struct Start {
+    /// w is below the plan by this part.
+    below: f64,
+    /// y is above its least possible value by this part.
+    above: f64,
+    /// The first barrier, as a part of the time per row; with `warm` multipliers are at least those of the barrier.
+    barrier: f64,
+    warm: bool,
+    /// Complementarity gap at the end, as a part of the time.
+    tolerance: f64,
 }
 
-/// The lower bound on the grid of a profile.
-pub fn certify<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    profile: &Profile,
-    effort: &Effort,
-) -> Certificate {
-    let grid = Grid::of(profile, problem.geometry.knots(), problem.caps, effort.watch);
-    let ends = prepare::window_ends(problem);
-    let x: Vec<f64> =
-        profile.speed_sq.iter().zip(&profile.slope).flat_map(|(w, slope)| [*w, *slope]).collect();
-    let count = profile.s.len() - 1;
-    let size = effort.window.max(2 * HALO);
-    let cores: Vec<Range<usize>> =
-        (0..count.div_ceil(size)).map(|i| i * size..((i + 1) * size).min(count)).collect();
-    let parts: Vec<Part> = cores
-        .par_iter()
-        .map(|core| {
-            // Cancelled work ends here.
-            effort.watch.check();
-            let window = core.start.saturating_sub(HALO)..(core.end + HALO).min(count);
-            let mut ends = ends;
-            let x = &x[2 * window.start..2 * window.end + 2];
-            let fixed = |at: usize| WindowEnd::Fixed { w: INSIDE * x[at], slope: INSIDE * x[at + 1] };
-            if window.start > 0 {
-                ends[0] = fixed(0);
-            }
-            if window.end < count {
-                ends[1] = fixed(x.len() - 2);
-            }
-            let rows = grid.constraints(problem, window.clone());
-            let part = part(&rows, ends, x, core.start - window.start..core.end - window.start, effort);
-            effort.watch.each(cores.len()).advance(1);
-            part
-        })
-        .collect();
-    let time: f64 = parts.iter().map(|part| part.time).sum::<f64>() + ramps(&ends, &x);
-    let least = join(&parts, &cores, &ends, 2 * (count + 1));
-    let least_time = (profile.time() * least / time).max(0.0);
-    Certificate { least_time, gap: 1.0 - least_time / profile.time() }
-}
+/// Beside the plan, with its multipliers.
+const NEAR: Start = Start { below: 1e-3, above: 1e-3, barrier: 1e-3, warm: true, tolerance: 1e-5 };
+/// Far inside the limits.
+const FAR: Start = Start { below: 0.03, above: 0.1, barrier: 1.0, warm: false, tolerance: 3e-5 };
+/// The solution starts near the plan where its multipliers of jerk exceed c by at most this part.
+const TIGHT: f64 = 2e-5;
+const MAX_ITERATIONS: usize = 60;
+/// The multipliers are balanced until the boxes cost less than this part of the time, at most so many times.
+const LOSS: f64 = 1e-6;
+const BALANCES: usize = 8;
+/// A bound above the time of a plan by this part is rounding; one by more is an error, and proves nothing.
+const ROUNDING: f64 = 1e-9;
 
-/// The contribution of a core: the intervals of a window without its overlaps.
-struct Part {
-    /// The plan's time by the 3/8 rule.
+/// The bound on the intervals of a window without its overlaps: at least `least` + Σ price · (w, w') at both ends.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The time of the plan, and at the greatest speeds, by the 3/8 rule, in s.
     time: f64,
-    /// The Lagrangian at x.
-    value: f64,
-    /// The point of expansion, the Lagrangian's slope there, and the box of each unknown.
-    x: Vec<f64>,
-    slope: Vec<f64>,
-    boxes: Vec<[f64; 2]>,
-    /// How much w can rise and fall on each interval.
-    change: Vec<[f64; 2]>,
-    /// Multipliers of the limits at the ramps.
-    ends: [f64; 2],
+    fastest: f64,
+    /// In s.
+    least: f64,
+    /// Prices of (w, w') at both ends, 0 at those of the path.
+    price: [[f64; 2]; 2],
+    /// Least and greatest w and w' at both ends.
+    boxes: [[[f64; 2]; 2]; 2],
 }
 
-fn part<const M: usize>(
-    rows: &Constraints<M>,
-    ends: [WindowEnd; 2],
-    plan: &[f64],
+/// A lower bound from the parts along a path, as a part of the plan's time; NaN where they prove none above 0.
+pub fn join(parts: &[Part]) -> f64 {
+    let mut least: f64 = parts.iter().map(|part| part.least).sum();
+    for pair in parts.windows(2) {
+        for i in 0..2 {
+            let [before, after] = [pair[0].boxes[1][i], pair[1].boxes[0][i]];
+            let both = [before[0].max(after[0]), before[1].min(after[1])];
+            least += lowest(pair[0].price[1][i] + pair[1].price[0][i], both);
+        }
+    }
+    // At very low feeds rounding leaves the multipliers few digits; the greatest speeds need none.
+    let fastest: f64 = parts.iter().map(|part| part.fastest).sum();
+    let part = least.max(fastest) / parts.iter().map(|part| part.time).sum::<f64>();
+    if part > 0.0 && part < 1.0 + ROUNDING {
+        part.min(1.0)
+    } else {
+        f64::NAN
+    }
+}
+
+/// The least slope · z in a box of z, whose ends may be infinite.
+fn lowest(slope: f64, [low, high]: [f64; 2]) -> f64 {
+    match slope {
+        0.0 => 0.0,
+        slope if slope > 0.0 => slope * low,
+        slope => slope * high,
+    }
+}
+
+/// What is known of a window that was planned.
+pub struct Planned<'a, const M: usize> {
+    /// The limits as they are, and as they were tightened for the plan.
+    pub rows: &'a Constraints<M>,
+    pub tight: &'a Constraints<M>,
+    pub ends: [WindowEnd; 2],
+    /// Whether an end is one of the path.
+    pub at_ends: [bool; 2],
+    pub x: &'a [f64],
+    /// With the multipliers under the tightened limits.
+    pub solved: &'a InteriorPoint<Exact, M>,
+}
+
+/// The part of the intervals `core` of a window.
+pub fn part<const M: usize>(
+    planned: &Planned<M>,
     core: Range<usize>,
     effort: &Effort,
+    space: &mut InteriorPoint<Relaxed, M>,
 ) -> Part {
-    let mut space = InteriorPoint::<Relaxed, M>::default();
-    let mut x: Vec<f64> = plan.iter().map(|x| INSIDE * x).collect();
-    let own = interior_point::Effort {
-        tolerance: effort.tolerance,
-        max_iterations: effort.max_iterations,
-        deadline: effort.deadline,
-        barrier: 1.0,
-        warm: false,
-        watch: effort.watch,
-    };
-    let mut without_ends = rows.clone();
-    without_ends.drop_at_ends(&ends);
-    let report = space.solve(&without_ends, ends, &mut x, &own);
-    let known = report.outcome != Outcome::NotInside;
-    let unknowns = 2 * (core.len() + 1);
-    let mut out = Part {
-        time: 0.0,
-        value: 0.0,
-        x: x[2 * core.start..2 * core.end + 2].to_vec(),
-        slope: vec![0.0; unknowns],
-        change: vec![],
-        boxes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1),
-        ends: [0, 1].map(|end| space.ends[end].filter(|_| known).map_or(0.0, |row| row.dual)),
-    };
+    let dual = loosened(planned);
+    let tight = excess(planned.rows, &dual) <= TIGHT;
+    let starts = if tight { &[NEAR, FAR][..] } else { &[FAR] };
+    let mut rows = planned.rows.clone();
+    if !tight {
+        speed_limit::lower(&mut rows);
+    }
+    let planned = &Planned { rows: &rows, ..*planned };
+    space.state.dual = dual;
+    space.ends = planned.solved.ends;
+    let (mut x, mut ends) = (vec![], planned.ends);
+    for start in starts {
+        let inside = 1.0 - start.below;
+        x = planned.x.iter().map(|x| inside * x).collect();
+        ends = std::array::from_fn(|end| match planned.ends[end] {
+            WindowEnd::Fixed { w, slope } if !planned.at_ends[end] => {
+                WindowEnd::Fixed { w: inside * w, slope: inside * slope }
+            }
+            known => known,
+        });
+        space.model.above = start.above;
+        let own = Effort {
+            tolerance: start.tolerance,
+            max_iterations: MAX_ITERATIONS,
+            barrier: start.barrier,
+            warm: start.warm,
+            ..*effort
+        };
+        if space.solve(planned.rows, ends, &mut x, &own).outcome == Outcome::Converged {
+            break;
+        }
+    }
+    let (mut best, mut loss) = tangent(planned, &core, &x, space);
+    for _ in 0..BALANCES {
+        if loss <= LOSS * best.time || !space.settle(planned.rows, &ends, &mut x) {
+            break;
+        }
+        let (part, less) = tangent(planned, &core, &x, space);
+        if less < loss {
+            (best, loss) = (part, less);
+        }
+    }
+    best
+}
+
+/// The part by the tangent at x, and what the boxes take from it, in s.
+fn tangent<const M: usize>(
+    planned: &Planned<M>,
+    core: &Range<usize>,
+    x: &[f64],
+    space: &mut InteriorPoint<Relaxed, M>,
+) -> (Part, f64) {
+    let Planned { rows, at_ends, x: plan, .. } = *planned;
+    let x = &x[2 * core.start..2 * core.end + 2];
+    let (mut time, mut fastest, mut least) = (0.0, 0.0, 0.0);
+    let mut slope = vec![0.0; x.len()];
+    let mut boxes = [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1);
+    let mut change = Vec::with_capacity(core.len());
     for n in core.clone() {
-        let interval = &rows.intervals[n];
-        let h = interval.h;
-        let mut dual: Vec<Lanes> = RowLayout::<M>::of(&space.state.dual, n).to_vec();
-        if !known {
-            dual.fill(Lanes::ZERO);
-        }
-        let (time, value, slope) = dispatch!(
+        let h = rows.intervals[n].h;
+        let from = 2 * (n - core.start);
+        let dual = RowLayout::<M>::of_mut(&mut space.state.dual, n);
+        let (passed, value, own) = dispatch!(
             space.level,
-            simd => lagrangian(simd, rows, n, &local(plan, n, h), &local(&x, n, h), &mut dual)
+            simd => lagrangian(simd, rows, n, &local(plan, n, h), &local(x, n - core.start, h), dual)
         );
-        out.time += time;
-        out.value += value;
+        time += passed;
+        least += value;
         for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
-            out.slope[2 * (n - core.start) + k] += slope[k] * scale;
+            slope[from + k] += own[k] * scale;
         }
-        let mut change = [0.0; 2];
+        // How much w can rise and fall on the interval: the 3/8 rule is exact for the quadratic w'.
+        let mut moves = [0.0; 2];
         for lane in 0..4 {
             let [w, rise, fall] = limits_at(rows, n, lane);
-            // The 3/8 rule is exact for the quadratic w'.
-            change[0] += MASS.values()[lane] * rise * h;
-            change[1] += MASS.values()[lane] * fall * h;
+            fastest += MASS.values()[lane] * h / w.sqrt();
+            moves[0] += MASS.values()[lane] * rise * h;
+            moves[1] += MASS.values()[lane] * fall * h;
             if lane == 0 || lane == 3 {
-                let at = 2 * (n - core.start + lane / 3);
-                out.boxes[at][1] = out.boxes[at][1].min(w);
-                out.boxes[at + 1] = [out.boxes[at + 1][0].max(-fall), out.boxes[at + 1][1].min(rise)];
+                let at = from + lane / 3 * 2;
+                boxes[at][1] = boxes[at][1].min(w);
+                boxes[at + 1] = [boxes[at + 1][0].max(-fall), boxes[at + 1][1].min(rise)];
             }
         }
-        out.change.push(change);
+        change.push(moves);
+    }
+    let last = x.len() - 2;
+    for end in (0..2).filter(|&end| at_ends[end]) {
+        let (at, sign) = (end * last, if end == 0 { 1.0 } else { -1.0 });
+        match planned.ends[end] {
+            WindowEnd::Rest { ramp, greatest } => {
+                let dual = space.ends[end].map_or(0.0, |row| row.dual);
+                let w = x[at];
+                time += ramp.way() / plan[end * (plan.len() - 2)].sqrt();
+                fastest += ramp.way() / greatest.sqrt();
+                least += ramp.way() / w.sqrt() - dual * (1.0 - w / greatest);
+                slope[at] += dual / greatest - 0.5 * ramp.way() / (w * w.sqrt());
+                slope[at] += sign * ramp.slope() * slope[at + 1];
+                (slope[at + 1], boxes[at][1]) = (0.0, boxes[at][1].min(greatest));
+            }
+            WindowEnd::Fixed { w, slope: known } => {
+                least += slope[at] * (w - x[at]) + slope[at + 1] * (known - x[at + 1]);
+                (slope[at], slope[at + 1], boxes[at][1]) = (0.0, 0.0, w);
+            }
+            WindowEnd::Free => {}
+        }
+    }
+    narrow(&change, &mut boxes);
+    let mut loss = 0.0;
+    let (mut price, mut ends) = ([[0.0; 2]; 2], [[[0.0; 2]; 2]; 2]);
+    for i in 0..x.len() {
+        let end = if i < 2 { Some(0) } else { (i >= last).then_some(1) };
+        match end.filter(|&end| !at_ends[end]) {
+            Some(end) => {
+                price[end][i % 2] = slope[i];
+                ends[end][i % 2] = boxes[i];
+                least -= slope[i] * x[i];
+            }
+            None => loss += slope[i] * x[i] - lowest(slope[i], boxes[i]),
+        }
+    }
+    (Part { time, fastest, least: least - loss, price, boxes: ends }, loss)
+}
+
+/// The part by which the multipliers of jerk exceed the weights of the time.
+fn excess<const M: usize>(rows: &Constraints<M>, dual: &[Lanes]) -> f64 {
+    let (mut excess, mut length) = (0.0, 0.0);
+    for (n, interval) in rows.intervals.iter().enumerate() {
+        let rest = rest::<M>(interval.h, RowLayout::<M>::of(dual, n));
+        excess += rest.values().iter().map(|rest| (-rest).max(0.0)).sum::<f64>();
+        length += interval.h;
+    }
+    excess / length
+}
+
+/// c less the multipliers of jerk at the collocation points of an interval of length h.
+fn rest<const M: usize>(h: f64, dual: &[Lanes]) -> Lanes {
+    let mut rest = MASS.map(|mass| mass * h);
+    for k in 0..M {
+        for row in [RowLayout::<M>::jerk(k), RowLayout::<M>::jerk(k) + 1] {
+            for (rest, own) in rest.values_mut().iter_mut().zip(dual[row].values()) {
+                *rest -= own;
+            }
+        }
+    }
+    rest
+}
+
+/// The multipliers of the limits as they are that pull like those of the tightened limits.
+fn loosened<const M: usize>(planned: &Planned<M>) -> Vec<Lanes> {
+    let mut out = planned.solved.state.dual.clone();
+    let scale = |dual: &mut Lanes, tight: &Lanes, own: &Lanes| {
+        for (lane, dual) in dual.values_mut().iter_mut().enumerate() {
+            // Limits that do not apply have a factor of 0.
+            if own.values()[lane] != 0.0 {
+                *dual *= tight.values()[lane] / own.values()[lane];
+            }
+        }
+    };
+    for (n, (own, tight)) in planned.rows.intervals.iter().zip(&planned.tight.intervals).enumerate() {
+        let dual = RowLayout::<M>::of_mut(&mut out, n);
+        scale(&mut dual[RowLayout::<M>::SPEED], &tight.speed, &own.speed);
+        let jerk = [tight, own].map(|limits| Lanes::all(limits.jerk));
+        for k in 0..M {
+            for side in 0..2 {
+                let row = &mut dual[RowLayout::<M>::acceleration(k) + side];
+                scale(row, &tight.acceleration, &own.acceleration);
+                scale(&mut dual[RowLayout::<M>::jerk(k) + side], &jerk[0], &jerk[1]);
+            }
+        }
+        dual[RowLayout::<M>::POSITIVE] = rest::<M>(own.h, dual).map(|rest| rest.max(0.0));
     }
     out
 }
@@ -215,65 +349,208 @@ fn limits_at<const M: usize>(rows: &Constraints<M>, n: usize, lane: usize) -> [f
     [w, rise, fall]
 }
 
-/// The lower bound from all cores.
-fn join(parts: &[Part], cores: &[Range<usize>], ends: &[WindowEnd; 2], unknowns: usize) -> f64 {
-    let mut x = vec![0.0; unknowns];
-    let mut slope = vec![0.0; unknowns];
-    let mut boxes = vec![[f64::NEG_INFINITY, f64::INFINITY]; unknowns];
-    let mut value = 0.0;
-    // Where two windows meet with different x, the slope accounts for the difference.
-    for (part, core) in parts.iter().zip(cores) {
-        value += part.value;
-        for i in 0..part.x.len() {
-            let at = 2 * core.start + i;
-            slope[at] += part.slope[i];
-            boxes[at] = [boxes[at][0].max(part.boxes[i][0]), boxes[at][1].min(part.boxes[i][1])];
-            if i < 2 && core.start > 0 {
-                value += part.slope[i] * (x[at] - part.x[i]);
-            } else {
-                x[at] = part.x[i];
-            }
-        }
-    }
-    for end in 0..2 {
-        let (at, sign) = (end * (unknowns - 2), if end == 0 { 1.0 } else { -1.0 });
-        match ends[end] {
-            WindowEnd::Rest { ramp, greatest } => {
-                let dual = parts[end * (parts.len() - 1)].ends[end];
-                let w = x[at];
-                value += ramp.way() / w.sqrt() - dual * (1.0 - w / greatest);
-                slope[at] += dual / greatest - 0.5 * ramp.way() / (w * w.sqrt());
-                slope[at] += sign * ramp.slope() * slope[at + 1];
-                slope[at + 1] = 0.0;
-                boxes[at][1] = boxes[at][1].min(greatest);
-            }
-            WindowEnd::Fixed { w, .. } => {
-                (slope[at], slope[at + 1]) = (0.0, 0.0);
-                boxes[at][1] = w;
-            }
-        }
-    }
-    narrow(parts, &mut boxes);
-    for i in 0..unknowns {
-        let [low, high] = boxes[i];
-        value += if slope[i] > 0.0 {
-            slope[i] * (low - x[i])
-        } else if slope[i] < 0.0 {
-            slope[i] * (high - x[i])
-        } else {
-            0.0
-        };
-    }
-    value
-}
-
 /// Narrows the boxes of w to the values that can be reached from station to station, forward and backward.
-fn narrow(parts: &[Part], boxes: &mut [[f64; 2]]) {
-    let change: Vec<[f64; 2]> = parts.iter().flat_map(|part| part.change.iter().copied()).collect();
+fn narrow(change: &[[f64; 2]], boxes: &mut [[f64; 2]]) {
     for n in 0..change.len() {
         boxes[2 * n + 2][1] = boxes[2 * n + 2][1].min(boxes[2 * n][1] + change[n][0]);
     }
     for n in (0..change.len()).rev() {
         boxes[2 * n][1] = boxes[2 * n][1].min(boxes[2 * n + 2][1] + change[n][1]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level;
+
+    use super::super::prepare::Prepared;
+    use super::super::window::ramps;
+    use super::super::{End, Geometry, Limits, PathPoint, Problem};
+    use super::*;
+    use feedplan_geometry::watch::Watch;
+
+    /// A plane curve that turns to both sides ever more sharply.
+    struct Winding {
+        knots: [f64; 2],
+        turn: f64,
+    }
+
+    impl Geometry<2> for Winding {
+        fn knots(&self) -> &[f64] {
+            &self.knots
+        }
+
+        fn at(&self, _: usize, s: f64) -> PathPoint<2> {
+            let (angle, rate, change) = (self.turn * s.sin(), self.turn * s.cos(), -self.turn * s.sin());
+            let (sin, cos) = angle.sin_cos();
+            let first = [cos, sin];
+            let second = [-sin * rate, cos * rate];
+            let third = [-cos * rate * rate - sin * change, -sin * rate * rate + cos * change];
+            PathPoint { first, second, third, speed_cap: 200.0 }
+        }
+    }
+
+    /// Σ c max(w^(−1/2), |L(w)|/J) over some intervals: jerk beyond its limit takes time instead.
+    fn relaxed_time(rows: &Constraints<2>, x: &[f64], core: &Range<usize>) -> f64 {
+        dispatch!(Level::new(), simd => {
+            let mut time = 0.0;
+            for n in core.clone() {
+                let interval = &rows.intervals[n];
+                let motion = interval.motion(simd, &local(x, n, interval.h));
+                let mut y = pace(motion[0]);
+                for [_, jerk] in rows.axes(interval, motion) {
+                    y = y.max(jerk.abs());
+                }
+                time += (MASS.load(simd) * y).sum() * interval.h;
+            }
+            time
+        })
+    }
+
+    /// Speed profiles around a plan that keep the limits of speed and acceleration, from 1e-4 to half of it away, rough
+    /// and smooth; the ends are multiplied by the same factor as the slopes there.
+    fn around(plan: &[f64], rows: &Constraints<2>, count: usize) -> Vec<Vec<f64>> {
+        let mut random = random();
+        let keeps = |x: &[f64]| {
+            (0..rows.intervals.len()).all(|n| {
+                let used = rows.utilisation(x, n);
+                used[0] <= 1.0 && used[1] <= 1.0 && (x[2 * n] > 0.0 && x[2 * n + 2] > 0.0)
+            })
+        };
+        let mut out = vec![];
+        while out.len() < count {
+            let size = 10f64.powf(-2.2 + 1.8 * random());
+            let (waves, phase) = (30.0 * (1.0 + random()), 3.0 * random());
+            let rough = random() > 0.0;
+            let last = plan.len() / 2 - 1;
+            let mut x = plan.to_vec();
+            for n in 0..=last {
+                let angle = waves * n as f64 / last as f64 + phase;
+                let factor = 1.0 - size * (1.0 + if rough { random() } else { angle.sin() });
+                x[2 * n] *= factor;
+                x[2 * n + 1] *= factor;
+                if !rough && n > 0 && n < last {
+                    let h = rows.intervals[n - 1].h + rows.intervals[n].h;
+                    x[2 * n + 1] -= size * plan[2 * n] * angle.cos() * waves * 2.0 / (last as f64 * h);
+                }
+            }
+            // Towards rest every use of a limit falls.
+            while !keeps(&x) {
+                x.iter_mut().for_each(|x| *x *= 0.9);
+            }
+            out.push(x);
+        }
+        out
+    }
+
+    /// Numbers from −1 to 1.
+    fn random() -> impl FnMut() -> f64 {
+        let mut seed = 1u64;
+        move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
+    }
+
+    /// Plans a path whole and calls `work` with what the bound takes, and the effort.
+    fn planned(turn: f64, work: impl Fn(&Planned<2>, &Effort)) {
+        let limits =
+            Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
+        let geometry = Winding { knots: [0.0, 20.0], turn };
+        let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
+        let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
+        let mut window = prepared.window(0..prepared.grid.pieces.len());
+        let rows = window.rows.clone();
+        let mut x = prepared.x.clone();
+        let watch = Watch::default();
+        let (tolerance, max_iterations, barrier) = (1e-7, 400, 1.0);
+        let effort = Effort { tolerance, max_iterations, deadline: None, barrier, warm: false, watch };
+        let mut exact = InteriorPoint::default();
+        window.improve(prepared.ends, &mut x, &effort, &mut exact);
+        let (tight, ends, at_ends) = (&window.rows, prepared.ends, [true; 2]);
+        work(&Planned { rows: &rows, tight, ends, at_ends, x: &x, solved: &exact }, &effort);
+    }
+
+    #[test]
+    fn the_lagrangian_of_any_multipliers_is_below_the_time_and_above_its_tangents() {
+        planned(2.2, |own, _| {
+            let mut random = random();
+            let profiles = around(own.x, own.rows, 40);
+            for (n, interval) in own.rows.intervals.iter().enumerate().step_by(7) {
+                // Of one row or all, up to more than the weights of the time.
+                let (most, one) = (interval.h * (1.0 + random()), 8.0 * random());
+                let of_row = |row: usize| if one < 0.0 || row == one as usize { most } else { 0.0 };
+                let dual: Vec<Lanes> =
+                    (0..RowLayout::<2>::COUNT).map(|row| MASS.map(|mass| mass * of_row(row))).collect();
+                let found: Vec<_> = profiles
+                    .iter()
+                    .map(|z| {
+                        let u = local(z, n, interval.h);
+                        let (_, value, slope) = dispatch!(
+                            Level::new(),
+                            simd => lagrangian(simd, own.rows, n, &u, &u, &mut dual.clone())
+                        );
+                        let time = relaxed_time(own.rows, z, &(n..n + 1));
+                        assert!(value <= time + 1e-12, "{value} and {time} s on interval {n}");
+                        (u, value, slope)
+                    })
+                    .collect();
+                for (from, to) in found.iter().zip(&found[1..]) {
+                    let tangent = from.1 + (0..4).map(|k| from.2[k] * (to.0[k] - from.0[k])).sum::<f64>();
+                    assert!(tangent <= to.1 + 1e-12, "{tangent} and {} s on interval {n}", to.1);
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn no_profile_beats_the_bound_even_if_jerk_only_costs_time() {
+        for turn in [0.6, 2.2] {
+            planned(turn, |own, effort| {
+                let count = own.rows.intervals.len();
+                let mut space = InteriorPoint::default();
+                let bound = part(own, 0..count, effort, &mut space).least;
+                let times: Vec<f64> = around(own.x, own.rows, 300)
+                    .iter()
+                    .map(|z| relaxed_time(own.rows, z, &(0..count)) + ramps(&own.ends, z))
+                    .collect();
+                let least = times.iter().copied().fold(f64::INFINITY, f64::min);
+                assert!((1.0..1.05).contains(&(least / bound)), "{least} s, {bound} s proven");
+                // Other multipliers prove less, but no more.
+                let mut random = random();
+                let known = space.state.dual.clone();
+                for i in 0..30 {
+                    let size = 10f64.powi(i % 6 - 5);
+                    for (dual, known) in space.state.dual.iter_mut().zip(&known) {
+                        *dual = known.map(|dual| dual * (1.0 + size * random()).abs());
+                    }
+                    let x: Vec<f64> = own.x.iter().map(|x| x * (1.0 + 0.3 * size)).collect();
+                    let other = tangent(own, &(0..count), &x, &mut space).0.least;
+                    assert!(other <= least, "{least} s, {other} s proven by multipliers {size} away");
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn parts_add_up_and_hold_for_all_speeds_at_their_ends() {
+        planned(2.2, |own, effort| {
+            let count = own.rows.intervals.len();
+            let mut space = InteriorPoint::default();
+            let whole = part(own, 0..count, effort, &mut space);
+            let cores = [0..count / 3, count / 3..2 * count / 3, 2 * count / 3..count];
+            let parts = cores.clone().map(|core| {
+                let at_ends = [core.start == 0, core.end == count];
+                part(&Planned { at_ends, ..*own }, core, effort, &mut space)
+            });
+            assert!((join(&parts) / join(&[whole]) - 1.0).abs() < 1e-6);
+            let [_, Part { least, price, .. }, _] = &parts;
+            for z in around(own.x, own.rows, 100) {
+                let [from, to] = [cores[1].start, cores[1].end].map(|n| [z[2 * n], z[2 * n + 1]]);
+                let priced: f64 = (0..2).map(|i| price[0][i] * from[i] + price[1][i] * to[i]).sum();
+                let time = relaxed_time(own.rows, &z, &cores[1]);
+                assert!(time >= least + priced, "{time} s, {} s proven", least + priced);
+            }
+        });
     }
 }

@@ -2,6 +2,7 @@
 
 use fearless_simd::Simd;
 
+use super::band::EndCondition;
 use super::constraints::{Constraints, RowLayout};
 use super::hermite::local;
 use super::interior_point::{InteriorPoint, WindowEnd};
@@ -179,6 +180,65 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             dual = dual.max(-row.step / row.dual);
         }
         (1.0 / primal, 1.0 / dual)
+    }
+
+    /// Moves x and the multipliers by a Newton step that keeps λ s: to first order the gradient of the Lagrangian
+    /// vanishes there. The multipliers stay at 0 or above, and w above 0, but x may leave the limits. False where there
+    /// is no such step.
+    #[inline(always)]
+    pub(super) fn balance<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Constraints<M>,
+        conditions: [EndCondition; 2],
+        x: &mut [f64],
+    ) -> bool {
+        if self.slacks(simd, rows, x, false).is_none() {
+            return false;
+        }
+        self.state.step.fill(Lanes::ZERO);
+        self.assemble(simd, rows, x, 0.0, 0.0);
+        if !self.band.factor(conditions) {
+            return false;
+        }
+        self.pulls.fill([[0.0; 2]; 2]);
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let pull = self.model.pull(simd, rows, n, RowLayout::<M>::of(&self.state.dual, n), 0);
+            let [w0, d0, w1, d1] = project(interval.h, &pull);
+            add(&mut self.pulls[n][0], [w0, d0 * interval.h]);
+            add(&mut self.pulls[n + 1][0], [w1, d1 * interval.h]);
+        }
+        for row in self.ends.iter().flatten() {
+            self.pulls[row.station][0][0] -= row.dual / row.greatest;
+        }
+        self.correct(1.0, 0.0);
+        self.band.solve(&self.rhs, [[0.0; 2]; 2], &mut self.step);
+        for ((to, from), step) in self.trial.iter_mut().zip(x.iter()).zip(&self.step) {
+            *to = from + step;
+        }
+        if self.trial.iter().step_by(2).any(|&w| w.is_nan() || w <= 0.0) {
+            return false;
+        }
+        x.copy_from_slice(&self.trial);
+        self.model.solved(simd, rows, &self.step, [1.0, 0.0]);
+        let change = &mut self.scratch[..RowLayout::<M>::COUNT];
+        let zero = Register::all(simd, 0.0);
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
+            let inverse = RowLayout::<M>::of(&self.state.slack, n);
+            let dual = RowLayout::<M>::of_mut(&mut self.state.dual, n);
+            for k in 0..RowLayout::<M>::COUNT {
+                let part = change[k].load(simd) * inverse[k];
+                dual[k] = (dual[k] * (Lanes::ONE - part)).max(zero).into();
+            }
+        }
+        for row in self.ends.iter_mut().flatten() {
+            let part = -self.step[2 * row.station] / row.greatest / row.slack;
+            row.dual = (row.dual * (1.0 - part)).max(0.0);
+        }
+        self.model.attempt(simd, 1.0);
+        self.model.accept();
+        true
     }
 
     /// Time and Σ ln s after a part of the step; the time is infinite where a limit is broken.

@@ -7,17 +7,15 @@
 //! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
 //! the acceleration goes on (`turns`).
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
-use crate::arc_length_path::{speed_sq, ArcLengthPath, Junction, Part};
+use crate::arc_length_path::{ArcLengthPath, Junction, Part};
 use crate::jerk_limited::held::{caps_between, stretches, Between, Stretch};
 use crate::jerk_limited::turns::{lower, Line};
-use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile, Ramp, SpeedCap};
-use crate::jerk_profile::{JerkProfile, FEED, SPEED_CUBIC};
+use crate::jerk_limited::{self, Effort, End, Limits, SpeedCap};
+use crate::jerk_profile::JerkProfile;
 use crate::s_curve::{self, Segment};
-use crate::subruns::{chains, checked, over_chains, subruns, turns, Chain, Subrun};
+use crate::subruns::{over_chains, Chain, Subrun};
 use feedplan_planner::problem::{along, Fault, Problem};
 
 /// A junction holds the speed where the plan is within this part of its cap.
@@ -50,68 +48,6 @@ pub fn plan<const M: usize>(
     })
 }
 
-/// Columns of a profile of this planner.
-#[derive(Clone, Copy, Debug)]
-pub struct Columns<'a> {
-    pub piece: &'a [u32],
-    pub kind: &'a [u8],
-    pub u0: &'a [f64],
-    pub u1: &'a [f64],
-    pub p0: &'a [f64],
-    pub p1: &'a [f64],
-    pub a0: &'a [f64],
-    pub a1: &'a [f64],
-    pub duration: &'a [f64],
-}
-
-/// A lower bound on the time of each subrun, in s, on the grid of a profile: see `jerk_limited::certify`. It is 0 for a
-/// subrun that this planner did not plan as a whole, and for those that the deadline leaves no time for.
-pub fn certified<const M: usize>(
-    problem: &Problem<M>,
-    jerk: &[f64; M],
-    columns: &Columns,
-    effort: &Effort,
-) -> Result<Vec<f64>, Fault> {
-    let limits = checked(problem, jerk)?;
-    let subruns = subruns(problem);
-    let position = |phase: usize| (columns.piece[phase] as usize, columns.u0[phase]);
-    let count = columns.piece.len();
-    let mut offsets = vec![];
-    let mut phase = 0;
-    for subrun in &subruns {
-        let start = subrun.parts[0];
-        while phase < count && position(phase) < (start.piece, start.u[0]) {
-            phase += 1;
-        }
-        offsets.push(phase);
-    }
-    offsets.push(count);
-    let watch = problem.watch.each(problem.width.len());
-    let of_chain = |chain: Chain| -> Result<Vec<f64>, Fault> {
-        let Strokes { paths, lines, accelerations } = Task { problem, limits, effort }.strokes(&chain)?;
-        let lower_bound = |i: usize| {
-            let subrun = &chain.subruns[i];
-            let watch = watch.part(subrun.parts.len() as f64);
-            if let Some(line) = lines[i] {
-                let ends = line.ends([accelerations[i], accelerations[i + 1]]);
-                return s_curve::cross(&line.segment, ends).iter().map(|section| section.duration).sum();
-            }
-            if effort.expired() {
-                return 0.0;
-            }
-            let phases = offsets[subrun.number]..offsets[subrun.number + 1];
-            let ends = [0, 1].map(|end| end_of(subrun.ends[end], accelerations[i + end]));
-            let task = Task { problem, limits, effort: &Effort { watch, ..*effort } };
-            task.certified(&paths[i], ends, columns, phases).unwrap_or(0.0)
-        };
-        Ok((0..lines.len()).into_par_iter().map(lower_bound).collect())
-    };
-    let turns = turns(problem, &limits, &subruns);
-    let bounds: Result<Vec<Vec<f64>>, Fault> =
-        chains(&subruns, &turns).into_par_iter().map(of_chain).collect();
-    Ok(bounds?.concat())
-}
-
 /// The subruns of a chain.
 struct Strokes<'a, const M: usize> {
     paths: Vec<ArcLengthPath<'a, M>>,
@@ -138,6 +74,7 @@ impl<const M: usize> Task<'_, M> {
             return Ok(vec![JerkProfile::unplanned(); count]);
         }
         let Strokes { paths, lines, mut accelerations } = self.strokes(chain)?;
+        let greatest = accelerations.clone();
         for i in 1..count {
             let most = BELOW * accelerations[i];
             accelerations[i] = match [lines[i - 1], lines[i]] {
@@ -151,7 +88,8 @@ impl<const M: usize> Task<'_, M> {
             let subrun = &chain.subruns[i];
             let watch = self.effort.watch.part(subrun.parts.len() as f64);
             let effort = Effort { watch, ..*self.effort };
-            let ends = [0, 1].map(|end| end_of(subrun.ends[end], accelerations[i + end]));
+            let ends =
+                [0, 1].map(|end| end_of(subrun.ends[end], [accelerations[i + end], greatest[i + end]]));
             Task { effort: &effort, problem: self.problem, limits: self.limits }.plan(&paths[i], ends, 0)
         };
         let mut planned = vec![JerkProfile::default(); count];
@@ -203,6 +141,17 @@ impl<const M: usize> Task<'_, M> {
                 planned[i] = self.along_line(&paths[i], line, [accelerations[i], accelerations[i + 1]]);
             }
         }
+        // A bound holds with the greatest accelerations at the turns, whatever the plan takes there.
+        if self.effort.proves {
+            for i in 0..count {
+                if let Some(line) = &lines[i] {
+                    let fastest = s_curve::cross(&line.segment, line.ends([greatest[i], greatest[i + 1]]));
+                    planned[i].lower_bound = vec![fastest.iter().map(|section| section.duration).sum()];
+                } else if (i..i + 2).any(|turn| accelerations[turn] == 0.0 && greatest[turn] > 0.0) {
+                    planned[i].lower_bound = plan(i, &greatest)?.lower_bound;
+                }
+            }
+        }
         Ok(planned)
     }
 
@@ -239,12 +188,14 @@ impl<const M: usize> Task<'_, M> {
                 Ok(JerkProfile::unplanned())
             }
             Ok(planned) => {
-                let mut excess = 0.0;
+                let (mut excess, mut least) = (0.0, 0.0);
                 for mut own in planned {
                     excess += own.excess.drain(..).sum::<f64>();
+                    least += own.lower_bound.drain(..).sum::<f64>();
                     phases.append(own);
                 }
                 phases.excess.push(excess);
+                phases.lower_bound.push(least);
                 Ok(phases)
             }
             // A moving end has no plan before some iterations.
@@ -319,6 +270,7 @@ impl<const M: usize> Task<'_, M> {
         let mut phases = JerkProfile::default();
         if let Some(feed) = held {
             phases.push_held(self.problem, path, ends, feed);
+            phases.lower_bound.push((ends[1] - ends[0]) / feed);
             watch.advance(1);
             self.kinks(path, junctions, |_| feed * feed, ends, &mut phases);
             return Ok(phases);
@@ -332,6 +284,7 @@ impl<const M: usize> Task<'_, M> {
         let plan = jerk_limited::plan(&problem, &Effort { watch, ..*effort })?;
         phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
         phases.stopped = !plan.converged && effort.expired();
+        phases.lower_bound.push(plan.lower_bound);
         if plan.iterations > 0.0 {
             phases.excess.push(plan.excess);
         }
@@ -354,63 +307,6 @@ impl<const M: usize> Task<'_, M> {
                 phases.kinks.push(path.parts[path.part(cap.s)].piece as u32);
             }
         }
-    }
-
-    /// The lower bound of a subrun; None where its phases are no profile of this planner.
-    fn certified(
-        &self,
-        path: &ArcLengthPath<M>,
-        ends: [End; 2],
-        columns: &Columns,
-        phases: Range<usize>,
-    ) -> Option<f64> {
-        let is_cubic = |phase: &usize| matches!(columns.kind[*phase], SPEED_CUBIC | FEED);
-        let first = phases.clone().find(is_cubic)?;
-        let last = phases.clone().rev().find(is_cubic)?;
-        if (first..last).any(|phase| columns.p1[phase] == 0.0) {
-            return None;
-        }
-        let knots = path.knots();
-        let powers = ends.map(|end| match end {
-            End::Turn { .. } => Ramp::ACCELERATION,
-            _ => Ramp::JERK,
-        });
-        let mut profile = Profile { ends: [0.0, path.total()], powers, ..Profile::default() };
-        let mut part = 0;
-        for phase in first..=last {
-            self.problem.watch.check_at(phase);
-            let (piece, u) = (columns.piece[phase] as usize, [columns.u0[phase], columns.u1[phase]]);
-            while path.parts[part].piece != piece || path.parts[part].u[1] <= u[0] {
-                part += 1;
-                path.parts.get(part)?;
-            }
-            if path.parts[part].u[1] < u[1] {
-                return None;
-            }
-            let speed_sq = |u: f64, p: f64| p * speed_sq(self.problem, piece, u);
-            if phase == first {
-                let before = path.length_between(part, path.parts[part].u[0], u[0]);
-                profile.s.push(knots[part] + before);
-                profile.speed_sq.push(speed_sq(u[0], columns.p0[phase]));
-                profile.slope.push(2.0 * columns.a0[phase]);
-            }
-            let ends = u[1] >= path.parts[part].u[1];
-            let before = profile.s[profile.s.len() - 1];
-            let s = if ends { knots[part + 1] } else { before + path.length_between(part, u[0], u[1]) };
-            if s <= before {
-                return None;
-            }
-            profile.s.push(s);
-            profile.speed_sq.push(speed_sq(u[1], columns.p1[phase]));
-            profile.slope.push(2.0 * columns.a1[phase]);
-        }
-        let turns = [columns.a0[phases.start], columns.a1[phases.end - 1]];
-        if ends.iter().zip(turns).any(|(end, a)| matches!(end, End::Turn { .. }) != (a != 0.0)) {
-            return None;
-        }
-        let caps = path.caps(&path.junctions(&self.limits.jerk));
-        let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps: &caps, ends };
-        Some(jerk_limited::certify(&problem, &profile, self.effort).least_time)
     }
 
     /// The quickest profile of a line with these accelerations at its ends.
@@ -465,6 +361,8 @@ impl<const M: usize> Task<'_, M> {
             return Ok(JerkProfile::unplanned());
         }
         phases.append(rest);
+        // The bounds of both hold with the stop alone.
+        phases.lower_bound = vec![f64::NAN];
         Ok(phases)
     }
 
@@ -485,12 +383,9 @@ impl<const M: usize> Task<'_, M> {
         caps: &[SpeedCap],
     ) -> Result<JerkProfile, Fault> {
         let effort = Effort { deadline: None, tolerance: 1e-4, ..*self.effort };
-        let speeds = ends.map(|end| match end {
-            End::Moving { speed, .. } => speed,
-            End::Rest | End::Turn { .. } => 0.0,
-        });
+        let speeds = ends.map(|end| end.speed());
         let possible = |speeds: [f64; 2]| {
-            let ends = speeds.map(|speed| end_of(speed, 0.0));
+            let ends = speeds.map(|speed| end_of(speed, [0.0; 2]));
             let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps, ends };
             jerk_limited::plan(&problem, &effort).is_ok()
         };
@@ -515,12 +410,13 @@ impl<const M: usize> Task<'_, M> {
     }
 }
 
-/// The end of a path at a speed in mm/s; at rest with an acceleration of at most this, in mm/s².
-fn end_of(speed: f64, acceleration: f64) -> End {
+/// The end of a path at a speed in mm/s; at rest with an acceleration of at most this, in mm/s², where the bound is for
+/// all up to another.
+fn end_of(speed: f64, [acceleration, greatest]: [f64; 2]) -> End {
     if speed > 0.0 {
         End::Moving { speed, acceleration: 0.0 }
     } else if acceleration > 0.0 {
-        End::Turn { acceleration }
+        End::Turn { acceleration, greatest }
     } else {
         End::Rest
     }

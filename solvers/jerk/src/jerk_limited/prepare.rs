@@ -26,6 +26,8 @@ pub struct Prepared<'a, G, const M: usize> {
     pub problem: &'a Problem<'a, G, M>,
     pub grid: Grid,
     pub ends: [WindowEnd; 2],
+    /// The ends of every motion that the lower bound is for.
+    pub bound_ends: [WindowEnd; 2],
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
     /// The time to stop from the greatest speed, in s.
@@ -39,7 +41,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let knots = problem.geometry.knots();
         let total = knots[knots.len() - 1];
         let limits = &problem.limits;
-        let ends = window_ends(problem);
+        let [ends, bound_ends] = window_ends(problem);
         let watch = effort.watch.part(PREPARING);
         let (samples, slopes) = sample_envelope(
             problem.geometry,
@@ -51,7 +53,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         )?;
         let grid = Grid::new(&samples, slopes, problem.caps, &ends, effort.resolution);
         watch.check();
-        let mut prepared = Self { problem, grid, ends, x: vec![], stop_time: 0.0, watch };
+        let mut prepared = Self { problem, grid, ends, bound_ends, x: vec![], stop_time: 0.0, watch };
         prepared.begin(slopes)?;
         Ok(prepared)
     }
@@ -113,27 +115,29 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     }
 }
 
-/// The known values at both ends of a path.
-pub fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [WindowEnd; 2] {
+/// The known values at both ends of a path, for the plan and for the lower bound.
+fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [[WindowEnd; 2]; 2] {
     let knots = problem.geometry.knots();
     let (pieces, limits) = (knots.len() - 1, &problem.limits);
     let total = knots[pieces];
-    std::array::from_fn(|end| match problem.ends[end] {
+    let at_rest = |end: usize, power: f64, most: f64| {
+        let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
+        let length = rest_ramp::length(limits, &problem.geometry.at(piece, s), total);
+        let ramp = Ramp { length, power };
+        let greatest = rest_ramp::greatest(problem.geometry, limits, problem.caps, ramp, end);
+        WindowEnd::Rest { ramp, greatest: greatest.min(2.0 * most * length) }
+    };
+    let both = [0, 1].map(|end| match problem.ends[end] {
+        End::Rest => [at_rest(end, Ramp::JERK, f64::INFINITY); 2],
+        End::Turn { acceleration, greatest } => {
+            [acceleration, greatest].map(|most| at_rest(end, Ramp::ACCELERATION, most))
+        }
         End::Moving { speed, acceleration } => {
-            WindowEnd::Fixed { w: speed * speed, slope: 2.0 * acceleration }
+            [WindowEnd::Fixed { w: speed * speed, slope: 2.0 * acceleration }; 2]
         }
-        End::Rest | End::Turn { .. } => {
-            let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
-            let length = rest_ramp::length(limits, &problem.geometry.at(piece, s), total);
-            let (power, most) = match problem.ends[end] {
-                End::Turn { acceleration } => (Ramp::ACCELERATION, 2.0 * acceleration * length),
-                _ => (Ramp::JERK, f64::INFINITY),
-            };
-            let ramp = Ramp { length, power };
-            let greatest = rest_ramp::greatest(problem.geometry, limits, problem.caps, ramp, end);
-            WindowEnd::Rest { ramp, greatest: greatest.min(most) }
-        }
-    })
+        End::Held { speed } => [WindowEnd::Fixed { w: speed * speed, slope: 0.0 }, WindowEnd::Free],
+    });
+    [0, 1].map(|which| both.map(|end| end[which]))
 }
 
 /// Whether each number is greater than the one before.
@@ -148,7 +152,7 @@ fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), 
     if knots.len() < 2 || !rising(knots.iter().copied()) {
         return wrong("the knots of the path do not rise: give two or more, each above the last".into());
     }
-    if knots[0] != 0.0 && !matches!(problem.ends[0], End::Moving { .. }) {
+    if knots[0] != 0.0 && matches!(problem.ends[0], End::Rest | End::Turn { .. }) {
         return wrong(format!("a path from rest begins at {} mm: let it begin at 0", knots[0]));
     }
     let limits = &problem.limits;

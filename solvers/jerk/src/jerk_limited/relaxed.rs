@@ -14,9 +14,10 @@ use super::model::{expand, fall, pace, project, Local, Model};
 use crate::lanes::{Lanes, Register};
 
 /// The variables y of the relaxation, four lanes for each interval.
-#[derive(Default)]
 pub struct Relaxed {
     pub y: Vec<Lanes>,
+    /// y starts above its least possible value by this part of it.
+    pub above: f64,
     step: Vec<Lanes>,
     trial: Vec<Lanes>,
     /// w^(−1/2), as the slacks were last evaluated.
@@ -26,8 +27,12 @@ pub struct Relaxed {
     pulls: Vec<[Lanes; 2]>,
 }
 
-/// y starts at this multiple of its least possible value.
-const ABOVE: f64 = 1.1;
+impl Default for Relaxed {
+    fn default() -> Self {
+        let [y, step, trial, pace] = std::array::from_fn(|_| vec![]);
+        Self { y, above: 0.1, step, trial, pace, cross: vec![], pulls: vec![] }
+    }
+}
 
 impl<const M: usize> Model<M> for Relaxed {
     #[inline(always)]
@@ -44,7 +49,7 @@ impl<const M: usize> Model<M> for Relaxed {
             for [_, jerk] in rows.axes(interval, motion) {
                 least = least.max(jerk.abs());
             }
-            self.y[n] = (least * ABOVE).into();
+            self.y[n] = (least * (1.0 + self.above)).into();
         }
     }
 

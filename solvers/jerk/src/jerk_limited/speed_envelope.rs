@@ -176,6 +176,7 @@ impl Slopes {
             r[station] = r[station].min(match *kind {
                 WindowEnd::Rest { ramp, .. } => self.k * ramp.length,
                 WindowEnd::Fixed { w, .. } => w.power(0.75),
+                WindowEnd::Free => f64::INFINITY,
             });
         }
     }

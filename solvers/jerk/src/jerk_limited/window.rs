@@ -51,7 +51,7 @@ pub struct WindowReport {
 }
 
 impl<const M: usize> Window<M> {
-    /// Improves the valid plan x in place.
+    /// Improves the valid plan x in place. The limits at given ends have been dropped.
     pub fn improve(
         &mut self,
         ends: [WindowEnd; 2],
@@ -59,7 +59,6 @@ impl<const M: usize> Window<M> {
         effort: &Effort,
         space: &mut InteriorPoint<Exact, M>,
     ) -> WindowReport {
-        self.rows.drop_at_ends(&ends);
         let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
         let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
@@ -201,7 +200,7 @@ impl<const M: usize> Window<M> {
 pub fn ramps(ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
     let time = |end: usize, w: f64| match ends[end] {
         WindowEnd::Rest { ramp, .. } => ramp.way() / w.sqrt(),
-        WindowEnd::Fixed { .. } => 0.0,
+        WindowEnd::Fixed { .. } | WindowEnd::Free => 0.0,
     };
     time(0, x[0]) + time(1, x[x.len() - 2])
 }

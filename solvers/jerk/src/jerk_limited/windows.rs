@@ -12,7 +12,9 @@ use rayon::prelude::*;
 use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point::{self, InteriorPoint, WindowEnd};
+use super::lower_bound::{self, Part, Planned};
 use super::prepare::{Prepared, PREPARING};
+use super::relaxed::Relaxed;
 use super::window::{ramps, WindowReport};
 use super::{Effort, Fault, Geometry, Plan, Problem, Profile};
 
@@ -36,7 +38,9 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     let prepared = Prepared::new(problem, effort)?;
     let mut x = prepared.x.clone();
     let run = Run { prepared: &prepared, effort, stations: &prepared.grid.stations };
-    let windows = run.windows();
+    let cuts = run.cuts();
+    let windows = run.windows(&cuts);
+    let mut parts = vec![];
     let watch = effort.watch.part(1.0 - PREPARING).each(windows.iter().map(Range::len).sum());
     let mut counts = Counts { converged: true, steps: 0.0, excess: 0.0 };
     for first in (0..windows.len()).step_by(BATCH * rayon::current_num_threads()) {
@@ -47,19 +51,21 @@ pub fn solve<G: Geometry<M>, const M: usize>(
         let batch = first..windows.len().min(first + BATCH * rayon::current_num_threads());
         let solved: Vec<_> = windows[batch.clone()]
             .par_iter()
-            .map_init(InteriorPoint::default, |space, range| {
-                let solved = run.solve(range, space);
+            .zip(cuts[batch.start..].par_windows(2))
+            .map_init(Spaces::default, |spaces, (range, core)| {
+                let solved = run.solve(range, core[0]..core[1], spaces);
                 watch.advance(range.len());
                 solved
             })
             .collect();
-        for (at, (y, verdict)) in batch.clone().zip(solved) {
+        for (at, (y, verdict, part)) in batch.clone().zip(solved) {
+            parts.extend(part);
             counts.add(&verdict, windows[at].len());
             let reached = if at == 0 { 0 } else { windows[at - 1].end };
             if !run.join(&mut x, reached, &windows[at], &y) {
                 // No blend keeps the limits: this window starts again from the first plan, where the last one ends.
                 let rest = reached..windows[at].end;
-                let (y, verdict) = run.solve(&rest, &mut InteriorPoint::default());
+                let (y, verdict, _) = run.solve(&rest, rest.start..rest.start, &mut Spaces::default());
                 counts.add(&verdict, rest.len());
                 counts.converged = false;
                 x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
@@ -73,8 +79,11 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     }
     let count = run.stations.len() - 1;
     let time: f64 = (0..count).map(|n| duration(&x, n, run.stations[n + 1] - run.stations[n])).sum();
+    let time = time + ramps(&prepared.ends, &x);
+    let lower_bound = if parts.len() == windows.len() { time * lower_bound::join(&parts) } else { f64::NAN };
     Ok(Plan {
-        time: time + ramps(&prepared.ends, &x),
+        time,
+        lower_bound,
         converged: counts.converged,
         excess: counts.excess,
         iterations: counts.steps / count as f64,
@@ -98,6 +107,13 @@ impl Counts {
     }
 }
 
+/// Working space of a thread.
+#[derive(Default)]
+struct Spaces<const M: usize> {
+    exact: InteriorPoint<Exact, M>,
+    relaxed: InteriorPoint<Relaxed, M>,
+}
+
 struct Run<'a, G, const M: usize> {
     prepared: &'a Prepared<'a, G, M>,
     effort: &'a Effort<'a>,
@@ -106,8 +122,7 @@ struct Run<'a, G, const M: usize> {
 
 impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     /// The windows, each with its overlaps.
-    fn windows(&self) -> Vec<Range<usize>> {
-        let cuts = self.cuts();
+    fn windows(&self, cuts: &[usize]) -> Vec<Range<usize>> {
         let reach = |from: usize, to: usize| {
             let step = |n: usize| if to > from { n + 1 } else { n - 1 };
             let (mut n, mut time) = (from, 0.0);
@@ -156,17 +171,26 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         duration(&self.prepared.x, n, self.stations[n + 1] - self.stations[n])
     }
 
-    /// Solves a window between states of the first plan.
-    fn solve(&self, range: &Range<usize>, space: &mut InteriorPoint<Exact, M>) -> (Vec<f64>, WindowReport) {
+    /// Solves a window between states of the first plan; with the lower bound of the intervals `core` in it.
+    fn solve(
+        &self,
+        range: &Range<usize>,
+        core: Range<usize>,
+        spaces: &mut Spaces<M>,
+    ) -> (Vec<f64>, WindowReport, Option<Part>) {
         let mut y = self.prepared.x[2 * range.start..2 * range.end + 2].to_vec();
-        let fixed = |at: usize| WindowEnd::Fixed { w: y[at], slope: y[at + 1] };
-        let mut ends = [fixed(0), fixed(y.len() - 2)];
-        if range.start == 0 {
-            ends[0] = self.prepared.ends[0];
-        }
-        if range.end + 1 == self.stations.len() {
-            ends[1] = self.prepared.ends[1];
-        }
+        let at_ends = [range.start == 0, range.end + 1 == self.stations.len()];
+        let ends_of = |known: [WindowEnd; 2]| {
+            [0, 1].map(|end| {
+                let at = end * (y.len() - 2);
+                if at_ends[end] {
+                    known[end]
+                } else {
+                    WindowEnd::Fixed { w: y[at], slope: y[at + 1] }
+                }
+            })
+        };
+        let [ends, bound_ends] = [self.prepared.ends, self.prepared.bound_ends].map(ends_of);
         let effort = interior_point::Effort {
             tolerance: self.effort.tolerance,
             max_iterations: self.effort.max_iterations,
@@ -176,8 +200,26 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             watch: self.effort.watch,
         };
         let mut window = self.prepared.window(range.clone());
-        let verdict = window.improve(ends, &mut y, &effort, space);
-        (y, verdict)
+        let own = self.effort.proves.then(|| {
+            let mut own = window.rows.clone();
+            own.drop_at_ends(&bound_ends);
+            own
+        });
+        window.rows.drop_at_ends(&ends);
+        let verdict = window.improve(ends, &mut y, &effort, &mut spaces.exact);
+        let part = own.filter(|_| !core.is_empty() && !self.effort.expired()).map(|rows| {
+            let planned = Planned {
+                rows: &rows,
+                tight: &window.rows,
+                ends: bound_ends,
+                at_ends,
+                x: &y,
+                solved: &spaces.exact,
+            };
+            let core = core.start - range.start..core.end - range.start;
+            lower_bound::part(&planned, core, &effort, &mut spaces.relaxed)
+        });
+        (y, verdict, part)
     }
 
     /// Continues x, planned up to the station `reached`, by the plan y of a window; false if no blend keeps the limits.

@@ -1,0 +1,276 @@
+//! The greatest speed at each collocation point that follows from all limits, in a few passes along a window.
+//!
+//! With w = v², the unit vector q' along the path, and q'' = κ N at right angles to it:
+//!
+//!   acceleration       (q_k'² w)' = 2 q_k' a_k for each axis: bounded by the limits of a_k
+//!   jerk across        N · jerk = ±(κ w^(3/2))': its size is at most Σ |N_k| J_k
+//!   jerk along         q' · jerk = v̈ − κ² v³, so that v̈ ≥ −Σ |q_k'| J_k = −J, and (v³)'' = 3 v̇²/v + 3 v̈ ≥ −3 J
+//!
+//! The first two bound the change of w and of κ w^(3/2) from point to point. By the last one v³ plus twice the integral
+//! of 3 J is convex: it lies below the lower convex hull of its bounds. Each bound makes the others closer.
+//!
+//! The relaxation (`relaxed`) lets jerk exceed its limit where that costs time. It is closer with these speeds.
+
+use super::constraints::Constraints;
+
+/// Rounds of all passes.
+const ROUNDS: usize = 4;
+/// Relative rounding of the sums along a window.
+const ROUNDING: f64 = 1e-12;
+/// q'' jumps where it changes by more than this part of itself at a station; κ w^(3/2) jumps there as well.
+const JUMP: f64 = 1e-6;
+
+struct Point<const M: usize> {
+    first: [f64; M],
+    normal: [f64; M],
+    bend: f64,
+    /// Bounds of w, and of v³ plus the integral.
+    w: f64,
+    convex: f64,
+    /// Arc length and twice the integral of 3 J, from the start of the window.
+    s: f64,
+    integral: f64,
+}
+
+/// The way from a point to the next.
+struct Step<const M: usize> {
+    /// The greatest changes of q_k'² w forward and backward.
+    energy: [[f64; M]; 2],
+    /// The greatest change of κ w^(3/2), and the least κ.
+    bending: f64,
+    straight: f64,
+}
+
+/// Lowers the speed caps of a window.
+pub fn lower<const M: usize>(rows: &mut Constraints<M>) {
+    let (mut points, steps) = points(rows);
+    for _ in 0..ROUNDS {
+        for (n, step) in steps.iter().enumerate() {
+            let (before, after) = points.split_at_mut(n + 1);
+            after[0].lower(&before[n], &step.energy[0], step);
+        }
+        for (n, step) in steps.iter().enumerate().rev() {
+            let (before, after) = points.split_at_mut(n + 1);
+            before[n].lower(&after[0], &step.energy[1], step);
+        }
+        convex(&mut points);
+    }
+    for (n, point) in points.iter().enumerate() {
+        // Limits that do not apply are 0.
+        let speed = &mut rows.intervals[n / 4].speed.values_mut()[n % 4];
+        if *speed > 0.0 {
+            *speed = speed.max(1.0 / point.w);
+        }
+    }
+}
+
+impl<const M: usize> Point<M> {
+    /// Lowers w to what can be reached from another point.
+    fn lower(&mut self, from: &Self, energy: &[f64; M], step: &Step<M>) {
+        // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
+        if self.s == from.s {
+            self.w = self.w.min(from.w);
+        }
+        for k in 0..M {
+            let square = self.first[k] * self.first[k];
+            if square > 0.0 && self.s != from.s {
+                self.w = self.w.min((from.first[k] * from.first[k] * from.w + energy[k]) / square);
+            }
+        }
+        let cubed = |w: f64| w * w.sqrt();
+        let straight = step.straight * cubed(from.w.max(self.w));
+        let bent = (from.bend * cubed(from.w)).min(straight) + step.bending;
+        if bent < self.bend * cubed(self.w) {
+            self.w = (bent / self.bend).cbrt().powi(2);
+        }
+    }
+}
+
+fn points<const M: usize>(rows: &Constraints<M>) -> (Vec<Point<M>>, Vec<Step<M>>) {
+    let jerk = rows.per_jerk.map(|per| 1.0 / per);
+    let most =
+        |k: usize, side: bool| rows.acceleration.most[k][usize::from(side)] / rows.acceleration.per_mean[k];
+    let along = |direction: &[f64; M]| (0..M).map(|k| direction[k].abs() * jerk[k]).sum::<f64>();
+    let mut points: Vec<Point<M>> = Vec::with_capacity(4 * rows.intervals.len());
+    let mut steps = Vec::with_capacity(4 * rows.intervals.len());
+    let mut slope = 0.0;
+    for interval in &rows.intervals {
+        for lane in 0..4 {
+            let [first, second] =
+                [0, 1].map(|order| std::array::from_fn(|k| interval.q[k][order].values()[lane]));
+            let bend = length(&second);
+            let normal = second.map(|second: f64| second / bend.max(f64::MIN_POSITIVE));
+            let across: f64 = (0..M).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
+            let w = (1.0 / interval.speed.values()[lane]).min(across / bend);
+            let mut next = Point { first, normal, bend, w, convex: 0.0, s: 0.0, integral: 0.0 };
+            if let Some(last) = points.last() {
+                let h = if lane == 0 { 0.0 } else { interval.h / 3.0 };
+                let change = 3.0 * 0.5 * (along(&last.first) + along(&next.first)) * h;
+                next.s = last.s + h;
+                next.integral = last.integral + h * (slope + 0.5 * change);
+                slope += change;
+                steps.push(step(last, &next, h, &along, length(&jerk), &most));
+            }
+            points.push(next);
+        }
+    }
+    (points, steps)
+}
+
+fn step<const M: usize>(
+    last: &Point<M>,
+    next: &Point<M>,
+    h: f64,
+    along: &impl Fn(&[f64; M]) -> f64,
+    all: f64,
+    most: &impl Fn(usize, bool) -> f64,
+) -> Step<M> {
+    let energy = [false, true].map(|back| {
+        std::array::from_fn(|k| {
+            let (a, b) = (last.first[k], next.first[k]);
+            // Acceleration against the axis is negative; on the way back the signs change.
+            h * (a.abs() + b.abs()) * most(k, (a + b < 0.0) != back)
+        })
+    });
+    let bends = [last, next].map(|point| point.normal.map(|part| part * point.bend));
+    let apart = difference(&bends[0], &bends[1]);
+    if h == 0.0 {
+        let jumps = length(&apart) > JUMP * (last.bend + next.bend);
+        let bending = if jumps { f64::INFINITY } else { 0.0 };
+        return Step { energy, bending, straight: f64::INFINITY };
+    }
+    // On an arc of N between the points, Σ |N_k| J_k exceeds both ends by 1/cos of half its angle at most.
+    let turn = length(&difference(&last.normal, &next.normal));
+    let steep = along(&last.normal).max(along(&next.normal)) * (1.0 + turn * turn / 6.0);
+    // The least |q''| where q'' changes evenly.
+    let back: f64 = (0..M).map(|k| -bends[0][k] * apart[k]).sum();
+    let part = (back / length(&apart).powi(2).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let straight = length::<M>(&std::array::from_fn(|k| bends[0][k] + part * apart[k]));
+    Step { energy, bending: h * if turn < 1.0 { steep.min(all) } else { all }, straight }
+}
+
+/// Lowers w to the lower convex hull of v³ plus the integral over the arc length.
+fn convex<const M: usize>(points: &mut [Point<M>]) {
+    let mut hull: Vec<usize> = vec![];
+    for n in 0..points.len() {
+        points[n].convex = points[n].w * points[n].w.sqrt() + points[n].integral;
+        let above = |a: usize, b: usize| {
+            let [a, b, c] = [&points[a], &points[b], &points[n]];
+            (b.convex - a.convex) * (c.s - a.s) >= (c.convex - a.convex) * (b.s - a.s)
+        };
+        while hull.len() > 1 && above(hull[hull.len() - 2], hull[hull.len() - 1]) {
+            hull.pop();
+        }
+        hull.push(n);
+    }
+    for pair in hull.windows(2) {
+        let [(s, convex), (end, last)] = [pair[0], pair[1]].map(|n| (points[n].s, points[n].convex));
+        for point in &mut points[pair[0] + 1..pair[1]] {
+            let most = convex + (last - convex) * (point.s - s) / (end - s);
+            // Where rounding takes the digits of a low speed, it stays as it is.
+            if most < (1.0 - ROUNDING) * point.convex {
+                point.w = (most - point.integral).max(0.0).cbrt().powi(2);
+            }
+        }
+    }
+}
+
+fn length<const M: usize>(vector: &[f64; M]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
+}
+
+fn difference<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+    std::array::from_fn(|k| b[k] - a[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Geometry, Limits, PathPoint};
+    use super::*;
+
+    /// A plane curve with the curvature c s, seen from the middle of its length.
+    struct Clothoid(f64);
+
+    impl Geometry<2> for Clothoid {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 2.0]
+        }
+
+        fn at(&self, _: usize, s: f64) -> PathPoint<2> {
+            let (c, s) = (self.0, s - 1.0);
+            let (sin, cos) = (0.5 * c * s * s).sin_cos();
+            let (bend, more) = (c * s, c * c * s * s);
+            PathPoint {
+                first: [cos, sin],
+                second: [-bend * sin, bend * cos],
+                third: [-c * sin - more * cos, c * cos - more * sin],
+                speed_cap: 100.0,
+            }
+        }
+    }
+
+    /// 1/w on 40 intervals of 2 mm, lowered; `cap` in mm/s at the stations.
+    fn lowered(c: f64, acceleration: f64, cap: impl Fn(usize) -> f64) -> Vec<f64> {
+        let limits =
+            Limits { velocity: [[1e3; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };
+        let stations: Vec<f64> = (0..=40).map(|n| 0.05 * n as f64).collect();
+        let mut rows = Constraints::sample(&Clothoid(c), &limits, &stations, &[0; 40], &[1.0; 40], cap);
+        lower(&mut rows);
+        (0..40).map(|n| 1.0 / rows.intervals[n].speed.values()[0]).collect()
+    }
+
+    /// Two lines along the second axis; the first one moves the first axis by rounding.
+    struct Rounded;
+
+    impl Geometry<2> for Rounded {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 1.0, 2.0]
+        }
+
+        fn at(&self, piece: usize, _: f64) -> PathPoint<2> {
+            let first = [if piece == 0 { 1e-15 } else { 0.0 }, 1.0];
+            PathPoint { first, second: [0.0; 2], third: [0.0; 2], speed_cap: 100.0 }
+        }
+    }
+
+    #[test]
+    fn rounding_at_a_knot_is_no_limit() {
+        let limits = Limits { velocity: [[1e3; 2]; 2], acceleration: [[1e3; 2]; 2], jerk: [50_000.0; 2] };
+        let stations = [0.0, 0.5, 1.0, 1.5, 2.0];
+        let mut rows =
+            Constraints::sample(&Rounded, &limits, &stations, &[0, 0, 1, 1], &[1.0; 4], |_| f64::INFINITY);
+        lower(&mut rows);
+        for interval in &rows.intervals {
+            assert!(interval.speed.values().iter().all(|per_w| (1e4 * per_w - 1.0).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn a_curvature_that_rises_evenly_limits_the_speed_by_hand() {
+        // κ w^(3/2) = c |s| w^(3/2) is at most J |s| where the path goes along one axis: v ≤ (J/c)^(1/3).
+        let w = lowered(0.4, 1e9, |_| f64::INFINITY);
+        let by_hand = (50_000.0f64 / 0.4).powf(2.0 / 3.0);
+        for n in [16, 19, 22, 24] {
+            assert!(w[n] >= by_hand * (1.0 - 1e-9) && w[n] < 1.02 * by_hand, "{} and {by_hand}", w[n]);
+        }
+    }
+
+    #[test]
+    fn acceleration_is_lost_within_the_limit_of_jerk() {
+        // From v³ = 1 at stations 0.8 mm apart, v³ rises by 3/2 J d² at most half-way, with d = 0.4 mm.
+        let w = lowered(0.0, 1e9, |station| if station == 10 || station == 26 { 1.0 } else { f64::INFINITY });
+        let by_hand = 1.0 + 1.5 * 50_000.0 * 0.16;
+        assert!((w[18].powf(1.5) / by_hand - 1.0).abs() < 1e-6, "{} and {by_hand}", w[18].powf(1.5));
+        assert!((w[10] - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn speed_is_gained_within_the_limit_of_acceleration() {
+        // w' = 2 A along an axis.
+        let w = lowered(0.0, 100.0, |station| if station == 10 { 1.0 } else { f64::INFINITY });
+        for n in [0, 9, 11, 30] {
+            let by_hand = 1.0 + 200.0 * 0.05 * (n as f64 - 10.0).abs();
+            assert!((w[n] / by_hand - 1.0).abs() < 1e-9, "{} and {by_hand}", w[n]);
+        }
+    }
+}
