@@ -534,9 +534,8 @@ fn phase_between<const M: usize>(
     let duration = cubic_time(h, &ends);
     let [start, end] = ends;
     let rounding = 3.0 * end.v * (f64::EPSILON * end.v * end.v + 2.0 * end.a.abs() * off) / (h * h);
-    // Half of the change of the jerk, from w'' = 2 a' at both ends.
-    let slopes = 2.0 * (start.a + end.a) - 2.0 * (end.v - start.v) * (end.v + start.v) / h;
-    let change = 1.5 * (slopes / h * end.v).abs();
+    let [from, to] = cubic_jerks(h, &ends);
+    let change = 0.5 * (to - from).abs();
     if change <= NOISE * rounding {
         let first = path.at(part, start.s).first;
         let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
@@ -546,6 +545,15 @@ fn phase_between<const M: usize>(
         }
     }
     Phase { kind: SPEED_CUBIC, value: 0.0, ends, duration }
+}
+
+/// The jerk v w''/2 at both ends of the cubic w = v² between two states at the distance h.
+fn cubic_jerks(h: f64, [from, to]: &[State; 2]) -> [f64; 2] {
+    let slope = (to.v - from.v) * (to.v + from.v) / h;
+    [
+        from.v * (3.0 * slope - 4.0 * from.a - 2.0 * to.a) / h,
+        to.v * (2.0 * from.a + 4.0 * to.a - 3.0 * slope) / h,
+    ]
 }
 
 /// ∫ ds/√w of the cubic w between two states at the distance h, in s.
@@ -582,6 +590,14 @@ mod tests {
         // 10 to 30 mm/s at 200 mm/s²: 2 mm, 0.1 s.
         let ends = [State { s: 1.0, v: 10.0, a: 200.0 }, State { s: 3.0, v: 30.0, a: 200.0 }];
         assert!((cubic_time(2.0, &ends) - 0.1).abs() < 1e-9, "{}", cubic_time(2.0, &ends));
+    }
+
+    #[test]
+    fn the_jerk_of_a_cubic_changes_with_its_speed_though_its_second_derivative_is_constant() {
+        // w = 4 + 6 s + 16 s² from s = 0 to 1: v = 2 and √26, a = 3 and 19, w'' = 32.
+        let ends = [State { s: 5.0, v: 2.0, a: 3.0 }, State { s: 6.0, v: 26f64.sqrt(), a: 19.0 }];
+        let [from, to] = cubic_jerks(1.0, &ends);
+        assert!((from - 32.0).abs() < 1e-12 && (to - 16.0 * 26f64.sqrt()).abs() < 1e-12, "{from} {to}");
     }
 
     #[test]
