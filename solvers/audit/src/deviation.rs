@@ -28,7 +28,7 @@ const FEW: usize = 8;
 const BLOCK: usize = 2048;
 
 /// The path on its own: finite numbers, piece on piece, within the travel of the axes.
-pub fn audit_path<const M: usize>(
+pub(crate) fn audit_path<const M: usize>(
     path: &Followed,
     phases: Option<&Phases>,
     limits: &Limits<M>,
@@ -103,7 +103,7 @@ pub fn offer_travel<const M: usize>(
 }
 
 /// The path against the program.
-pub fn audit_deviation<const M: usize>(
+pub(crate) fn audit_deviation<const M: usize>(
     path: &Followed,
     program: &Programmed,
     phases: Option<&Phases>,

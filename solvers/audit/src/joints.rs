@@ -1,7 +1,6 @@
 //! The audit of plans whose limits belong to joints that are not the path's axes: by the recorded formula of the kinematics.
 
 pub mod formula;
-pub mod kernels;
 pub mod path;
 mod phase_jerk;
 mod phase_motion;

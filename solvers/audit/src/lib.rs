@@ -6,27 +6,28 @@
 //!
 //! The path: `curve`, `polygon`, `hodographs`, `nearest`; the program: `moves`, `deviation`. The profile: `phases`, `phase_motion`,
 //! `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `profile`. Setpoints: `setpoints`, `differences`; with their plan
-//! `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`.
+//! `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
 
-pub mod against_plan;
+mod against_plan;
 pub mod curve;
-pub mod deviation;
-pub mod differences;
-pub mod hodographs;
+mod deviation;
+mod differences;
+mod hodographs;
 pub mod joints;
+pub mod kernels;
 pub mod moves;
-pub mod nearest;
+mod nearest;
 mod peak;
-pub mod phase_by_length;
-pub mod phase_jerk;
-pub mod phase_motion;
-pub mod phase_time;
+mod phase_by_length;
+mod phase_jerk;
+mod phase_motion;
+mod phase_time;
 pub mod phases;
-pub mod polygon;
-pub mod profile;
+mod polygon;
+mod profile;
 pub mod profile_clock;
 pub mod setpoints;
-pub mod speed_by_length;
+mod speed_by_length;
 pub mod tracking;
 
 /// Told of how many more phases, pieces or moves have been looked at; it may end the audit by unwinding.

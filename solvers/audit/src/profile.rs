@@ -36,7 +36,7 @@ const SHORTEST: f64 = 1e-8;
 const BLOCK: usize = 4096;
 
 /// The whole profile: phases, joints, ends of runs. `junction_speed` has one more entry than the path has pieces.
-pub fn audit_profile<const M: usize>(
+pub(crate) fn audit_profile<const M: usize>(
     path: &Followed,
     junction_speed: &[f64],
     phases: &Phases,

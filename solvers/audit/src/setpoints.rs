@@ -75,7 +75,7 @@ impl<const M: usize> Stream<M> {
     }
 
     /// The next setpoints; `plan` must be the same every time. What `seen` ends is of no more use.
-    pub fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
+    pub(crate) fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
         rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| Row {
@@ -115,7 +115,7 @@ impl<const M: usize> Stream<M> {
     }
 
     /// The end of the stream: what the last setpoints alone can show.
-    pub fn finish(self, plan: Option<&Plan>) -> Tally<M> {
+    pub(crate) fn finish(self, plan: Option<&Plan>) -> Tally<M> {
         let plan = plan.map(|plan| plan.with_clock(&self.clock));
         let plan = plan.as_ref();
         let rows = &self.kept;

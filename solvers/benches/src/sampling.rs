@@ -103,7 +103,7 @@ fn setpoints(c: &mut Criterion) {
                     dwell: vec![0.0],
                 };
                 let period = time / (SETPOINTS - 1) as f64;
-                let sampler = Sampler::new(path.into(), phases, &[0, PIECES], period, Watch::default())
+                let sampler = Sampler::on(&path.into(), phases, &[0, PIECES], period, Watch::default())
                     .expect("a profile");
                 let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{law:?}"));
                 group.bench_function(name, |b| {

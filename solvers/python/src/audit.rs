@@ -12,11 +12,9 @@ use super::with_padded_axes;
 use super::work::run;
 
 use feedplan_audit::curve::{Followed, Pieces};
-use feedplan_audit::deviation::{audit_deviation, audit_path};
-
+use feedplan_audit::kernels::{PlanKernels, SetpointKernels};
 use feedplan_audit::moves::Programmed;
 use feedplan_audit::phases::Phases;
-use feedplan_audit::profile::audit_profile;
 use feedplan_audit::profile_clock::ProfileClock;
 use feedplan_audit::setpoints::{Chunk, Stream};
 use feedplan_audit::tracking::Plan;
@@ -261,14 +259,14 @@ fn audit_plan(
             // About what each takes of the time.
             let [of_path, of_profile, of_deviation] = [0.05, 0.45, 0.5].map(|share| watch.part(share));
             let seen = |count| of_path.each(pieces).advance(count);
-            let mut tally = audit_path(&path, phases.as_ref(), &limits, &seen);
+            let mut tally = limits.path(&path, phases.as_ref(), &seen);
             if let Some(phases) = &phases {
                 let seen = |count| of_profile.each(phases.len()).advance(count);
-                tally = tally.merge(audit_profile(&path, junction_speed, phases, &limits, &seen));
+                tally = tally.merge(limits.profile(&path, junction_speed, phases, &seen));
             }
             if let Some(program) = &program {
                 let seen = |count| of_deviation.each(pieces + program.len()).advance(count);
-                tally = tally.merge(audit_deviation(&path, program, phases.as_ref(), &seen));
+                tally = tally.merge(limits.deviation(&path, program, phases.as_ref(), &seen));
             }
             findings(&tally, path.axes)
         })
@@ -295,16 +293,19 @@ trait AnyStream: Send + Sync {
     fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings;
 }
 
-impl<const M: usize> AnyStream for Stream<M> {
+impl<const M: usize> AnyStream for Stream<M>
+where
+    Stream<M>: SetpointKernels<M>,
+{
     fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch) {
         // Places are found, then judged.
         let each = watch.each(2 * chunk.t.len());
-        Stream::push(self, plan, chunk, &|count| each.advance(count));
+        self.take(plan, chunk, &|count| each.advance(count));
     }
 
     fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings {
         let axes = self.axes();
-        findings(&Stream::finish(*self, plan), axes)
+        findings(&self.verdict(plan), axes)
     }
 }
 

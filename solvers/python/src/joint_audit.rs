@@ -15,10 +15,10 @@ use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::joints::formula::Formula;
-use feedplan_audit::joints::kernels::Kernels;
 use feedplan_audit::joints::path::{JointPath, Words};
 use feedplan_audit::joints::profile::JointAudit;
 use feedplan_audit::joints::setpoints::JointSetpoints;
+use feedplan_audit::kernels::JointKernels;
 use feedplan_audit::setpoints::Chunk;
 use feedplan_geometry::watch::Watch;
 
@@ -197,7 +197,7 @@ trait AnyStream: Send + Sync {
 
 impl<const M: usize> AnyStream for JointSetpoints<M>
 where
-    for<'a> JointAudit<'a, M>: Kernels<M>,
+    for<'a> JointAudit<'a, M>: JointKernels<M>,
 {
     fn push(
         &mut self,
@@ -207,13 +207,13 @@ where
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         of.kept.with::<M, _>(of.problem.bind(py), of.profile.get(), &of.limits, progress, |audit, _| {
-            audit.push(self, chunk);
+            audit.take(self, chunk);
         })
     }
 
     fn finish(self: Box<Self>, of: &Compared, py: Python<'_>) -> PyResult<Findings> {
         of.kept.with::<M, _>(of.problem.bind(py), of.profile.get(), &of.limits, None, |audit, _| {
-            findings(&audit.finish(*self), audit.path.joints)
+            findings(&audit.verdict(*self), audit.path.joints)
         })
     }
 }

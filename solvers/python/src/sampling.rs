@@ -16,6 +16,7 @@ use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_setpoints::phase_motion::Phase;
 use feedplan_setpoints::sampling::{Chunk, Interpolator, Resume, Sampler};
+use feedplan_setpoints::{Sampled, States};
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
@@ -111,7 +112,7 @@ impl PySampler {
         };
         let runs = profile.runs.iter().map(offset).collect::<PyResult<Vec<_>>>()?;
         let sampler = with_padded_axes!(axes, M, {
-            let path = problem.rows::<M>()?.path.clone();
+            let path = &problem.rows::<M>()?.path;
             let sampler = run(py, progress.as_ref(), |watch| {
                 let count = profile.piece.len();
                 let each = watch.part(0.5).each(count);
@@ -120,7 +121,7 @@ impl PySampler {
                     phase(profile, i, axes)
                 };
                 let phases = (0..count).map(counted).collect::<Result<Vec<_>, String>>()?;
-                Sampler::new(path, phases, &runs, period, watch.part(0.5))
+                path.sampled(phases, &runs, period, watch.part(0.5))
             })?;
             sampler.map(InAxes::new).map_err(InputError::new_err)
         })?;
@@ -164,7 +165,9 @@ impl PySampler {
         let state = || self.resume.lock().unwrap_or_else(PoisonError::into_inner);
         let mut next = *state();
         let chunk = with_padded_axes!(self.axes, M, {
-            self.states::<M>(py, |sampler, watch| sampler.chunk(start..stop, interpolator, &mut next, watch))
+            self.states::<M>(py, |sampler, watch| {
+                sampler.setpoints(start..stop, interpolator, &mut next, watch)
+            })
         })?;
         *state() = next;
         Ok(chunk)
@@ -173,7 +176,11 @@ impl PySampler {
     /// The states at times of the plan's own clock.
     fn at<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'_, f64>) -> PyResult<ChunkArrays<'py>> {
         let times = slice(&times)?;
-        with_padded_axes!(self.axes, M, self.states::<M>(py, |sampler, watch| sampler.at(times, watch)))
+        with_padded_axes!(
+            self.axes,
+            M,
+            self.states::<M>(py, |sampler, watch| sampler.states_at(times, watch))
+        )
     }
 
     /// The states at places of the path.
@@ -188,7 +195,7 @@ impl PySampler {
             return Err(PyValueError::new_err(format!("{} pieces and {} parameters", piece.len(), u.len())));
         }
         with_padded_axes!(self.axes, M, {
-            self.states::<M>(py, |sampler, watch| sampler.along(piece, u, watch))
+            self.states::<M>(py, |sampler, watch| sampler.states_along(piece, u, watch))
         })
     }
 }

@@ -3,3 +3,31 @@
 pub mod csv;
 pub mod phase_motion;
 pub mod sampling;
+
+use std::ops::Range;
+
+use feedplan_geometry::instances;
+use feedplan_geometry::watch::Watch;
+
+use phase_motion::Phase;
+use sampling::{Chunk, Interpolator, Resume, Sampler};
+
+instances! {
+    /// Setpoints of a path.
+    pub trait Sampled for [3, 6, 9] std::sync::Arc<sampling::PathData<M>> = {
+        /// Lays the times of the setpoints of a profile: its phases, the phase offsets of its runs, and the period in s. The
+        /// error is a sentence for the user.
+        fn sampled(&self, phases: Vec<Phase>, runs: &[usize], period: f64, watch: Watch)
+            -> Result<Sampler<M>, String> = Sampler::on;
+    }
+}
+
+instances! {
+    /// The states of a profile; see the methods of `Sampler` that are named here.
+    pub trait States for [3, 6, 9] Sampler<M> = {
+        fn setpoints(&self, range: Range<usize>, interpolator: Interpolator, resume: &mut Option<Resume>, watch: Watch)
+            -> Chunk<M> = Sampler::chunk;
+        fn states_at(&self, times: &[f64], watch: Watch) -> Chunk<M> = Sampler::at;
+        fn states_along(&self, pieces: &[u32], u: &[f64], watch: Watch) -> Chunk<M> = Sampler::along;
+    }
+}

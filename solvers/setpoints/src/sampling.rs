@@ -126,14 +126,14 @@ impl<const M: usize> PathData<M> {
 
 impl<const M: usize> Sampler<M> {
     /// Lays the time grid. `phase_runs` are the phase offsets of the runs. The error is a sentence for the user.
-    pub fn new(
-        path: Arc<PathData<M>>,
+    pub fn on(
+        path: &Arc<PathData<M>>,
         phases: Vec<Phase>,
         phase_runs: &[usize],
         period: f64,
         watch: Watch,
     ) -> Result<Self, String> {
-        check(&path, &phases, phase_runs, watch)?;
+        check(path, &phases, phase_runs, watch)?;
         if !(period.is_finite() && period > 0.0) {
             return Err(format!("the period is {period} s: give a positive one"));
         }
@@ -189,7 +189,7 @@ impl<const M: usize> Sampler<M> {
             begin += time + path.dwell[r];
         }
         let count = first as usize + 1;
-        let sampler = Self { path, phases, starts, runs, period, count, ends_moving };
+        let sampler = Self { path: path.clone(), phases, starts, runs, period, count, ends_moving };
         match sampler.start() {
             Some((speed, ..)) if speed > 0.0 && sampler.path.start_dwell > 0.0 => Err(format!(
                 "line {}: the plan begins at {speed:.6} mm/s, but the program pauses {} s there: plan with start speed 0",

@@ -68,7 +68,7 @@ struct Reach<const M: usize> {
 
 /// Velocity, acceleration and jumps of the joints, feed, chord error, times and order of the phases; where the limits say so
 /// the jerk of the joints too, and the jumps of their accelerations.
-pub(super) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: Seen) -> Tally<M> {
+pub(crate) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: Seen) -> Tally<M> {
     let mut tally = Tally::default();
     let good = order(audit, &mut tally);
     let phases: Vec<usize> = (0..audit.phases.len()).filter(|&phase| good[phase]).collect();

@@ -81,7 +81,7 @@ pub struct JointSetpoints<const M: usize> {
 }
 
 impl<const M: usize> JointSetpoints<M> {
-    pub(super) fn new(audit: &JointAudit<M>) -> Self {
+    pub(crate) fn new(audit: &JointAudit<M>) -> Self {
         let (phases, path) = (&audit.phases, &audit.path.path);
         let runs = phases.runs;
         let is_usable = !phases.is_empty()
@@ -100,7 +100,7 @@ impl<const M: usize> JointSetpoints<M> {
     }
 
     /// The next setpoints; the last of them waits for the next chunk.
-    pub(super) fn push(&mut self, audit: &JointAudit<M>, chunk: &Chunk) {
+    pub(crate) fn push(&mut self, audit: &JointAudit<M>, chunk: &Chunk) {
         if !self.is_usable || chunk.t.is_empty() {
             return;
         }
@@ -119,7 +119,7 @@ impl<const M: usize> JointSetpoints<M> {
     }
 
     /// The last setpoint must be the end of the path.
-    pub(super) fn finish(mut self, audit: &JointAudit<M>) -> Tally<M> {
+    pub(crate) fn finish(mut self, audit: &JointAudit<M>) -> Tally<M> {
         let Some(row) = self.held.take() else {
             if self.is_usable {
                 self.tally.offer(Check::Place, 0, f64::INFINITY, PLACE_TOLERANCE, 0.0, 0);

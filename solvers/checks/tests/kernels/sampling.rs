@@ -49,7 +49,7 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
 fn sampler(period: f64) -> Sampler<2> {
     let (line, phases) = triangle();
     let path = path_of(&line);
-    Sampler::new(path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).unwrap()
+    Sampler::on(&path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).unwrap()
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn nonsense_is_refused_with_a_sentence() {
         let (line, mut phases) = triangle();
         change(&mut phases[1]);
         let path = path_of(&line);
-        Sampler::new(path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).err()
+        Sampler::on(&path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).err()
     };
     assert!(build(&|_| (), 0.001).is_none());
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12, 5e-324] {
