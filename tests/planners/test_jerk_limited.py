@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
@@ -161,6 +162,25 @@ def test_a_piece_of_a_nanometre_keeps_the_limit_of_jerk() -> None:
     assert (profile.kind == PhaseLaw.PATH_JERK).sum() == 3
     assert jerk_excess(problem, profile).worst <= EXCESS
     assert audit(problem, profile, CURVES, jerk=True).ok
+
+
+def test_turns_after_a_long_way_keep_the_limit_of_jerk(tmp_path: FilePath) -> None:
+    # The length from the start, 1.2 km, has a rounding error of 2e-10 mm, and the phases in the turns are as
+    # short as 1e-4 mm.
+    turns = """\
+X4.5705 Y58.4434 Z1.4321
+X4.5903 Y58.4430 Z1.4320
+X4.6004 Y58.1009 Z1.5442
+X4.6116 Y57.7857 Z1.6607
+X4.6240 Y57.4939 Z1.7817
+X4.6373 Y57.2233 Z1.9078
+X4.6515 Y56.9683 Z2.0411
+X4.6665 Y56.7251 Z2.1839
+"""
+    file = tmp_path / "far.ngc"
+    file.write_text(f"G64 P0.01\nG0 X4.57 Y58.44 Z1.43\nG1 F30000 Y-600000\nF4000\n{turns}M2\n")
+    made = plan_program(file, "mill", method="jerk-limited")
+    assert audited(made.problem, made.profile, made.machine) == ()
 
 
 # Turns so sharp that the tool rests at them or nearly, rests beside turns, cusps on lines and on curves of

@@ -4,8 +4,6 @@
 //! Three laws, of `feedplan.profile.PhaseLaw`: the feed is held, the jerk along the path is constant, or v² is a cubic of
 //! the arc length. All stay what they are where a phase is cut at the end of a piece. Lengths in mm, times in s.
 
-use std::ops::Range;
-
 use crate::arc_length_path::{speed_sq, ArcLengthPath};
 use crate::jerk_limited::{Geometry, Profile, Ramp};
 use crate::s_curve::{Section, SegmentEnd};
@@ -373,9 +371,10 @@ impl JerkProfile {
 
     /// Appends a profile of the jerk-limited planner on a part of a subrun.
     ///
-    /// Phases near rest are so short that the rounding of u changes their lengths, and w'' by some hundred times as
-    /// much. So the lengths of phases are measured between the rounded parameters, and each state is moved along its
-    /// profile to the end of its phase. These moves add up from the nearer end of each part.
+    /// Arc lengths far along a path, and parameters next to rest, have too few digits for short phases: what rounding
+    /// changes in their lengths shows some hundred times as much in w''. So the lengths of phases are measured between
+    /// the rounded parameters, and each state is moved along its profile to the end of its phase. These moves add up
+    /// from both ends of the profile; the longest phase, in which they show least, takes their difference.
     pub fn push_profile<const M: usize>(
         &mut self,
         problem: &Problem<M>,
@@ -383,67 +382,100 @@ impl JerkProfile {
         jerk_limits: &[f64; M],
         profile: &Profile,
     ) {
-        let (s, knots, ends) = (&profile.s, path.knots(), profile.ends);
+        let (s, ends) = (&profile.s, profile.ends);
         let last = s.len() - 1;
-        let (mut first, mut part) = (0, path.part(s[0]));
-        while first < last {
-            problem.watch.check_at(part);
-            while knots[part + 1] <= s[first] && part + 1 < path.parts.len() {
-                part += 1;
-            }
-            let at = path.parts[part];
-            let end = first + s[first..].partition_point(|&s| s <= knots[part + 1]) - 1;
-            let ends_of_part = [knots[part].max(ends[0]), knots[part + 1].min(ends[1])];
-            let [from, to] = ends_of_part.map(|s| path.locate(part, s));
-            let mut u = vec![from];
-            u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
-            u.push(to);
-            let lengths: Vec<f64> = u.windows(2).map(|u| path.length_between(part, u[0], u[1])).collect();
-            let meeting = moved_from_start(&s[first..=end], ends_of_part);
-            let mut states = moved_states(profile, first..end + 1, ends_of_part, meeting, &lengths);
-            let count = states.len();
-            if first == 0 && s[0] > ends[0] {
-                let within = part == 0;
-                let length = if within { lengths[0] } else { s[0] - ends[0] };
-                let OnRamp { jerk, duration, ends: [from, to] } =
-                    OnRamp::new(Ramp { length, ..profile.ramp(0) }, states[0].v);
-                let rest = State { s: ends[0], v: 0.0, a: from };
-                states[0].a = to;
-                if within {
-                    let phase = Phase { kind: PATH_JERK, value: jerk, ends: [rest, states[0]], duration };
-                    self.push(problem, at.piece, [u[0], u[1]], &phase);
-                } else {
-                    self.push_jerk(problem, path, [rest, states[0]], jerk, duration);
-                }
-            }
-            let stops = end == last && s[last] < ends[1];
-            let within = part + 1 == path.parts.len();
-            let length = if within { lengths[count] } else { ends[1] - s[last] };
+        let ways = ways_between(problem, path, s);
+        // A ramp within one part has its own length between rounded parameters.
+        let ramp_way = |end: usize, from: f64, to: f64| {
+            let part = [0, path.parts.len() - 1][end];
+            (from < to && path.part(if end == 0 { to } else { from }) == part)
+                .then(|| Way::new(path, part, [from, to]))
+        };
+        let ramp_ways = [ramp_way(0, ends[0], s[0]), ramp_way(1, s[last], ends[1])];
+        let (mut states, meeting, off) = moved_states(profile, &ways, &ramp_ways);
+        if s[0] > ends[0] {
+            let length = ramp_ways[0].as_ref().map_or(s[0] - ends[0], |way| way.length);
             let OnRamp { jerk, duration, ends: [from, to] } =
-                OnRamp::new(Ramp { length, ..profile.ramp(1) }, states[count - 1].v);
-            if stops {
-                states[count - 1].a = -to;
-            }
-            for n in 1..count {
-                // Where the moves from both knots meet, the phase has the rounding of s.
-                let off = if n == meeting.clamp(1, count - 1) { f64::EPSILON * s[first + n] } else { 0.0 };
-                let phase =
-                    phase_between(path, jerk_limits, part, (lengths[n], off), [states[n - 1], states[n]]);
-                self.push(problem, at.piece, [u[n], u[n + 1]], &phase);
-            }
-            if stops {
-                let rest = State { s: ends[1], v: 0.0, a: -from };
-                let from = states[count - 1];
-                if within {
-                    let phase = Phase { kind: PATH_JERK, value: jerk, ends: [from, rest], duration };
-                    self.push(problem, at.piece, [u[count], u[count + 1]], &phase);
-                } else {
-                    self.push_jerk(problem, path, [from, rest], jerk, duration);
-                }
-            }
-            first = end;
+                OnRamp::new(Ramp { length, ..profile.ramp(0) }, states[0].v);
+            states[0].a = to;
+            let ends = [State { s: ends[0], v: 0.0, a: from }, states[0]];
+            self.push_ramp(
+                problem,
+                path,
+                ramp_ways[0].as_ref(),
+                Phase { kind: PATH_JERK, value: jerk, ends, duration },
+            );
+        }
+        let to_rest = (s[last] < ends[1]).then(|| {
+            let length = ramp_ways[1].as_ref().map_or(ends[1] - s[last], |way| way.length);
+            OnRamp::new(Ramp { length, ..profile.ramp(1) }, states[last].v)
+        });
+        if let Some(ramp) = &to_rest {
+            states[last].a = -ramp.ends[1];
+        }
+        for (n, way) in ways.iter().enumerate() {
+            problem.watch.check_at(n);
+            let off = if n == meeting { off } else { 0.0 };
+            let phase =
+                phase_between(path, jerk_limits, way.part, (way.length, off), [states[n], states[n + 1]]);
+            self.push(problem, path.parts[way.part].piece, way.u, &phase);
+        }
+        if let Some(OnRamp { jerk, duration, ends: [from, _] }) = to_rest {
+            let ends = [states[last], State { s: ends[1], v: 0.0, a: -from }];
+            self.push_ramp(
+                problem,
+                path,
+                ramp_ways[1].as_ref(),
+                Phase { kind: PATH_JERK, value: jerk, ends, duration },
+            );
         }
     }
+
+    fn push_ramp<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ArcLengthPath<M>,
+        way: Option<&Way>,
+        phase: Phase,
+    ) {
+        match way {
+            Some(way) => self.push(problem, path.parts[way.part].piece, way.u, &phase),
+            None => self.push_jerk(problem, path, phase.ends, phase.value, phase.duration),
+        }
+    }
+}
+
+/// A way on one part: its parameters, and the length between them in mm.
+struct Way {
+    part: usize,
+    u: [f64; 2],
+    length: f64,
+}
+
+impl Way {
+    fn new<const M: usize>(path: &ArcLengthPath<M>, part: usize, ends: [f64; 2]) -> Self {
+        let u = ends.map(|s| path.locate(part, s));
+        Self { part, u, length: path.length_between(part, u[0], u[1]) }
+    }
+}
+
+/// The ways between neighbouring stations; the knots between them are stations.
+fn ways_between<const M: usize>(problem: &Problem<M>, path: &ArcLengthPath<M>, s: &[f64]) -> Vec<Way> {
+    let (knots, mut part) = (path.knots(), path.part(s[0]));
+    let mut ways: Vec<Way> = Vec::with_capacity(s.len() - 1);
+    for ends in s.windows(2) {
+        problem.watch.check_at(ways.len());
+        while knots[part + 1] <= ends[0] && part + 1 < path.parts.len() {
+            part += 1;
+        }
+        let from = match ways.last() {
+            Some(before) if before.part == part => before.u[1],
+            _ => path.locate(part, ends[0]),
+        };
+        let u = [from, path.locate(part, ends[1])];
+        ways.push(Way { part, u, length: path.length_between(part, u[0], u[1]) });
+    }
+    ways
 }
 
 /// The least time in which an axis reaches its greatest speed, in s.
@@ -474,56 +506,42 @@ impl OnRamp {
     }
 }
 
-/// The number of these stations between two knots that are nearer to the first knot.
-fn moved_from_start(stations: &[f64], [from, to]: [f64; 2]) -> usize {
-    stations.partition_point(|&s| s < 0.5 * (from + to))
-}
-
-/// The states at some stations of a part between two knots, moved to the positions that `lengths` give: those before
-/// `meeting` by the lengths from the first knot, the others by those from the last.
-fn moved_states(
-    profile: &Profile,
-    stations: Range<usize>,
-    [from, to]: [f64; 2],
-    meeting: usize,
-    lengths: &[f64],
-) -> Vec<State> {
-    let s = &profile.s[stations.clone()];
-    let count = s.len();
-    let mut moved = vec![0.0; count];
+/// The states at the stations, moved to the positions that the ways between them give, from both ends of the profile;
+/// the longest way, between whose ends the moves meet; and the error of its length.
+fn moved_states(profile: &Profile, ways: &[Way], ramp_ways: &[Option<Way>; 2]) -> (Vec<State>, usize, f64) {
+    let (s, last) = (&profile.s, ways.len());
+    let meeting = (0..last).fold(0, |most, n| if ways[n].length > ways[most].length { n } else { most });
     // The quadrature error of long phases must not move the states in turns that are shorter than it.
-    let absorb = |miss: f64, length: f64| miss - miss.clamp(-ABSORBED * length, ABSORBED * length);
-    let mut miss = 0.0;
-    for n in 0..count {
-        miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
-        miss = absorb(miss, lengths[n]);
-        if n < meeting && s[n] > from {
-            moved[n] = miss;
-        }
+    let added = |miss: f64, way: &Way, length: f64| {
+        let miss = miss + (way.length - length);
+        miss - miss.clamp(-ABSORBED * way.length, ABSORBED * way.length)
+    };
+    let mut moved = vec![0.0; last + 1];
+    moved[0] = ramp_ways[0].as_ref().map_or(0.0, |way| added(0.0, way, s[0] - profile.ends[0]));
+    for n in 0..meeting {
+        moved[n + 1] = added(moved[n], &ways[n], s[n + 1] - s[n]);
     }
-    let mut miss = 0.0;
-    for n in (0..count).rev() {
-        miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
-        miss = absorb(miss, lengths[n + 1]);
-        if n >= meeting && s[n] < to {
-            moved[n] = miss;
-        }
+    moved[last] = ramp_ways[1].as_ref().map_or(0.0, |way| -added(0.0, way, profile.ends[1] - s[last]));
+    for n in (meeting + 1..last).rev() {
+        moved[n] = -added(-moved[n + 1], &ways[n], s[n + 1] - s[n]);
     }
+    let way = &ways[meeting];
+    let off = way.length - (s[meeting + 1] - s[meeting]) - (moved[meeting + 1] - moved[meeting]);
     let state = |n: usize| {
-        let (d, at) = (moved[n], stations.start + n);
+        let d = moved[n];
         // w'' on the side to which the station moves.
         let bend = profile.at(if d < 0.0 { s[n] * (1.0 - f64::EPSILON) } else { s[n] })[2];
-        let w = profile.speed_sq[at] + d * (profile.slope[at] + 0.5 * d * bend);
-        State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[at] + d * bend) }
+        let w = profile.speed_sq[n] + d * (profile.slope[n] + 0.5 * d * bend);
+        State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[n] + d * bend) }
     };
-    (0..count).map(state).collect()
+    ((0..=last).map(state).collect(), meeting, off.abs())
 }
 
 /// The phase between two states at the distance h on a part, where h has the error `off`.
 ///
 /// v² as a cubic is known by its values at both ends. Their rounding ε v² and the error e of h change the jerk by 3 v
-/// (ε v² + 2 |a| e)/h². That is more than the limit on a phase of a nanometre, or of ten nanometres a metre along the
-/// path. There the accelerations at both ends give a constant jerk: over so short a length it changes only by rounding.
+/// (ε v² + 2 |a| e)/h². That is more than the limit on a phase of a nanometre. There the accelerations at both ends give
+/// a constant jerk: over so short a length it changes only by rounding.
 fn phase_between<const M: usize>(
     path: &ArcLengthPath<M>,
     jerk_limits: &[f64; M],
