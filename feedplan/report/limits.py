@@ -51,14 +51,18 @@ def samples_per_phase(profile: SpeedProfile) -> int:
 
 
 def drawn_phases(profile: SpeedProfile, motion: ToolMotion) -> NDArray[np.int64]:
-    """The phases that have samples: those in which more than rotary axes move, or all if there are none."""
-    return np.flatnonzero(motion.drawn[profile.piece.astype(np.int64)])
+    """The phases that have samples: those in which more than rotary axes move, or all if there are none.
+
+    Every second, third … of them, if all would have too many samples.
+    """
+    drawn = np.flatnonzero(motion.drawn[profile.piece.astype(np.int64)])
+    return drawn[:: 1 + len(drawn) * samples_per_phase(profile) // (_SAMPLES + 1)]
 
 
 def limit_samples(
     problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
 ) -> Iterator[LimitSamples]:
-    """Samples of every phase that has samples, computed for a block of phases at a time."""
+    """Samples of the phases that have samples, computed for a block of phases at a time."""
     count = samples_per_phase(profile)
     drawn = drawn_phases(profile, motion)
     states = sampler(problem, profile, progress=part(progress, 0.0, 0.2))
