@@ -11,7 +11,7 @@ from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine, bundled_machines
-from feedplan.machine.path_derivatives import derivatives, enclosures, interpolation_constants, positions
+from feedplan.machine.path_derivatives import derivatives, enclosures, positions
 from feedplan.machine.rotary import RotaryChain, ToolVector
 from feedplan.machine.singularities import joint_path
 
@@ -58,6 +58,5 @@ def _row(kinematics: Kinematics, count: int) -> dict[str, Cell]:
         "to order 9": cost(partial(derivatives, kinematics, points, width, half, 9)),
         "bounds to 3": cost(partial(enclosures, kinematics, points, width, 3)),
         "bounds to 9": cost(partial(enclosures, kinematics, points, width, 9)),
-        "interpolation": cost(partial(interpolation_constants, kinematics, points, width, 9)),
         "joint path": cost(partial(joint_path, kinematics, points, width)),
     }

@@ -20,10 +20,9 @@ from feedplan.program.program import Program
 __all__ = [
     "Curve", "CurveLength", "JointSetpointAudit", "Moves", "PlanError", "Problem", "Profile", "Sampler",
     "SetpointAudit", "__version__", "audit_joints", "audit_plan", "build_path", "csv_rows", "feed_between",
-    "fit_points", "insert_knot", "joint_constants", "joint_derivatives",
-    "joint_enclosures", "joint_interpolants", "joint_path", "joint_positions", "look_ahead", "lower_bound",
-    "path_segments", "plan_bang_bang", "plan_jerk_limited", "plan_s_curve", "profile_of_sections",
-    "read_gcode",
+    "joint_derivatives", "joint_enclosures", "joint_interpolants", "joint_path", "joint_positions",
+    "look_ahead", "lower_bound", "path_segments", "plan_bang_bang", "plan_jerk_limited", "plan_s_curve",
+    "profile_of_sections", "read_gcode",
 ]  # fmt: skip
 
 _Floats = NDArray[np.float64]
@@ -99,9 +98,6 @@ class Moves:
 def read_gcode(
     source: bytes, name: str, options: Options, progress: _Progress = None
 ) -> tuple[Moves, dict[str, Any]]: ...
-def fit_points(
-    points: _Floats, tolerance: float, max_chord: float, max_curvature: float, corner_angle: float
-) -> tuple[_Floats, _Floats, _Integers, _Floats, _Naturals]: ...
 def build_path(
     program: Program, rules: Rules, motion: Motion | None = None, progress: _Progress = None
 ) -> tuple[
@@ -161,9 +157,6 @@ def joint_derivatives(expression: Expression, tips: TipPieces, fraction: _Floats
 def joint_enclosures(
     expression: Expression, tips: TipPieces, order: int, parts: _Floats | None = None
 ) -> tuple[_Floats, _Floats]: ...
-def joint_constants(
-    expression: Expression, tips: TipPieces, nodes: int, parts: _Floats | None = None
-) -> _Floats: ...
 def joint_path(
     expression: Expression, tips: TipPieces, travel: _Floats | None = None, start: _Floats | None = None
 ) -> tuple[
@@ -176,9 +169,6 @@ def joint_interpolants(
     to_bernstein: _Floats,
     tolerance: _Floats | Accuracy,
 ) -> tuple[_Integers, _Floats, _Floats, _Floats]: ...
-def insert_knot(
-    control_points: _Floats, weights: _Floats | None, knots: _Floats, degree: int, value: float, times: int
-) -> tuple[_Floats, _Floats | None, _Floats]: ...
 
 @final
 class Curve:
@@ -209,10 +199,10 @@ class Curve:
     ) -> tuple[_Naturals, NDArray[np.uint8], _Floats, _Floats, _Floats]: ...
     def regular(self) -> tuple[Curve, _Integers, NDArray[np.bool_]]: ...
     def cusps(self, tolerance: float) -> tuple[_Naturals, _Floats]: ...
-    def lengths(self, accuracy: float, progress: _Progress = None) -> CurveLength: ...
 
 @final
 class CurveLength:
+    def __new__(cls, curve: Curve, accuracy: float, progress: _Progress = None) -> CurveLength: ...
     total: Final[float]
     error: Final[float]
     def lengths(self, piece: _Naturals, u: _Floats) -> _Floats: ...

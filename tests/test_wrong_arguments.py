@@ -16,7 +16,7 @@ import pytest
 import feedplan
 from feedplan import Axis, FeedplanError, Machine, Path
 from feedplan.audit import audit_setpoints
-from feedplan.curves.composite import CompositeCurve, insert_knot, knot_continuity
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.fit_settings import FitSettings
 from feedplan.machine import kinematics
@@ -265,8 +265,6 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         ),
         "CompositeCurve.cusps": (curve.cusps, {"tolerance": 1e-9}),
         "CompositeCurve[]": (curve.__getitem__, {"pieces": slice(0, 1)}),
-        "insert_knot": (insert_knot, {**spline, "value": 0.5, "weights": None, "times": 1}),
-        "knot_continuity": (knot_continuity, {"knots": KNOTS, "degree": 2}),
     }
     for method in feedplan.methods():
         options = options_of(method)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Curve
-from feedplan._solvers import insert_knot as native_insert_knot
 from feedplan.arguments import flag, instance, is_number, is_whole, not_negative, number, positive, shown
 from feedplan.arguments import refuse as refusal
 from feedplan.curves._arrays import floats, places, points, refuse, whole_numbers
@@ -341,35 +340,6 @@ class CompositeCurve(OfNative[Curve]):
         first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         apart = (self.control_points != first).any(axis=1)
         return np.flatnonzero(~np.logical_or.reduceat(apart, self.offsets[:-1]))
-
-
-def insert_knot(
-    control_points: ArrayLike,
-    knots: ArrayLike,
-    degree: int,
-    value: float,
-    weights: ArrayLike | None = None,
-    times: int = 1,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]:
-    """Control points, knots and weights of the same spline with the knot `value` inserted `times` times."""
-    control, weight = points(control_points, weights)
-    number(value, "the knot", "a number")
-    if not is_whole(times, most=2**31 - 1):
-        raise InputError(f"the knot {value} is to be inserted {shown(times)} times: give 1 or more")
-    new, new_weights, new_knots = native_insert_knot(
-        control, weight, floats(knots, "knots", 1), _degree(degree), value, times
-    )
-    return new, new_knots, new_weights
-
-
-def knot_continuity(knots: ArrayLike, degree: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The distinct knots inside the curve, and degree − multiplicity: the continuity each guarantees."""
-    t = floats(knots, "knots", 1)
-    if len(t) < 2 * _degree(degree) + 2:
-        raise InputError(f"{len(t)} knots for degree {degree}: at least {2 * degree + 2} are needed")
-    inner = t[(t > t[degree]) & (t < t[len(t) - degree - 1])]
-    values, multiplicity = np.unique(inner, return_counts=True)
-    return values, degree - multiplicity
 
 
 def _degree(degree: int) -> int:

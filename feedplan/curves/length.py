@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan._solvers import CurveLength as Native
 from feedplan.arguments import one_of
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
@@ -48,7 +49,7 @@ class CurveLength:
             raise InputError("the curve is empty: it has no length table")
         if not 1e-16 <= accuracy < 1:
             raise InputError(f"the accuracy of lengths is {accuracy:g}: give a part from 1e-16 to 1")
-        self._table = curve.native.lengths(accuracy, progress)
+        self._table = Native(curve.native, accuracy, progress)
 
     @property
     def total(self) -> float:

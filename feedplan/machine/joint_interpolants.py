@@ -1,8 +1,7 @@
 """Polynomials that interpolate a joint's motion q'(u), with a proven bound of the error.
 
 q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
-c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u (`path_derivatives.interpolation_constants`), by the
-interpolation error formula
+c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u, by the interpolation error formula
 
     |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
 

@@ -13,7 +13,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan._solvers import joint_constants, joint_derivatives, joint_enclosures, joint_positions
+from feedplan._solvers import joint_derivatives, joint_enclosures, joint_positions
 from feedplan.machine.kinematics import Kinematics
 
 Array = NDArray[np.float64]
@@ -98,23 +98,6 @@ def enclosures(
     pieces = TipPieces.of(control_points, width, weights)
     lo, hi = joint_enclosures(kinematics.recorded, pieces, order, contiguous(parts))
     return Bounds(np.moveaxis(lo, 1, 0), np.moveaxis(hi, 1, 0))
-
-
-def interpolation_constants(
-    kinematics: Kinematics,
-    control_points: ArrayLike,
-    width: ArrayLike,
-    nodes: int,
-    parts: ArrayLike | None = None,
-    weights: ArrayLike | None = None,
-) -> Array:
-    """c ≥ |q^(n+2)|/(n + 1)! (n, joints) on each part, for interpolation of q'' at n = `nodes` points.
-
-    With h the part's width in u, q'' is then met within 2 (n + 1) c (h/4)^n at Chebyshev points. Infinite
-    where the part must be cut smaller.
-    """
-    pieces = TipPieces.of(control_points, width, weights)
-    return joint_constants(kinematics.recorded, pieces, nodes, contiguous(parts))
 
 
 @overload

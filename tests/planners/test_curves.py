@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.named import butterfly, butterfly_nurbs, lemniscate, trefoil
+from benchmarks.named import butterfly, lemniscate, trefoil
 from feedplan._solvers import PlanError, plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
-from feedplan.curves.composite import CompositeCurve, insert_knot
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.profile import SpeedProfile
 from tests.planners.excess import worst_excess
@@ -92,16 +92,13 @@ def test_the_butterfly_takes_its_published_time(feed: float, time: float) -> Non
 
 
 def test_what_leaves_the_curve_alone_leaves_its_time() -> None:
-    points, knots, degree, weights = butterfly_nurbs()
     curve = butterfly()
     time = Planned(curve, 250.0, 3000.0).time
-    middle = 0.5 * (knots[10] + knots[11])
-    finer_points, finer_knots, finer_weights = insert_knot(points, knots, degree, middle, weights)
     for other in (
         curve.reversed(),
         curve.elevated(5),
         curve.with_width(np.linspace(0.1, 3.0, len(curve))),
-        CompositeCurve.from_nurbs(finer_points, finer_knots, degree, finer_weights),
+        curve.split([7], [0.5 * curve.width[7]]),
     ):
         assert Planned(other, 250.0, 3000.0).time == pytest.approx(time, rel=1e-10)
 

@@ -2,11 +2,7 @@
 
 use feedplan_geometry::quadratic::Quadratic;
 use feedplan_geometry::spline::CompositeCurve;
-use feedplan_planner::problem::Fault;
-use feedplan_planner::profile::Profile;
-use feedplan_planner::Exact as _;
 
-use super::elevated::Elevated;
 use super::regular_path::RegularPath;
 
 /// A random number generator that is the same everywhere (splitmix64).
@@ -98,23 +94,6 @@ impl<const M: usize> Case<M> {
         }
     }
 
-    pub fn plan(&self) -> Result<Profile, Fault> {
-        self.plan_elevated(0)
-    }
-
-    /// The plan of the same pieces with an elevated degree.
-    pub fn plan_elevated(&self, elevate: usize) -> Result<Profile, Fault> {
-        if M <= 3 {
-            Elevated::<3>::new(self, elevate).problem(self).fastest()
-        } else {
-            Elevated::<6>::new(self, elevate).problem(self).fastest()
-        }
-    }
-
-    pub fn time(&self) -> f64 {
-        self.plan().expect("a profile").time()
-    }
-
     /// The same path with straight pieces as lines, cut where they reverse, as the planner needs them.
     pub fn regular(&self) -> Self {
         let mut curve = CompositeCurve::default();
@@ -123,7 +102,7 @@ impl<const M: usize> Case<M> {
         }
         let found = RegularPath::new(&curve, &self.junction);
         let mut other = self.clone();
-        other.pieces = found.curve.pieces().filter_map(|piece| Quadratic::from_piece(&piece)).collect();
+        other.pieces = found.curve.pieces().filter_map(|piece| piece.quadratic()).collect();
         other.feed = found.source.iter().map(|&i| self.feed[i]).collect();
         other.junction = found.junction;
         other

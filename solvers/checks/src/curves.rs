@@ -6,9 +6,9 @@ use feedplan_planner::problem::{Fault, Problem};
 use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 
+use super::axes::{padded, PADDED};
 use super::cases::Random;
 use super::regular_path::RegularPath;
-use super::{padded, PADDED};
 
 /// One piece: its control points and weights, and its parameter width.
 #[derive(Clone, Debug)]

@@ -1,11 +1,13 @@
-//! A case of quadratic pieces as a problem of the planner, with their degree or an elevated one.
+//! A case of quadratic pieces as a problem of the planner, with their degree or an elevated one, and its plan.
 
 use feedplan_geometry::quadratic::{lerp, norm, sub};
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::problem::Problem;
+use feedplan_planner::problem::{Fault, Problem};
+use feedplan_planner::profile::Profile;
+use feedplan_planner::Exact as _;
 
+use super::axes::padded;
 use super::cases::Case;
-use super::padded;
 
 /// The arrays of such a problem in P axes; axes that the case does not have rest.
 pub struct Elevated<const P: usize> {
@@ -64,5 +66,24 @@ impl<const P: usize> Elevated<P> {
             end_speed: case.end_speed,
             watch: Watch::default(),
         }
+    }
+}
+
+impl<const M: usize> Case<M> {
+    pub fn plan(&self) -> Result<Profile, Fault> {
+        self.plan_elevated(0)
+    }
+
+    /// The plan of the same pieces with an elevated degree.
+    pub fn plan_elevated(&self, elevate: usize) -> Result<Profile, Fault> {
+        if M <= 3 {
+            Elevated::<3>::new(self, elevate).problem(self).fastest()
+        } else {
+            Elevated::<6>::new(self, elevate).problem(self).fastest()
+        }
+    }
+
+    pub fn time(&self) -> f64 {
+        self.plan().expect("a profile").time()
     }
 }

@@ -1,6 +1,6 @@
 //! The jerk-limited planner on paths of any kind in up to three axes, compiled once for all tests.
 
-use crate::{padded, PADDED};
+use crate::axes::{padded, PADDED};
 use feedplan_jerk::jerk_limited::{self, Effort, Fault, Geometry, Limits, PathPoint, Plan, Problem};
 
 /// A path of any kind, with axes that rest for those that it does not have.

@@ -1,6 +1,7 @@
 //! Random planning problems and an audit of profiles that shares no formula with the planner.
 
 mod audit;
+mod axes;
 pub mod bends;
 pub mod by_length;
 pub mod campaign;
@@ -13,61 +14,7 @@ mod regular_path;
 pub mod wave;
 
 pub use audit::{audit, Audit};
+pub use axes::{padded, FEW_AXES, PADDED};
 pub use campaign::seeds;
 pub use cases::{milder_case, random_case, Case, Random};
 pub use elevated::Elevated;
-
-/// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
-#[macro_export]
-macro_rules! for_axes {
-    ($count:expr, $m:ident, $call:expr) => {
-        match $count {
-            4 => {
-                const $m: usize = 4;
-                $call
-            }
-            5 => {
-                const $m: usize = 5;
-                $call
-            }
-            6 => {
-                const $m: usize = 6;
-                $call
-            }
-            few => $crate::for_few_axes!(few, $m, $call),
-        }
-    };
-}
-
-/// The numbers of axes of cases for the kernels of curves.
-pub const FEW_AXES: [usize; 3] = [1, 2, 3];
-
-/// The number of axes that kernels are compiled for, as in the Python module.
-pub const PADDED: usize = 3;
-
-/// The values of all axes, with `still` for axes that rest.
-pub fn padded<const M: usize, const P: usize>(values: &[f64; M], still: f64) -> [f64; P] {
-    assert!(M <= P, "{M} axes in {P}");
-    std::array::from_fn(|k| values.get(k).copied().unwrap_or(still))
-}
-
-/// `for_axes!` for one of `FEW_AXES`.
-#[macro_export]
-macro_rules! for_few_axes {
-    ($count:expr, $m:ident, $call:expr) => {
-        match $count {
-            1 => {
-                const $m: usize = 1;
-                $call
-            }
-            2 => {
-                const $m: usize = 2;
-                $call
-            }
-            _ => {
-                const $m: usize = 3;
-                $call
-            }
-        }
-    };
-}

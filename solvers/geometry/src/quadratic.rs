@@ -1,7 +1,5 @@
 //! Vectors, segments and quadratic Bézier pieces in M axes.
 
-use crate::spline::Piece;
-
 /// Scalar product.
 #[inline(always)]
 pub fn dot<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
@@ -66,17 +64,6 @@ impl<const M: usize> Quadratic<M> {
     /// The straight piece from `a` to `b`, parametrised by its length.
     pub fn line(a: [f64; M], b: [f64; M]) -> Self {
         Self { control: [a, lerp(&a, &b, 0.5), b], width: norm(&sub(&b, &a)) }
-    }
-
-    /// A polynomial piece of degree 1 or 2.
-    #[inline]
-    pub fn from_piece(piece: &Piece<M>) -> Option<Self> {
-        let control = match *piece.control {
-            [a, b] => [a, lerp(&a, &b, 0.5), b],
-            [a, b, c] => [a, b, c],
-            _ => return None,
-        };
-        (!piece.is_rational()).then_some(Self { control, width: piece.width })
     }
 
     /// C(u).

@@ -26,7 +26,7 @@ pub mod regular;
 pub mod speed;
 
 use crate::polynomial::BINOMIALS;
-use crate::quadratic::{norm, sub};
+use crate::quadratic::{lerp, norm, sub, Quadratic};
 use crate::tolerance::NO_DIRECTION;
 
 /// The greatest degree of a piece.
@@ -67,6 +67,17 @@ impl<'a, const M: usize> Piece<'a, M> {
     #[inline(always)]
     pub fn is_rational(&self) -> bool {
         !self.weights.is_empty()
+    }
+
+    /// The same piece as a quadratic; None if its degree is above 2 or it is rational.
+    #[inline]
+    pub fn quadratic(&self) -> Option<Quadratic<M>> {
+        let control = match *self.control {
+            [a, b] => [a, lerp(&a, &b, 0.5), b],
+            [a, b, c] => [a, b, c],
+            _ => return None,
+        };
+        (!self.is_rational()).then_some(Quadratic { control, width: self.width })
     }
 
     /// The first edge of the control polygon that has a direction, or with `at_end` the last; None if the piece has no

@@ -171,23 +171,6 @@ pub fn enclosures(machine: Machine, tips: Tips, parts: Option<&[[f64; 2]]>, orde
     result
 }
 
-/// c ≥ |q^(n+2)|/(n + 1)! over each piece, or a part of it, for interpolation of q'' at n nodes: piece by piece, joint by
-/// joint.
-///
-/// With h the part's width in u, q'' is then met within 2 (n + 1) c (h/4)^n at Chebyshev points.
-pub fn constants(machine: Machine, tips: Tips, parts: Option<&[[f64; 2]]>, nodes: usize) -> Vec<f64> {
-    let joints = machine.joints.outputs();
-    let mut result = vec![f64::INFINITY; tips.len() * joints];
-    result.par_chunks_mut(BLOCK * joints).enumerate().for_each(|(block, rows)| {
-        let mut work = PartWork::new(machine, tips, nodes + 2);
-        for (i, row) in rows.chunks_exact_mut(joints).enumerate() {
-            let piece = block * BLOCK + i;
-            work.constants(piece, parts.map_or(WHOLE, |parts| parts[piece]), row);
-        }
-    });
-    result
-}
-
 /// [−r, r]^j.
 fn powers(radius: f64, order: usize) -> [Interval; MOST_ORDER + 1] {
     let mut powers = [Interval::exactly(1.0); MOST_ORDER + 1];

@@ -12,7 +12,6 @@ mod tolerance;
 use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
-use fit::{FitOptions, FittedPiece};
 use path_builder::{Axes, BuiltPath, Motion};
 use program_pieces::{MoveError, PathOptions};
 
@@ -26,13 +25,5 @@ instances! {
         /// to its speed.
         fn smooth_path(&self, options: &PathOptions, axes: &Axes<M>, motion: Option<&Motion<M>>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_smooth_path;
-    }
-}
-
-instances! {
-    /// Splines near points.
-    pub trait Fitted for [3, 6, 9] [[f64; M]] = {
-        /// Lines and quadratic B-splines within the tolerance; see `fit`.
-        fn fitted(&self, options: &FitOptions, watch: Watch) -> Vec<FittedPiece<M>> = fit::fit_points;
     }
 }

@@ -1,12 +1,8 @@
 //! Conversion of NumPy arrays to and from the types of kernels; lengths are checked here.
 
-use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-
-use feedplan_geometry::quadratic::Quadratic;
 
 /// Offsets; a negative one becomes the greatest number, which no kernel accepts.
 pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
@@ -56,17 +52,6 @@ pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
         rows.iter().flat_map(|row| &row[..axes]).copied().collect()
     };
     PyArray1::from_vec(py, flat).reshape([count, axes]).expect("n × axes values")
-}
-
-/// The first `axes` coordinates of the control points of pieces as an (n, 3, axes) array.
-pub fn to_array3<'py, const M: usize>(
-    py: Python<'py>,
-    pieces: &[Quadratic<M>],
-    axes: usize,
-) -> Bound<'py, PyArray3<f64>> {
-    let flat: Vec<f64> =
-        pieces.iter().flat_map(|piece| &piece.control).flat_map(|point| &point[..axes]).copied().collect();
-    PyArray1::from_vec(py, flat).reshape([pieces.len(), 3, axes]).expect("n × 3 × axes values")
 }
 
 fn contiguous() -> PyErr {

@@ -13,7 +13,6 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows, to_array2};
-use super::curve_length::CurveLength;
 use super::views::view;
 use super::with_padded_axes;
 use super::work::run;
@@ -30,9 +29,7 @@ use feedplan_geometry::spline::{CompositeCurve, MAX_DEGREE};
 pyo3::import_exception!(feedplan.errors, InputError);
 
 pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
-    module.add_class::<Curve>()?;
-    module.add_class::<CurveLength>()?;
-    module.add_function(wrap_pyfunction!(insert_knot, module)?)
+    module.add_class::<Curve>()
 }
 
 /// Number of places that one thread evaluates at a time.
@@ -423,41 +420,6 @@ impl Curve {
             PyArray1::from_iter(py, found.iter().map(|cusp| cusp.u)),
         ))
     }
-
-    /// The lengths along the curve, which has at least one piece.
-    #[pyo3(signature = (accuracy, progress=None))]
-    fn lengths(
-        &self,
-        py: Python<'_>,
-        accuracy: f64,
-        progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<CurveLength> {
-        CurveLength::new(py, self, accuracy, progress.as_ref())
-    }
-}
-
-/// Control points, weights and knots after inserting a knot.
-#[pyfunction]
-#[allow(clippy::type_complexity)]
-fn insert_knot<'py>(
-    py: Python<'py>,
-    control_points: Array2<'py>,
-    weights: Option<Array1<'py>>,
-    knots: Array1<'py>,
-    degree: usize,
-    value: f64,
-    times: usize,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>)> {
-    let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
-        let mut spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, false)?;
-        spline.insert(value, times).map_err(input_error)?;
-        Ok((
-            to_array2(py, spline.control, axes),
-            (!spline.weights.is_empty()).then(|| PyArray1::from_vec(py, spline.weights)),
-            PyArray1::from_vec(py, spline.knots),
-        ))
-    })
 }
 
 pub fn check_places(width: &[f64], piece: &[u32], u: &[f64]) -> PyResult<()> {

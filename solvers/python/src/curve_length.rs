@@ -18,24 +18,30 @@ pub struct CurveLength {
     width: Vec<f64>,
 }
 
-impl CurveLength {
-    pub fn new(
-        py: Python<'_>,
-        curve: &Curve,
-        accuracy: f64,
-        progress: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let (axes, width) = (curve.axes(), curve.widths().to_vec());
-        with_padded_axes!(axes, M, {
-            let pieces = curve.padded::<M>()?;
-            let lengths = InAxes::new(run(py, progress, |watch| Kernel::new(pieces, accuracy, watch))?);
-            Ok(Self { axes, lengths, width })
-        })
-    }
+pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
+    module.add_class::<CurveLength>()
 }
 
 #[pymethods]
 impl CurveLength {
+    /// Of a curve, which has at least one piece.
+    #[new]
+    #[pyo3(signature = (curve, accuracy, progress=None))]
+    fn new(
+        py: Python<'_>,
+        curve: &Curve,
+        accuracy: f64,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (axes, width) = (curve.axes(), curve.widths().to_vec());
+        with_padded_axes!(axes, M, {
+            let pieces = curve.padded::<M>()?;
+            let lengths =
+                InAxes::new(run(py, progress.as_ref(), |watch| Kernel::new(pieces, accuracy, watch))?);
+            Ok(Self { axes, lengths, width })
+        })
+    }
+
     /// Length of the curve in mm.
     #[getter]
     fn total(&self) -> PyResult<f64> {

@@ -175,24 +175,6 @@ fn joint_enclosures<'py>(
     Ok((lo?, hi?))
 }
 
-/// c ≥ |q^(n+2)|/(n + 1)! (m, joints) over pieces, or parts (m, 2) of them.
-#[pyfunction]
-#[pyo3(signature = (expression, tips, nodes, parts=None))]
-fn joint_constants<'py>(
-    py: Python<'py>,
-    expression: ExpressionArrays<'py>,
-    tips: TipArrays<'py>,
-    nodes: usize,
-    parts: Option<PyReadonlyArray2<'py, f64>>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (joints, pieces) = (expression.expression()?, tips.tips()?);
-    let machine = machine(&joints, &expression, &pieces)?;
-    require_order(nodes.saturating_add(2))?;
-    let parts = parts_of(&parts, pieces.len())?;
-    let found = run(py, None, |_| path_derivatives::constants(machine, pieces, parts, nodes))?;
-    table(py, found, joints.outputs())
-}
-
 /// Parts: pieces (m,), fractions (m, 2), least and greatest positions (m, joints). Singular places: pieces and fractions.
 /// Overruns: piece, fraction, joint, value, limit.
 type JointPathArrays<'py> = (
@@ -353,7 +335,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(joint_positions, module)?)?;
     module.add_function(wrap_pyfunction!(joint_derivatives, module)?)?;
     module.add_function(wrap_pyfunction!(joint_enclosures, module)?)?;
-    module.add_function(wrap_pyfunction!(joint_constants, module)?)?;
     module.add_function(wrap_pyfunction!(joint_path, module)?)?;
     module.add_function(wrap_pyfunction!(joint_interpolants, module)?)
 }

@@ -5,6 +5,7 @@ use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 use feedplan_geometry::watch::Watch;
 use feedplan_path::fit::{fit_points, FitOptions, FittedPiece};
 use proptest::prelude::*;
+use std::f64::consts::TAU;
 
 const TOLERANCE: f64 = 0.01;
 const OPTIONS: FitOptions = FitOptions {
@@ -210,6 +211,43 @@ fn a_bulge_between_one_and_two_tolerances_is_shared_and_stays_smooth() {
     let pieces = fitted(&points, &OPTIONS);
     assert!(pieces.iter().all(|piece| piece.spline == 0), "{}", pieces[pieces.len() - 1].spline);
     assert!(pieces.iter().any(|piece| piece.deviation > 0.75 * TOLERANCE));
+}
+
+/// A profile with waves, and beads in its creases, as 486 points on a grid of 1 µm.
+fn vase_pass() -> Vec<[f64; 2]> {
+    let beads = [8.0, 15.0, 95.0, 102.0, 109.0];
+    let profile: Vec<[f64; 2]> = (0..=20_000)
+        .map(|i| 0.006 * f64::from(i))
+        .map(|y| {
+            let waves = 25.0 + 8.0 * (TAU * y / 90.0).sin();
+            let wave = 2.5 * (TAU * y / 17.0 + 0.5).sin() * (-((y - 60.0) / 30.0).powi(2)).exp();
+            let bead = |centre: f64| 2.0 * (1.0 - ((y - centre) / 3.2).powi(2)).max(0.0).sqrt();
+            [y, beads.iter().fold(waves + wave, |z, &centre| z.max(z - 0.8 + bead(centre)))]
+        })
+        .collect();
+    let mut length = vec![0.0];
+    for pair in profile.windows(2) {
+        length.push(length[length.len() - 1] + norm(&sub(&pair[1], &pair[0])));
+    }
+    let micrometre = |value: f64| (1000.0 * value).round() / 1000.0;
+    (0..486)
+        .map(|i| {
+            let at = length[20_000] * f64::from(i) / 485.0;
+            let next = length.partition_point(|&before| before < at).clamp(1, 20_000);
+            let t = (at - length[next - 1]) / (length[next] - length[next - 1]);
+            lerp(&profile[next - 1], &profile[next], t).map(micrometre)
+        })
+        .collect()
+}
+
+/// Zhang et al. 2010 report 14.3 chords per spline and 2.8 per polynomial for 486 points.
+#[test]
+fn a_vase_pass_compresses_as_in_the_paper() {
+    let max_curvature = 4.0 * 3000.0_f64.hypot(1000.0) / 100.0_f64.powi(2);
+    let pieces = fitted(&vase_pass(), &FitOptions { max_curvature, ..OPTIONS });
+    let splines = pieces[pieces.len() - 1].spline + 1;
+    assert!((10.0..50.0).contains(&(485.0 / f64::from(splines))), "{splines} splines");
+    assert!((2.5..4.5).contains(&(485.0 / pieces.len() as f64)), "{} polynomials", pieces.len());
 }
 
 #[test]

@@ -25,8 +25,6 @@ pub enum SplineError {
     EmptyDomain { first: usize, last: usize, value: f64 },
     Broken { knot: usize, value: f64, gap: f64, degree: usize },
     Weight { index: usize, value: f64 },
-    Outside { value: f64, start: f64, end: f64 },
-    Insertion { value: f64, count: usize, degree: usize },
     Helix { tolerance: f64, pieces: f64 },
 }
 
@@ -103,14 +101,6 @@ impl fmt::Display for SplineError {
                 "weight {index} is {value}: weights must be positive, from {:e} to {MAX_WEIGHT:e}; correct it or \
                  scale all by one factor",
                 1.0 / MAX_WEIGHT
-            ),
-            Self::Outside { value, start, end } => {
-                write!(f, "the knot {value} is not inside ({start}, {end}), where the curve is: choose one that is")
-            }
-            Self::Insertion { value, count, degree } => write!(
-                f,
-                "the knot {value} would stand {count} times: at most {degree} (the degree) keep the curve \
-                 together; insert it fewer times"
             ),
             Self::Helix { tolerance, pieces } => write!(
                 f,

@@ -72,7 +72,7 @@ fn bezier_points<const M: usize>(knots: &[f64], points: &mut [[f64; M]], weights
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spline::bezier::{derivatives, point};
+    use crate::spline::bezier::point;
     use proptest::prelude::*;
 
     /// De Boor's recurrence by the definition of the basis functions.
@@ -164,30 +164,6 @@ mod tests {
                 start += piece.width;
             }
             prop_assert!((start - spline.domain()[1]).abs() < 1e-12 * start.abs().max(1.0));
-        }
-
-        #[test]
-        fn an_inserted_knot_changes_no_value(spline in splines(), at in 0.05..0.95f64, inside in 0.0..1.0f64) {
-            let [start, end] = spline.domain();
-            let mut more = spline.clone();
-            prop_assume!(more.insert(start + at * (end - start), 1).is_ok());
-            let (before, after) = (extract(&spline).unwrap(), extract(&more).unwrap());
-            prop_assert_eq!(after.len(), before.len() + 1);
-            let mut begin = 0.0;
-            for piece in after.pieces() {
-                let mut x = begin + inside * piece.width;
-                begin += piece.width;
-                let mut i = 0;
-                while i + 1 < before.len() && x > before.width[i] {
-                    x -= before.width[i];
-                    i += 1;
-                }
-                let expected = derivatives(&before.piece(i), x.min(before.width[i]));
-                let found = derivatives(&piece, inside * piece.width);
-                for axis in 0..2 {
-                    prop_assert!((found[0][axis] - expected[0][axis]).abs() < 1e-10);
-                }
-            }
         }
     }
 }

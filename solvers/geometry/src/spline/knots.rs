@@ -1,10 +1,9 @@
-//! A B-spline or NURBS curve from control points, knots and weights as users give them: checked, unrolled if it is periodic,
-//! with knots inserted.
+//! A B-spline or NURBS curve from control points, knots and weights as users give them: checked, and unrolled
+//! if it is periodic.
 //!
 //! n control points of degree d have knots t₀ … t_{n+d}; the curve is on [t_d, t_n]. Knots may be clamped or not.
 
 use super::error::{SplineError, MAX_COORDINATE, MAX_WEIGHT};
-use super::rational::cut_corners;
 use super::MAX_DEGREE;
 use crate::tolerance::KNOT_SPAN;
 
@@ -88,38 +87,6 @@ impl<const M: usize> Spline<M> {
     pub fn domain(&self) -> [f64; 2] {
         [self.knots[self.degree], self.knots[self.control.len()]]
     }
-
-    /// The same curve with the knot `value` inserted `times` times (Boehm 1980).
-    pub fn insert(&mut self, value: f64, times: usize) -> Result<(), SplineError> {
-        let (d, [start, end]) = (self.degree, self.domain());
-        if !(start < value && value < end) {
-            return Err(SplineError::Outside { value, start, end });
-        }
-        let present = self.knots.iter().filter(|&&knot| knot == value).count();
-        if present + times > d {
-            return Err(SplineError::Insertion { value, count: present + times, degree: d });
-        }
-        for _ in 0..times {
-            let span = self.knots.partition_point(|&knot| knot <= value) - 1;
-            // Points span − d … span become one point more: the inner ones are means.
-            let first = span - d;
-            let mut points = self.control[first..=span].to_vec();
-            let mut weights =
-                if self.weights.is_empty() { vec![] } else { self.weights[first..=span].to_vec() };
-            let knots = &self.knots;
-            cut_corners(&mut points, &mut weights, d, |i| {
-                let (low, high) = (knots[first + i + 1], knots[first + i + d + 1]);
-                (value - low) / (high - low)
-            });
-            // The first stays, then come the means, then the last, which `cut_corners` leaves where it is.
-            self.control.splice(first + 1..=span, points);
-            if !self.weights.is_empty() {
-                self.weights.splice(first + 1..=span, weights);
-            }
-            self.knots.insert(span + 1, value);
-        }
-        Ok(())
-    }
 }
 
 /// Degree, coordinates and weights of control points.
@@ -177,32 +144,6 @@ fn check_knots(degree: usize, knots: &[f64]) -> Result<(), SplineError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn parabola() -> Spline<2> {
-        let control = vec![[0.0, 0.0], [1.0, 2.0], [3.0, 1.0]];
-        Spline::new(2, vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], control, vec![]).unwrap()
-    }
-
-    #[test]
-    fn inserting_the_middle_of_a_parabola_halves_its_polygon() {
-        let mut spline = parabola();
-        spline.insert(0.5, 2).unwrap();
-        assert_eq!(spline.knots, [0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0]);
-        assert_eq!(spline.control, [[0.0, 0.0], [0.5, 1.0], [1.25, 1.25], [2.0, 1.5], [3.0, 1.0]]);
-    }
-
-    #[test]
-    fn a_knot_is_inserted_inside_and_up_to_the_degree_only() {
-        let mut spline = parabola();
-        assert_eq!(
-            spline.insert(0.0, 1).unwrap_err(),
-            SplineError::Outside { value: 0.0, start: 0.0, end: 1.0 }
-        );
-        assert_eq!(
-            spline.insert(0.5, 3).unwrap_err().to_string(),
-            "the knot 0.5 would stand 3 times: at most 2 (the degree) keep the curve together; insert it fewer times"
-        );
-    }
 
     #[test]
     fn a_periodic_curve_is_unrolled_by_its_degree() {

@@ -11,7 +11,6 @@ use super::{CompositeCurve, Piece};
 use crate::arc_length::{quadrature, tabulate, Length, Node, QuadraticSpeed, Table};
 use crate::inverse_length::{self, Located};
 use crate::newton;
-use crate::quadratic::Quadratic;
 use crate::tolerance::CUSP;
 use crate::watch::Watch;
 
@@ -79,7 +78,7 @@ impl<const M: usize> CurveLength<M> {
             error: 0.0,
         };
         for piece in curve.pieces() {
-            lengths.speeds.push(match Quadratic::from_piece(&piece) {
+            lengths.speeds.push(match piece.quadratic() {
                 Some(quadratic) => PieceSpeed::Quadratic(Length(QuadraticSpeed::new(&quadratic))),
                 None => {
                     let coefficients = Coefficients::new(&piece);
