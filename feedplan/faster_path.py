@@ -1,14 +1,15 @@
 """A faster path within the tolerance: fitted anew to the speed of a plan, and kept where it is faster.
 
-A path that is fitted without knowing the speed spreads each bend evenly. Fitted to the speed of a plan (the
-energy is in `solvers/path/src/smooth_fit/pace.rs`) it bends where the tool is slow and is smooth where it is
-fast. Between two stops that both paths have, the tool is at rest at the same places, so each of these
-sections can follow the path on which it takes less time.
+A path that is fitted without knowing the speed spreads each bend evenly. Fitted to the speed of a plan it
+bends where the tool is slow and is smooth where it is fast; later fits go on from the best path along the
+gradient of its least time (`refit`). Between two stops that both paths have, the tool is at rest at the same
+places, so each of these sections can follow the path on which it takes less time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -21,7 +22,9 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, SolverError
 from feedplan.geometry.path import Path
 from feedplan.geometry.rules import Motion
+from feedplan.path_gradient import path_gradient
 from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
+from feedplan.refit import FitLimits, along_gradient, at_speed_of, promise
 
 # The most rounds: later ones hardly gain.
 MAX_ROUNDS = 3
@@ -29,6 +32,8 @@ MAX_ROUNDS = 3
 _WORTH_TRYING = 1e-3
 # A section that is shorter by less than this part is none the faster.
 _ROUNDING = 1e-9
+# A step that gains nowhere is followed by one that is shorter by this factor.
+_SHORTER = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +54,12 @@ class Followed:
 class Gain:
     """What paths fitted to the speed gained.
 
-    `times` [s]: along the path as fitted, and after each round; `sections` between the stops that both paths
-    of the last round have, and in how many of them the new one was `faster`."""
+    `times` [s]: along the path as fitted, and after each round; `promised` [s]: what each step along the
+    gradient promised to save, and what one more promises; `sections` between the stops that both paths of
+    the last round have, and in how many of them the new one was `faster`."""
 
     times: tuple[float, ...]
+    promised: tuple[float, ...]
     sections: int
     faster: int
 
@@ -68,57 +75,52 @@ class Gain:
 
 def faster(
     first: Followed,
-    max_jerk: NDArray[np.float64],
-    follow: Callable[[Motion], Followed],
+    limits: FitLimits,
+    fit: Callable[[Motion], Path],
+    follow: Callable[[Path], Followed],
     join: Callable[[Path], Problem],
     rounds: int,
 ) -> tuple[Followed, Gain]:
     """The first plan, each section on the path on which it takes least time.
 
-    In each of the `rounds`, as long as they gain, a path is fitted to the speed of the plan before.
-    `max_jerk` (path axes,) [mm/s³] is infinite where the plan has no limit of jerk; `follow` makes and plans
-    the path for a motion; `join` states the problem along a path.
+    The first of the `rounds` fits a path to the speed of the first plan, each later one goes a step along the
+    gradient from the best; where the axes are not those of the path, it fits to the speed of the best. `fit`
+    makes a path for a motion and `follow` plans it; `join` states the problem along a path.
     """
-    best, times, sections, count = first, [first.time], _Sections(first.path, first.path), 0
-    worth: NDArray[np.bool_] = _excess(first, sections.runs[0]) > _WORTH_TRYING
-    while worth.any() and len(times) <= rounds:
-        try:
-            other = follow(motion_of(best, max_jerk))
-        except (InfeasibleError, SolverError):
-            # What can be planned along one path need not be along another; the first plan holds.
-            break
-        sections = _Sections(best.path, other.path)
-        before, after = (
-            _sums(each.profile.run_times, runs)
-            for each, runs in zip((best, other), sections.runs, strict=True)
-        )
-        better: NDArray[np.bool_] = after < (1.0 - _ROUNDING) * before
-        count = int(better.sum())
-        if count == 0:
-            break
-        best = other if better.all() else _joined(best, other, sections, better, join)
-        times.append(best.time)
-    return best, Gain(tuple(times), len(sections), count)
-
-
-def motion_of(followed: Followed, max_jerk: NDArray[np.float64]) -> Motion:
-    """The motion of a plan: u̇² at the ends of its phases, by the part of the way from rest to rest."""
-    path, profile = followed.problem.path, followed.profile
-    # Where one move ends and the next begins at rest, a run goes back along its own line.
-    phase = np.searchsorted(profile.piece, np.arange(len(path) + 1))
-    rests = 1 + np.flatnonzero((path.move[1:, 0] > path.move[:-1, 1]) & (profile.p0[phase[1:-1]] == 0.0))
-    runs = np.union1d(path.runs, rests)
-    begin, ends = np.concatenate([[0.0], np.cumsum(path.width)]), phase[runs]
-    # The starts of all phases, and the end of the last one of each run.
-    place = np.insert(begin[profile.piece] + profile.u0, ends[1:], begin[runs[1:]])
-    speed_sq = np.insert(profile.p0, ends[1:], profile.p1[ends[1:] - 1])
-    finite = np.isfinite(speed_sq)
-    speed_sq = np.where(finite, speed_sq, speed_sq[finite].max(initial=0.0))
-    start = ends + np.arange(len(ends))
-    run = np.repeat(np.arange(len(runs) - 1), np.diff(start))
-    part = (place - begin[runs[run]]) / np.diff(begin[runs])[run]
-    moves = np.stack([path.move[runs[:-1], 0], path.move[runs[1:] - 1, 1]], axis=1)
-    return Motion(run=moves, start=start, place=np.clip(part, 0.0, 1.0), speed_sq=speed_sq, max_jerk=max_jerk)
+    best, times, promised = first, [first.time], list[float]()
+    sections, count, step = _Sections(first.path, first.path), 0, 1.0
+    # What can be planned along one path need not be along another; the best so far holds.
+    with suppress(InfeasibleError, SolverError):
+        # Of a step after the last round only the promise is wanted.
+        for turn in range(rounds + (rounds > 1)):
+            if not (_excess(best) > _WORTH_TRYING).any():
+                break
+            problem, stepping = best.problem, turn > 0 and best.problem.joints is None
+            if turn == rounds and not stepping:
+                break
+            if stepping:
+                gradient = path_gradient(problem, best.profile, limits.jerk)
+                path = fit(along_gradient(problem, gradient, limits, step))
+                both = _Sections(problem.path, path).runs
+                promised.append(promise(gradient, problem.path, path, both, limits, step))
+            else:
+                path = fit(at_speed_of(problem, best.profile, limits))
+            if turn == rounds:
+                break
+            other = follow(path)
+            sections = _Sections(best.path, other.path)
+            before, after = (
+                _sums(each.profile.run_times, runs)
+                for each, runs in zip((best, other), sections.runs, strict=True)
+            )
+            better: NDArray[np.bool_] = after < (1.0 - _ROUNDING) * before
+            count = int(better.sum())
+            if count:
+                best = other if better.all() else _joined(best, other, sections, better, join)
+            elif stepping:
+                step *= _SHORTER
+            times.append(best.time)
+    return best, Gain(tuple(times), tuple(promised), len(sections), count)
 
 
 class _Sections:
@@ -153,16 +155,15 @@ def _sums(values: NDArray[np.float64], offsets: NDArray[np.int64]) -> NDArray[np
     return np.add.reduceat(values, offsets[:-1])
 
 
-def _excess(followed: Followed, runs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """By how much each section takes longer than at the feed and the axes' greatest speeds, as a part."""
+def _excess(followed: Followed) -> NDArray[np.float64]:
+    """By how much each run takes longer than at the feed and the axes' greatest speeds, as a part."""
     problem, path = followed.problem, followed.problem.path
     control, offsets = path.curve.control_points, path.curve.offsets
     way = np.abs(control[offsets[1:] - 1] - control[offsets[:-1]])
     least = path.width / problem.feed
     if not problem.words:
         least = np.maximum(least, (way / problem.limits("velocity").max(axis=0)).max(axis=1))
-    time = _sums(followed.profile.run_times, runs)
-    return np.asarray(time / np.maximum(_sums(_sums(least, path.runs), runs), 1e-300) - 1.0)
+    return np.asarray(followed.profile.run_times / np.maximum(_sums(least, path.runs), 1e-300) - 1.0)
 
 
 def _joined(

@@ -28,7 +28,6 @@ from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
 from feedplan.geometry.path_words import path_words
-from feedplan.geometry.rules import Motion
 from feedplan.knots import Knots
 from feedplan.lazy import cached_property
 from feedplan.lower_bound import lower_bound
@@ -54,6 +53,7 @@ from feedplan.program.program import Program
 from feedplan.program.read import Reading, checked_reading, read_program
 from feedplan.program.source import Source
 from feedplan.progress import Listener, Progress, of_stage, part, tell
+from feedplan.refit import FitLimits
 from feedplan.report.account import Account, account
 from feedplan.report.operations import OperationTime, operation_times
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, Sink, setpoints
@@ -351,8 +351,8 @@ def plan(
     and arcs and bends keep their size. With "fastest" it is planned a second time, along a smooth path that
     is fitted to the speed of the first plan: it bends where the tool is slow, and cuts corners, arcs and
     bends as far as the tolerance allows. Of each section between two stops the faster of both paths is
-    followed, and `Plan.gain` says what that gained. `path_rounds` (1 to 3) is how often it is fitted to the
-    speed of the plan before, as long as that gains. Such a path depends on machine, feeds and method;
+    followed, and `Plan.gain` says what that gained. Of `path_rounds` (1 to 3) each after the first fits it
+    again, a step along the gradient of its time. Such a path depends on machine, feeds and method;
     neighbouring passes may differ by up to twice the tolerance. Methods that follow the lines themselves
     know one path only, and take no "fastest". `feed` [mm/s] replaces the programmed feeds,
     `feed_override` multiplies them. `reading` are keywords of `read_program`, such as a tool table. `period`
@@ -479,17 +479,20 @@ def plan(
 
         profile = solved(problem)
     if refits and program is not None and not profile.stopped:
+        fit = partial(build_path, program, machine, tolerance, corners=Corners.SMOOTH)
 
-        def follow(motion: Motion) -> Followed:
-            path = build_path(program, machine, tolerance, corners=Corners.SMOOTH, motion=motion)
+        def follow(path: Path) -> Followed:
             problem = stated(path)
             return Followed(path, problem, solved(problem))
 
         with _timed(compute, "refit"):
-            max_jerk = path_words(program, machine).max_jerk
-            if not limits_jerk(method):
-                max_jerk = np.full_like(max_jerk, np.inf)
-            best, gain = faster(Followed(followed, problem, profile), max_jerk, follow, stated, rounds)
+            words = path_words(program, machine)
+            jerk = words.max_jerk if limits_jerk(method) else np.full_like(words.max_jerk, np.inf)
+            first_of_all = Followed(followed, problem, profile)
+            limits = FitLimits(words.max_acceleration, jerk)
+            best, gain = faster(
+                first_of_all, limits, lambda motion: fit(motion=motion), follow, stated, rounds
+            )
             followed, problem, profile = best.path, best.problem, best.profile
     with _timed(compute, "bound"):
         least = profile.lower_bound

@@ -86,24 +86,55 @@ def test_the_path_as_fitted_is_that_of_the_program_alone() -> None:
 
 def test_bang_bang_takes_the_smooth_path_on_noise() -> None:
     random = np.random.default_rng(3)
-    x = np.cumsum(random.uniform(0.15, 0.6, 60))
+    x = np.concatenate(([0.0], np.cumsum(random.uniform(0.15, 0.6, 60))))
     form = 1.5 * np.sin(2.0 * np.pi * x / 12.0) + 0.3 * np.sin(2.0 * np.pi * x / 3.1)
-    y = form + 0.005 * random.standard_normal(60)
-    lines = "".join(f"G1 X{a:.6f} Y{b:.6f}\n" for a, b in zip(x, y, strict=True))
+    y = form + 0.005 * random.standard_normal(61)
+    lines = "".join(f"G1 X{a:.6f} Y{b:.6f}\n" for a, b in zip(x[1:], y[1:] - y[0], strict=True))
     options = {"machine": SLOW, "method": "bang-bang", "tolerance": 0.05}
-    first, found = made(lines, **options), made(lines, path="fastest", **options)
-    assert found.time < 0.95 * first.time
-    assert found.audit().ok
+    first, one, two = (
+        made(lines, **options, **more)
+        for more in ({}, {"path": "fastest"}, {"path": "fastest", "path_rounds": 2})
+    )
+    assert one.time < 0.95 * first.time
+    # The least time of path and speed together is 0.880 s.
+    assert two.time < 0.925
+    for found in (one, two):
+        assert found.audit().ok
 
 
-def test_rounds_go_on_as_long_as_they_gain() -> None:
+def test_steps_along_the_gradient_keep_what_they_promise() -> None:
     turn = "G1 X10\nG1 X2.928932 Y7.071068\n"
     one, three = (made(turn, tolerance=0.05, path="fastest", path_rounds=k) for k in (1, 3))
     assert one.gain is not None
     assert three.gain is not None
-    assert three.gain.times[: len(one.gain.times)] == one.gain.times
-    assert three.time < one.time
+    assert one.gain.promised == ()
+    assert three.gain.times[:2] == one.gain.times
     assert list(three.gain.times) == sorted(three.gain.times, reverse=True)
+    # Each step with what it promised, and one more that is not taken.
+    assert len(three.gain.promised) == 3
+    assert len(three.gain.times) == 4
+    assert all(promised >= 0.0 for promised in three.gain.promised)
+    saved = one.time - three.gain.times[2]
+    assert 0.3 * three.gain.promised[0] < saved < 3.0 * three.gain.promised[0]
+    assert three.summary()["gain"]["promised"] == three.gain.promised
+    assert three.audit().ok
+
+
+def test_two_steps_round_the_facets_of_a_circle_within_the_tolerance() -> None:
+    # Chords of 0.3 mm, 0.01 mm from the circle; the least time of path and speed together is 0.329 s.
+    count = 24
+    angle, radius = np.arange(count + 1) * 2.0 * np.pi / count, 0.3**2 / 0.08 + 0.005
+    points = np.round(radius * np.column_stack((np.sin(angle), 1.0 - np.cos(angle))), 6)
+    lines = "".join(f"G1 X{x:.6f} Y{y:.6f}\n" for x, y in points[1:])
+    found = made(lines, SLOW, tolerance=0.05, path="fastest", path_rounds=3)
+    assert found.gain is not None
+    assert found.time < 0.3325 < 0.98 * found.gain.times[1]
+    assert found.audit().ok
+    assert distances(found, points).max() <= 0.05
+
+
+def test_rounds_are_one_to_three() -> None:
+    turn = "G1 X10\nG1 X2.928932 Y7.071068\n"
     for wrong in (0, 4, 1.5):
         with pytest.raises(InputError, match="path_rounds"):
             made(turn, path="fastest", path_rounds=wrong)
@@ -123,10 +154,13 @@ def test_no_section_of_a_random_program_is_slower_or_beyond_its_tolerance(seed: 
         lines += f"{kind} X{points[-1][0]:.6f} Y{points[-1][1]:.6f}\n" + random.choice(["", "", "G4 P0.01\n"])
     machine = random.choice([FAST, SLOW])
     method = str(random.choice(["jerk-limited", "bang-bang", "s-curve"]))
+    rounds = int(random.integers(1, 4))
     tolerance = float(random.choice([0.01, 0.1]))
     first = made(lines, machine, method, tolerance=tolerance)
-    found = made(lines, machine, method, tolerance=tolerance, path="fastest")
+    found = made(lines, machine, method, tolerance=tolerance, path="fastest", path_rounds=rounds)
+    assert found.gain is not None
     assert found.time <= first.time * (1.0 + 1e-12)
+    assert list(found.gain.times) == sorted(found.gain.times, reverse=True)
     assert found.audit().ok, found.audit()
     assert distances(found, np.array(points)).max() <= tolerance
     assert found.path.fit.deviation <= tolerance * (1.0 + 1e-9)

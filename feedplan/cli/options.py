@@ -69,7 +69,8 @@ PATH_ROUNDS = click.option(
     type=click.IntRange(1, MAX_ROUNDS),
     default=1,
     show_default=True,
-    help="How often the fastest path is fitted to the speed of the plan before, as long as that gains.",
+    help="How often the fastest path is made: first fitted to the speed of a plan, then by steps along the "
+    "gradient of its time.",
 )
 ACCURACY = click.option(
     "--accuracy", type=Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."

@@ -215,7 +215,12 @@ def gain_text(gain: Mapping[str, Any]) -> str:
     times = " → ".join(duration_text(float(seconds)) for seconds in gain["times"])
     if len(gain["times"]) == 1:
         return f"{times} as fitted: a path fitted to the speed gains nothing"
-    return f"{times}; the last fit is faster in {gain['faster']} of {counted(gain['sections'], 'section')}"
+    text = f"{times}; the last fit is faster in {gain['faster']} of {counted(gain['sections'], 'section')}"
+    promised = [duration_text(float(seconds)) for seconds in gain["promised"]]
+    if promised:
+        *taken, following = promised
+        text += f"; the steps promised {', '.join(taken)}, one more promises {following}"
+    return text
 
 
 def _side_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -54,11 +54,14 @@ class Motion:
 
     `run` (r, 2) first and last move of each run of that path; `start` (r + 1,) where its places begin in
     `place` (m,), ascending parts of the run from 0 to 1; `speed_sq` (m,) the square of the speed there
-    [mm²/s²]; `max_jerk` (axes,) [mm/s³], infinite where the motion has no limit of jerk.
+    [mm²/s²]; `second` and `third` (m, axes) the derivatives that the path should have there [1/mm, 1/mm²];
+    `max_jerk` (axes,) [mm/s³], infinite where the motion has no limit of jerk.
     """
 
     run: NDArray[np.int64]
     start: NDArray[np.int64]
     place: Floats
     speed_sq: Floats
+    second: Floats
+    third: Floats
     max_jerk: Floats

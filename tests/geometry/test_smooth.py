@@ -97,6 +97,16 @@ def test_the_path_stops_where_it_turns_back_and_where_it_is_told(make_program: A
     assert audited(program, path).ok
 
 
+def test_only_turns_that_are_stops_are_warned_of(make_program: Any) -> None:
+    # Back along its own line at X30, where the tool rests for no time, and at 170° at X10.
+    program = make_program([[0, 0], [30, 0], [10, 0], [29.696, 3.473]], blend_tolerance=0.1)
+    path = smooth(program)
+    np.testing.assert_array_equal(path.move[path.runs[1:] - 1, 1], [1, 2])
+    (warning,) = path.warnings
+    assert warning.startswith("line 11: the path turns back")
+    assert smooth(make_program([[0, 0], [30, 0], [10, 0]], blend_tolerance=0.1)).warnings == ()
+
+
 def test_a_rapid_between_feed_moves_is_one_run_and_each_keeps_its_feed_to_the_corner(
     make_program: Any,
 ) -> None:

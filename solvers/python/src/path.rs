@@ -61,6 +61,8 @@ struct MotionArrays<'py> {
     start: PyReadonlyArray1<'py, i64>,
     place: Floats<'py>,
     speed_sq: Floats<'py>,
+    second: Rows<'py>,
+    third: Rows<'py>,
     max_jerk: Floats<'py>,
 }
 
@@ -70,12 +72,14 @@ impl MotionArrays<'_> {
             self.run.as_slice()?.as_chunks().0.iter().map(|run: &[i64; 2]| run.map(|i| i as usize)).collect();
         let (start, place) = (indices(&self.start), self.place.as_slice()?.to_vec());
         let speed_sq = self.speed_sq.as_slice()?.to_vec();
+        let aim: Vec<_> =
+            rows(&self.second)?.into_iter().zip(rows(&self.third)?).map(<[_; 2]>::from).collect();
         let good = start.len() == runs.len() + 1
             && start.is_sorted()
             && start.last() == Some(&place.len())
-            && place.len() == speed_sq.len();
+            && [speed_sq.len(), aim.len()] == [place.len(); 2];
         let max_jerk = row::<M>(&self.max_jerk, f64::INFINITY)?;
-        let motion = Motion { runs, start, place, speed_sq, max_jerk };
+        let motion = Motion { runs, start, place, speed_sq, aim, max_jerk };
         good.then_some(motion)
             .ok_or_else(|| PyValueError::new_err("the columns of the motion differ in length"))
     }

@@ -20,7 +20,7 @@ use super::{deviation, Axes, BuiltPath, Chunk};
 use crate::program_pieces::{
     Chord, Chords, FitCounts, MoveError, Moves, PathOptions, PathPiece, Shape, RAPID,
 };
-use crate::smooth_fit::pace::Pace;
+use crate::smooth_fit::pace::{Moment, Pace};
 use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 use crate::tolerance;
@@ -31,7 +31,7 @@ use feedplan_geometry::watch::Watch;
 /// Where a smooth path stops without being told to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NotSmooth {
-    /// Moves at whose end the path turns back.
+    /// Moves at whose end the path turns back and stops.
     pub reversals: Vec<u32>,
     /// First and last move of each place where no smooth curve is within the tolerance. Corners are rounded one by one
     /// there, between two stops.
@@ -58,27 +58,31 @@ pub struct Motion<const M: usize> {
     /// Places as fractions of their run, ascending, and the square of the speed there, in mm²/s².
     pub place: Vec<f64>,
     pub speed_sq: Vec<f64>,
+    /// There, the second and third derivatives that the path should have.
+    pub aim: Vec<[[f64; M]; 2]>,
     /// Of each axis, in mm/s³; infinite where there is no limit.
     pub max_jerk: [f64; M],
 }
 
 impl<const M: usize> Motion<M> {
-    /// Stations of a run of chords and the square of the speed there.
-    fn along(&self, chords: &[Chord], station: &[f64]) -> Vec<[f64; 2]> {
+    /// The moments of a run of chords, with the numbers of the axes that move.
+    fn along<const D: usize>(&self, chords: &[Chord], station: &[f64], moving: &[usize]) -> Vec<Moment<D>> {
         let (first, last) = (chords[0].first as usize, chords[chords.len() - 1].last as usize);
         let begin = self.runs.partition_point(|run| run[1] < first);
-        let mut table = Vec::new();
+        let mut moments = Vec::new();
         for (run, places) in self.runs.iter().zip(self.start.windows(2)).skip(begin) {
             if run[0] > last {
                 break;
             }
             let from = station[chords.partition_point(|chord| (chord.last as usize) < run[0])];
             let to = station[chords.partition_point(|chord| chord.first as usize <= run[1])];
-            let own = places[0]..places[1];
-            let stations = self.place[own.clone()].iter().map(|part| from + part * (to - from));
-            table.extend(stations.zip(&self.speed_sq[own]).map(|(u, &square)| [u, square]));
+            moments.extend((places[0]..places[1]).map(|i| Moment {
+                station: from + self.place[i] * (to - from),
+                speed_sq: self.speed_sq[i],
+                aim: self.aim[i].each_ref().map(|aim| narrow(aim, moving, 0.0)),
+            }));
         }
-        table
+        moments
     }
 }
 
@@ -108,7 +112,11 @@ pub fn build_smooth_path<const M: usize>(
         path.not_smooth.corners.extend(section.not_smooth.corners);
     }
     let pieces: Vec<&PathPiece<M>> = path.chunks.iter().flat_map(|chunk| &chunk.pieces).collect();
-    path.runs.retain(|&first| first == 0 || !goes_back(moves, pieces[first - 1], pieces[first]));
+    let rests = |first: usize| first > 0 && goes_back(moves, pieces[first - 1], pieces[first]);
+    let back: Vec<u32> =
+        path.runs.iter().filter(|&&first| rests(first)).map(|&first| pieces[first - 1].last).collect();
+    path.runs.retain(|&first| !rests(first));
+    path.not_smooth.reversals.retain(|last| back.binary_search(last).is_err());
     path.runs.push(total);
     path.deviation = deviation(&path.chunks);
     path.offsets = Some(offsets);
@@ -229,16 +237,14 @@ impl<const M: usize> Section<M> {
     ) {
         let Rules { exact, travel, long, max_acceleration, motion } = rules;
         let own = &chords.chords[run.clone()];
-        let narrow = |p: &[f64; M]| std::array::from_fn(|k| moving.get(k).map_or(0.0, |&axis| p[axis]));
-        let points: Vec<[f64; D]> = chords.points[run.start..=run.end].iter().map(narrow).collect();
-        let mut line = Polyline::new(points, own.iter().map(Chord::rest).collect());
+        let points = chords.points[run.start..=run.end].iter().map(|p| narrow(p, moving, 0.0)).collect();
+        let mut line = Polyline::<D>::new(points, own.iter().map(Chord::rest).collect());
         line.sized = motion.is_none();
         if let Some(motion) = motion {
-            let of =
-                |limits: &[f64; M]| std::array::from_fn(|k| moving.get(k).map_or(1.0, |&axis| limits[axis]));
-            let table = motion.along(own, &line.station);
-            if !table.is_empty() {
-                line.pace = Pace::new(table, of(max_acceleration), of(&motion.max_jerk));
+            let moments = motion.along(own, &line.station, moving);
+            if !moments.is_empty() {
+                let of = |limits: &[f64; M]| narrow(limits, moving, 1.0);
+                line.pace = Pace::new(moments, of(max_acceleration), of(&motion.max_jerk));
             }
         }
         line.hold_bends(*long, |i| !own[i].is_line(), watch);
@@ -278,6 +284,11 @@ impl<const M: usize> Section<M> {
         let corners = smooth.corners.iter().map(|zone| [own[zone.start].first, own[zone.end - 1].last]);
         self.not_smooth.corners.extend(corners);
     }
+}
+
+/// The values of the axes that move, at most D; `rest` beyond them.
+fn narrow<const M: usize, const D: usize>(values: &[f64; M], moving: &[usize], rest: f64) -> [f64; D] {
+    std::array::from_fn(|k| moving.get(k).map_or(rest, |&axis| values[axis]))
 }
 
 /// All of a piece but its shape: it goes along some chords, at most `deviation` from them, in mm.

@@ -1,11 +1,11 @@
 //! The curve of least energy in the tolerance tube: a primal-dual interior-point method for a window (Mehrotra 1992).
 //!
 //! ```text
-//! minimise ½ xᵀQx   subject to   s₁ = e − (Ax − b) ≥ 0,   s₂ = e + (Ax − b) ≥ 0
+//! minimise ½ xᵀQx − pᵀx   subject to   s₁ = e − (Ax − b) ≥ 0,   s₂ = e + (Ax − b) ≥ 0
 //! ```
 //!
-//! x are the coefficients, of which some are fixed; λ₁, λ₂ are the multipliers of the slacks s₁, s₂. The start need not be
-//! feasible. Newton's matrix Q + Aᵀ diag(λ₁/s₁ + λ₂/s₂) A is banded.
+//! x are the coefficients, of which some are fixed, p is the pull of what the energy aims at; λ₁, λ₂ are the multipliers of
+//! the slacks s₁, s₂. The start need not be feasible. Newton's matrix Q + Aᵀ diag(λ₁/s₁ + λ₂/s₂) A is banded.
 //!
 //! Energies of intervals of length h differ as h⁻⁵, so that one complementarity s λ for all rows would be far too great for
 //! some and far too small for others. All rows of an interval aim at s λ = μ d ε²/h⁵ instead, the unit of the interval, d
@@ -17,7 +17,7 @@ use feedplan_geometry::lanes::{Lanes, Register};
 use super::band::Band;
 use super::quads::{Columns, LocalMatrix, Quads};
 use super::rows::Row;
-use super::spline::{Form, ORDER};
+use super::spline::{Form, Pull, ORDER};
 
 /// It ends when the sum of all s λ is below this part of the energy,
 const GAP: f64 = 1e-3;
@@ -44,6 +44,8 @@ const NO_ENERGY: f64 = 1e-8;
 pub struct Problem<const D: usize> {
     /// The forms of the energy of every interval, by axis.
     pub energy: Vec<[Form; D]>,
+    /// The pull of its aims in every interval, by axis.
+    pub pull: Vec<[Pull; D]>,
     pub rows: Vec<Row<D>>,
     /// The number of rows before each interval, and all of them.
     pub start: Vec<usize>,
@@ -154,7 +156,7 @@ struct Newton<'a, const D: usize> {
 
 impl<'a, const D: usize> Newton<'a, D> {
     fn new(problem: &'a Problem<D>, band: &'a mut Band<D>) -> Self {
-        let quads = Quads::new(&problem.rows, &problem.start, &problem.energy, &problem.unit);
+        let quads = Quads::new(problem);
         let zeros = Columns::zeros(quads.count());
         let mut x = zeros.clone();
         x.set(&problem.x);
@@ -440,8 +442,9 @@ mod tests {
             .collect();
         let mut fixed = vec![false; 45];
         (fixed[0], fixed[44]) = (true, true);
-        let energy = (0..40).map(|j| line.pace.energy(&around(&knots, j))).collect();
-        let mut problem = Problem { energy, rows, start, x, fixed, unit: vec![0.25 / 0.5f64.powi(5); 40] };
+        let (energy, pull) = (0..40).map(|j| line.pace.energy(&around(&knots, j))).unzip();
+        let mut problem =
+            Problem { energy, pull, rows, start, x, fixed, unit: vec![0.25 / 0.5f64.powi(5); 40] };
         let energy_of = |problem: &Problem<2>| {
             let mut sum = 0.0;
             for (j, forms) in problem.energy.iter().enumerate() {

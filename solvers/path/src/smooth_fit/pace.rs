@@ -1,23 +1,30 @@
 //! Pace: the speed u̇ at which a curve C(u) is followed, and what its derivatives cost at that speed.
 //!
-//! Where u̇ changes slowly, the acceleration of axis k is C_k'' u̇² and its jerk C_k''' u̇³. The squares of both, in parts of
-//! the limits A_k and J_k, summed over time, are the energy that the fit makes least:
+//! Where u̇ changes slowly, the acceleration of axis k is C_k'' u̇² and its jerk C_k''' u̇³. The squares of what both differ
+//! by from an aim, in parts of the limits A_k and J_k, summed over time, are the energy that the fit makes least:
 //!
 //! ```text
-//! Σ_k ∫ (C_k'' u̇²/A_k)² + (C_k''' u̇³/J_k)² dt = Σ_k ∫ u̇³ C_k''²/A_k² + u̇⁵ C_k'''²/J_k² du
+//! Σ_k ∫ u̇³ (C_k'' − aim₂)²/A_k² + u̇⁵ (C_k''' − aim₃)²/J_k² du
 //! ```
 //!
 //! Where the tool is slow the curve may bend sharply, and where it is fast it is smooth.
 
-use super::spline::{energies, Around, Form};
+use super::spline::{derivative_rows, gauss, Around, Form, Pull, ORDER};
 
-/// The speed counts as at least this part of the greatest: where one plan stops, the next need not.
-const LEAST: f64 = 0.2;
+/// What holds at a station.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment<const D: usize> {
+    pub station: f64,
+    /// u̇², in mm²/s².
+    pub speed_sq: f64,
+    /// The second and the third derivative that the curve should have, in 1/mm and 1/mm².
+    pub aim: [[f64; D]; 2],
+}
 
 #[derive(Clone, Debug)]
 pub struct Pace<const D: usize> {
-    /// Stations, ascending, with u̇² there; between them it is linear.
-    table: Vec<[f64; 2]>,
+    /// By ascending stations; between them all is linear.
+    moments: Vec<Moment<D>>,
     /// 1/A² and 1/J² of each axis.
     per_acceleration_sq: [f64; D],
     per_jerk_sq: [f64; D],
@@ -28,20 +35,17 @@ pub struct Pace<const D: usize> {
 impl<const D: usize> Default for Pace<D> {
     /// The same speed everywhere, limits of jerk that are the same for all axes and none of acceleration.
     fn default() -> Self {
-        Self { table: vec![[0.0, 1.0]], per_acceleration_sq: [0.0; D], per_jerk_sq: [1.0; D], fitted: false }
+        let even = Moment { station: 0.0, speed_sq: 1.0, aim: [[0.0; D]; 2] };
+        Self { moments: vec![even], per_acceleration_sq: [0.0; D], per_jerk_sq: [1.0; D], fitted: false }
     }
 }
 
 impl<const D: usize> Pace<D> {
-    /// From stations with u̇², at least one, and the limits of each axis, of which those of jerk may be infinite.
-    pub fn new(mut table: Vec<[f64; 2]>, max_acceleration: [f64; D], max_jerk: [f64; D]) -> Self {
-        let greatest = table.iter().fold(0.0, |most: f64, [_, square]| most.max(*square));
-        for [_, square] in &mut table {
-            *square = square.max(LEAST * LEAST * greatest);
-        }
+    /// From one moment or more, and the limits of each axis, of which those of jerk may be infinite.
+    pub fn new(moments: Vec<Moment<D>>, max_acceleration: [f64; D], max_jerk: [f64; D]) -> Self {
         let per_square = |limits: [f64; D]| limits.map(|limit| 1.0 / (limit * limit));
         Self {
-            table,
+            moments,
             per_acceleration_sq: per_square(max_acceleration),
             per_jerk_sq: per_square(max_jerk),
             fitted: true,
@@ -50,37 +54,62 @@ impl<const D: usize> Pace<D> {
 
     /// The pace from a station on, its stations from 0.
     pub fn from(&self, station: f64) -> Self {
-        Self { table: self.table.iter().map(|[u, square]| [u - station, *square]).collect(), ..*self }
+        let shifted = |at: &Moment<D>| Moment { station: at.station - station, ..*at };
+        Self { moments: self.moments.iter().map(shifted).collect(), ..*self }
     }
 
-    fn square(&self, u: f64) -> f64 {
-        let after = self.table.partition_point(|[station, _]| *station <= u);
-        if after == 0 || after == self.table.len() {
-            return self.table[after.max(1) - 1][1];
+    fn at(&self, u: f64) -> Moment<D> {
+        let after = self.moments.partition_point(|at| at.station <= u);
+        if after == 0 || after == self.moments.len() {
+            return self.moments[after.max(1) - 1];
         }
-        let ([u0, square0], [u1, square1]) = (self.table[after - 1], self.table[after]);
-        square0 + (square1 - square0) * (u - u0) / (u1 - u0)
+        let (a, b) = (&self.moments[after - 1], &self.moments[after]);
+        let part = (u - a.station) / (b.station - a.station);
+        let between = |a: &[f64; D], b: &[f64; D]| std::array::from_fn(|k| a[k] + (b[k] - a[k]) * part);
+        Moment {
+            station: u,
+            speed_sq: a.speed_sq + (b.speed_sq - a.speed_sq) * part,
+            aim: [0, 1].map(|order| between(&a.aim[order], &b.aim[order])),
+        }
     }
 
-    /// The energy of each axis in an interval: the matrix of its form in the coefficients that the interval sees.
-    pub fn energy(&self, t: &Around) -> [Form; D] {
-        let [second, third] = energies(t, |u| {
-            let square = self.square(u);
-            let cube = square * square.sqrt();
-            [cube, cube * square]
-        });
-        std::array::from_fn(|k| {
-            let (a, j) = (self.per_acceleration_sq[k], self.per_jerk_sq[k]);
-            std::array::from_fn(|row| std::array::from_fn(|i| a * second[row][i] + j * third[row][i]))
-        })
+    /// The weights of the squares of the second and third derivatives of axis k.
+    fn weights(&self, at: &Moment<D>, k: usize) -> [f64; 2] {
+        let cube = at.speed_sq * at.speed_sq.sqrt();
+        [self.per_acceleration_sq[k] * cube, self.per_jerk_sq[k] * cube * at.speed_sq]
+    }
+
+    /// The energy of each axis in an interval: the matrix of its form in the coefficients that the interval sees, and the
+    /// pull of its aims on them.
+    pub fn energy(&self, t: &Around) -> ([Form; D], [Pull; D]) {
+        let derivatives = derivative_rows(t);
+        let (mut forms, mut pulls) = ([[[0.0; ORDER]; ORDER]; D], [[0.0; ORDER]; D]);
+        for (u, part) in gauss(t) {
+            let (at, rows) = (self.at(u), derivatives(u));
+            for k in 0..D {
+                let weights = self.weights(&at, k).into_iter().zip(rows).zip(at.aim);
+                for ((weight, row), aim) in weights.filter(|((weight, _), _)| *weight > 0.0) {
+                    for a in 0..ORDER {
+                        let share = weight * part * row[a];
+                        pulls[k][a] += share * aim[k];
+                        for b in 0..ORDER {
+                            forms[k][a][b] += share * row[b];
+                        }
+                    }
+                }
+            }
+        }
+        (forms, pulls)
     }
 
     /// The energy per length of a curve with C''' = 1 and C'' = h in an interval of length h, for the axis for which it is
     /// greatest.
     pub fn density(&self, u: f64, h: f64) -> f64 {
-        let square = self.square(u);
-        let cube = square * square.sqrt();
-        let of = |k: usize| cube * (self.per_acceleration_sq[k] * h * h + self.per_jerk_sq[k] * square);
+        let at = self.at(u);
+        let of = |k: usize| {
+            let [second, third] = self.weights(&at, k);
+            second * h * h + third
+        };
         (0..D).map(of).fold(0.0, f64::max)
     }
 }
@@ -92,10 +121,12 @@ mod tests {
     #[test]
     fn the_energy_of_a_motion_is_that_over_time() {
         // u = t + t²/2 from t = 0 to 1: u̇² = 1 + 2u. An interval far from others, knots on even steps.
-        let table = (0..=300).map(|i| 0.005 * f64::from(i)).map(|u| [u, 1.0 + 2.0 * u]).collect();
-        let pace = Pace::<2>::new(table, [2.0, 4.0], [3.0, f64::INFINITY]);
+        let at = |station: f64, speed_sq: f64| Moment { station, speed_sq, aim: [[0.0; 2]; 2] };
+        let moments = (0..=300).map(|i| 0.005 * f64::from(i)).map(|u| at(u, 1.0 + 2.0 * u)).collect();
+        let pace = Pace::<2>::new(moments, [2.0, 4.0], [3.0, f64::INFINITY]);
         let t: Around = std::array::from_fn(|k| 1.5 * (k as f64 - 4.0));
-        let forms = pace.energy(&t);
+        let (forms, pull) = pace.energy(&t);
+        assert_eq!(pull, [[0.0; 6]; 2]);
         // C = u³ as coefficients: the blossom at five knots.
         let coefficient: [f64; 6] = std::array::from_fn(|i| {
             let knots: [f64; 5] = std::array::from_fn(|k| 1.5 * (i as f64 + k as f64 - 4.0));
@@ -122,11 +153,18 @@ mod tests {
         // At u = 0.5 with h = 2: u̇² = 2.
         let density = pace.density(0.5, 2.0);
         assert!((density - 2f64.powf(1.5) * (1.0 + 2.0 / 9.0)).abs() < 1e-9, "{density}");
-        // A part begins at its own 0, and what is slow counts as 0.2 of the greatest speed.
-        assert_eq!(pace.from(0.5).square(0.25), pace.square(0.75));
-        assert_eq!(
-            Pace::<2>::new(vec![[0.0, 0.0], [1.0, 4.0]], [1.0; 2], [1.0; 2]).square(0.0),
-            0.2 * 0.2 * 4.0
-        );
+        // A part begins at its own 0.
+        assert_eq!(pace.from(0.5).at(0.25).speed_sq, pace.at(0.75).speed_sq);
+        // A curve with the derivatives that are aimed at is pulled back as its energy pushes it.
+        let aimed = |u: f64| Moment { aim: [[6.0 * u; 2], [6.0; 2]], ..at(u, 1.0 + 2.0 * u) };
+        let (forms, pull) =
+            Pace::new((0..=300).map(|i| aimed(0.005 * f64::from(i))).collect(), [2.0, 4.0], [3.0; 2])
+                .energy(&t);
+        for k in 0..2 {
+            for a in 0..6 {
+                let push: f64 = (0..6).map(|b| forms[k][a][b] * coefficient[b]).sum();
+                assert!((push - pull[k][a]).abs() < 1e-9 * forms[k][a][a] * 10.0, "{push} {}", pull[k][a]);
+            }
+        }
     }
 }

@@ -8,8 +8,9 @@ use fearless_simd::Simd;
 use feedplan_geometry::lanes::{Lanes, Register};
 
 use super::band::Band;
+use super::interior_point::Problem;
 use super::rows::Row;
-use super::spline::{Form, ORDER};
+use super::spline::ORDER;
 
 /// Intervals of a quad.
 const LANES: usize = 4;
@@ -213,19 +214,23 @@ pub struct Quads<const D: usize> {
     /// The number of rows before each quad, and all of them.
     start: Vec<usize>,
     energy: Vec<[[[Lanes; ORDER]; ORDER]; D]>,
+    pull: Vec<[[Lanes; ORDER]; D]>,
 }
 
 impl<const D: usize> Quads<D> {
-    /// From the rows, the number of them before each interval, the energies and the units of the intervals.
-    pub fn new(rows: &[Row<D>], start: &[usize], energy: &[[Form; D]], unit: &[f64]) -> Self {
+    /// The energy and the rows of a problem.
+    pub fn new(problem: &Problem<D>) -> Self {
+        let Problem { rows, start, energy, pull, unit, .. } = problem;
         let intervals: Vec<usize> = (0..energy.len()).collect();
-        let mut out = Self { rows: Vec::with_capacity(rows.len() / 2), start: vec![0], energy: vec![] };
+        let rows_of_quads = Vec::with_capacity(rows.len() / 2);
+        let mut out = Self { rows: rows_of_quads, start: vec![0], energy: vec![], pull: vec![] };
         for quad in intervals.chunks(LANES) {
             let own = |j: usize| &rows[start[j]..start[j + 1]];
             let most = quad.iter().map(|&j| own(j).len()).max().unwrap_or(0);
             let first = out.rows.len();
             out.rows.resize(first + most, QuadRow::NONE);
             let mut forms = [[[Lanes::ZERO; ORDER]; ORDER]; D];
+            let mut pulls = [[Lanes::ZERO; ORDER]; D];
             for (lane, &j) in quad.iter().enumerate() {
                 for (i, row) in own(j).iter().enumerate() {
                     out.rows[first + i].set(lane, row, unit[j]);
@@ -234,9 +239,13 @@ impl<const D: usize> Quads<D> {
                 for (form, own) in forms.as_flattened_mut().as_flattened_mut().iter_mut().zip(own) {
                     form.values_mut()[lane] = *own;
                 }
+                for (to, own) in pulls.as_flattened_mut().iter_mut().zip(pull[j].as_flattened()) {
+                    to.values_mut()[lane] = *own;
+                }
             }
             out.start.push(out.rows.len());
             out.energy.push(forms);
+            out.pull.push(pulls);
         }
         out
     }
@@ -268,13 +277,13 @@ impl<const D: usize> Quads<D> {
         }
     }
 
-    /// Qx, and the energy ½ xᵀQx.
+    /// Qx − p, and the energy ½ xᵀQx.
     #[inline(always)]
     pub fn energy_gradient<S: Simd>(&self, simd: S, x: &Columns<D>, out: &mut Columns<D>) -> f64 {
         out.fill(0.0);
         let zero = Register::all(simd, 0.0);
         let mut twice = zero;
-        for (quad, forms) in self.energy.iter().enumerate() {
+        for (quad, (forms, pull)) in self.energy.iter().zip(&self.pull).enumerate() {
             let x = x.around(simd, quad);
             let mut terms = [[zero; D]; ORDER];
             for a in 0..ORDER {
@@ -285,6 +294,7 @@ impl<const D: usize> Quads<D> {
                 }
                 for k in 0..D {
                     twice += terms[a][k] * x[a][k];
+                    terms[a][k] = terms[a][k] - pull[k][a].load(simd);
                 }
             }
             out.add(quad, &terms);

@@ -150,7 +150,7 @@ fn frame<const D: usize>(along: &[f64; D]) -> [[f64; D]; D] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::pace::Pace;
+    use super::super::pace::{Moment, Pace};
     use super::*;
 
     #[test]
@@ -178,7 +178,8 @@ mod tests {
         assert!((corner.half[0] - 0.095).abs() < 1e-15);
         assert!((dot(&corner.direction[1], &[1.0, 1.0])).abs() > 1.3);
         // A curve that is fitted to a motion may slip along the polyline, but not where a vertex is held.
-        line.pace = Pace::new(vec![[0.0, 1.0]], [1.0; 2], [1.0; 2]);
+        let even = Moment { station: 0.0, speed_sq: 1.0, aim: [[0.0; 2]; 2] };
+        line.pace = Pace::new(vec![even], [1.0; 2], [1.0; 2]);
         let along = |line: &Polyline<2>| {
             let (rows, _) = super::rows(line, &knots, 0, &[1.0; 4], &[0.0; 2]);
             rows.iter().map(|row| row.half[1]).fold(0.0, f64::max)

@@ -56,35 +56,33 @@ fn basis_of_degree(t: &Around, u: f64, degree: usize, out: &mut [f64]) {
 /// A quadratic form in the coefficients that an interval sees.
 pub type Form = [[f64; ORDER]; ORDER];
 
-/// ∫ w₂ |C''|² du and ∫ w₃ |C'''|² du over an interval, as forms of one axis; `weights` gives w₂ and w₃ at a place.
-pub fn energies(t: &Around, weights: impl Fn(f64) -> [f64; 2]) -> [Form; 2] {
-    // Abscissae and weights of Gauss on [−1, 1]: exact for the square of a cubic.
-    const GAUSS: [(f64, f64); 4] = [
+/// A linear form in the coefficients that an interval sees.
+pub type Pull = [f64; ORDER];
+
+/// Places in an interval and their weights, after Gauss: exact for the square of a cubic.
+pub fn gauss(t: &Around) -> [(f64, f64); 4] {
+    // Abscissae and weights on [−1, 1].
+    const NODES: [(f64, f64); 4] = [
         (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
         (-0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
         (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
         (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
     ];
-    let differences = [derivative_coefficients::<2>(t), derivative_coefficients::<3>(t)];
     let (middle, half) = (0.5 * (t[4] + t[5]), 0.5 * (t[5] - t[4]));
-    let mut out = [[[0.0; ORDER]; ORDER]; 2];
-    for (x, share) in GAUSS {
-        let u = middle + half * x;
-        for (which, weight) in weights(u).into_iter().enumerate().filter(|(_, weight)| *weight > 0.0) {
-            let degree = DEGREE - 2 - which;
+    NODES.map(|(x, weight)| (middle + half * x, half * weight))
+}
+
+/// C'' and C''' at u as linear forms of one axis.
+pub fn derivative_rows(t: &Around) -> impl Fn(f64) -> [Pull; 2] + '_ {
+    let differences = [derivative_coefficients::<2>(t), derivative_coefficients::<3>(t)];
+    move |u| {
+        std::array::from_fn(|which| {
+            let (degree, rows) = (DEGREE - 2 - which, &differences[which]);
             let mut values = [0.0; ORDER];
             basis_of_degree(t, u, degree, &mut values);
-            let rows = &differences[which];
-            let row: [f64; ORDER] =
-                std::array::from_fn(|a| (0..=degree).map(|q| values[q] * rows[q][a]).sum());
-            for a in 0..ORDER {
-                for b in 0..ORDER {
-                    out[which][a][b] += weight * share * half * row[a] * row[b];
-                }
-            }
-        }
+            std::array::from_fn(|a| (0..=degree).map(|q| values[q] * rows[q][a]).sum())
+        })
     }
-    out
 }
 
 /// The coefficients of the derivative of an order, a spline of a lower degree, from those of C; rows beyond them are of
@@ -186,13 +184,10 @@ mod tests {
             })
             .collect();
         for j in 0..5 {
-            let [_, form] = energies(&around(&KNOTS, j), |_| [0.0, 1.0]);
-            let mut sum = 0.0;
-            for a in 0..ORDER {
-                for b in 0..ORDER {
-                    sum += coefficient[j + a] * form[a][b] * coefficient[j + b];
-                }
-            }
+            let t = around(&KNOTS, j);
+            let rows = derivative_rows(&t);
+            let third = |u: f64| -> f64 { (0..ORDER).map(|a| rows(u)[1][a] * coefficient[j + a]).sum() };
+            let sum: f64 = gauss(&t).iter().map(|(u, weight)| weight * third(*u).powi(2)).sum();
             let expected = 36.0 * (KNOTS[j + 1] - KNOTS[j]);
             assert!((sum / expected - 1.0).abs() < 1e-11, "{j}: {sum} {expected}");
         }

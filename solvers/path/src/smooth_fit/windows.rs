@@ -131,8 +131,10 @@ impl<'a, const D: usize> Fit<'a, D> {
             let tolerance = self.line.tolerance[self.line.chord_at(knots[j])];
             density[j - first] * tolerance.powi(2) / (knots[j + 1] - knots[j]).powi(5)
         };
+        let (energy, pull) = (first..end).map(|j| pace.energy(&around(knots, j))).unzip();
         let mut problem = Problem {
-            energy: (first..end).map(|j| pace.energy(&around(knots, j))).collect(),
+            energy,
+            pull,
             rows,
             start,
             x: given.iter().map(|x| std::array::from_fn(|k| x[k] - origin[k])).collect(),

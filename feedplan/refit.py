@@ -1,0 +1,119 @@
+"""Motions that a path is fitted to: that of a plan, and one along the gradient of its least time.
+
+The fit makes the energy of `solvers/path/src/smooth_fit/pace.rs` least: the squares of what the second and
+third derivatives differ by from those aimed at, weighted by u̇³/A² and u̇⁵/J². For a path that knows no speed
+these aims are 0. A step along the gradient aims at the derivatives of the path less `step` times the gradient
+over the weights: the energy is then the change of the time to first order, and in place of its second order
+half the weighted square of the step over `step`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.geometry.path import Path
+from feedplan.geometry.rules import Motion
+from feedplan.path_gradient import PathGradient
+from feedplan.profile import SpeedProfile
+
+Array = NDArray[np.float64]
+
+# The speed counts as at least this part of the greatest of its run: where one plan stops, the next need not.
+LEAST_SPEED = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class FitLimits:
+    """The greatest `acceleration` [mm/s²] and `jerk` [mm/s³] of the axes of a path (axes,).
+
+    The jerk is infinite where the plan has no limit of it."""
+
+    acceleration: Array
+    jerk: Array
+
+
+def at_speed_of(problem: Problem, profile: SpeedProfile, limits: FitLimits) -> Motion:
+    """The motion of a plan, no derivatives aimed at."""
+    path = problem.path
+    ends = np.searchsorted(profile.piece, path.runs)
+    # The starts of all phases, and the end of the last one of each run.
+    piece = np.insert(profile.piece.astype(np.int64), ends[1:], path.runs[1:] - 1)
+    u = np.insert(profile.u0, ends[1:], path.width[path.runs[1:] - 1])
+    p = np.insert(profile.p0, ends[1:], profile.p1[ends[1:] - 1])
+    finite = np.isfinite(p)
+    p = np.where(finite, p, p[finite].max(initial=0.0))
+    # Where one move ends and the next begins at rest, a run goes back along its own line.
+    start = np.searchsorted(profile.piece, np.arange(1, len(path)))
+    rests = 1 + np.flatnonzero((path.move[1:, 0] > path.move[:-1, 1]) & (profile.p0[start] == 0.0))
+    nothing = np.zeros((len(piece), len(limits.jerk)))
+    return _motion(path, np.union1d(path.runs, rests), piece, u, p, nothing, nothing, limits)
+
+
+def along_gradient(problem: Problem, at: PathGradient, limits: FitLimits, step: float) -> Motion:
+    """The motion whose path is less than that of a plan by a step along the gradient."""
+    path = problem.path
+    runs = path.runs
+    second_weight, third_weight = _weights(path, at, limits)
+    second = at.second - step * at.by_second / second_weight
+    # Without limits of jerk the third derivatives count nothing.
+    third = at.third - step * at.by_third / np.where(third_weight > 0.0, third_weight, 1.0)
+    return _motion(path, runs, at.piece, at.u, at.p, second, third, limits)
+
+
+def promise(
+    at: PathGradient, path: Path, other: Path, runs: list[NDArray[np.int64]], limits: FitLimits, step: float
+) -> float:
+    """The time [s] that the sections promise to save on which the other path is faster to second order.
+
+    `runs` are the offsets of the sections in both paths."""
+    begin, of_other = (np.concatenate([[0.0], np.cumsum(each.width)]) for each in (path, other))
+    place = np.interp(begin[at.piece] + at.u, begin[path.runs[runs[0]]], of_other[other.runs[runs[1]]])
+    piece = np.clip(np.searchsorted(of_other, place, side="right") - 1, 0, len(other) - 1)
+    u = np.clip(place - of_other[piece], 0.0, other.width[piece])
+    _, _, second, third = other.curve.evaluate(piece, u, 3)
+    saved = np.zeros(len(place))
+    of_orders = (second - at.second, at.by_second), (third - at.third, at.by_third)
+    for weight, (change, by) in zip(_weights(path, at, limits), of_orders, strict=True):
+        saved -= (at.width[:, None] * (by * change + 0.5 / step * weight * change**2)).sum(axis=1)
+    first = np.searchsorted(at.piece, path.runs[runs[0][:-1]])
+    return float(np.maximum(np.add.reduceat(saved, first), 0.0).sum())
+
+
+def _weights(path: Path, at: PathGradient, limits: FitLimits) -> tuple[Array, Array]:
+    """u̇³/A² and u̇⁵/J² (m, axes) at the speed that counts."""
+    p = _counted(at.p, np.searchsorted(at.piece, path.runs))[:, None]
+    return p**1.5 / limits.acceleration**2, p**2.5 / limits.jerk**2
+
+
+def _counted(p: Array, start: NDArray[np.int64]) -> Array:
+    """p as it counts, runs from `start` (r + 1,)."""
+    greatest = np.maximum.reduceat(p, start[:-1])
+    return np.maximum(p, LEAST_SPEED**2 * np.repeat(greatest, np.diff(start)))
+
+
+def _motion(
+    path: Path,
+    runs: NDArray[np.int64],
+    piece: NDArray[np.int64],
+    u: Array,
+    p: Array,
+    second: Array,
+    third: Array,
+    limits: FitLimits,
+) -> Motion:
+    begin, start = np.concatenate([[0.0], np.cumsum(path.width)]), np.searchsorted(piece, runs)
+    run = np.repeat(np.arange(len(runs) - 1), np.diff(start))
+    part = (begin[piece] + u - begin[runs[run]]) / np.diff(begin[runs])[run]
+    return Motion(
+        run=np.stack([path.move[runs[:-1], 0], path.move[runs[1:] - 1, 1]], axis=1),
+        start=start,
+        place=np.clip(part, 0.0, 1.0),
+        speed_sq=_counted(p, start),
+        second=second,
+        third=third,
+        max_jerk=limits.jerk,
+    )
