@@ -32,7 +32,7 @@ MAX_ROUNDS = 3
 _WORTH_TRYING = 1e-3
 # A section that is shorter by less than this part is none the faster.
 _ROUNDING = 1e-9
-# A step that gains nowhere is followed by one that is shorter by this factor.
+# Where a step does not gain, the next one is shorter by this factor.
 _SHORTER = 0.3
 
 
@@ -88,7 +88,9 @@ def faster(
     makes a path for a motion and `follow` plans it; `join` states the problem along a path.
     """
     best, times, promised = first, [first.time], list[float]()
-    sections, count, step = _Sections(first.path, first.path), 0, 1.0
+    sections, count = _Sections(first.path, first.path), 0
+    # The length of the next step, by move.
+    step = np.ones(int(first.path.move.max()) + 1)
     # What can be planned along one path need not be along another; the best so far holds.
     with suppress(InfeasibleError, SolverError):
         # Of a step after the last round only the promise is wanted.
@@ -99,10 +101,11 @@ def faster(
             if turn == rounds and not stepping:
                 break
             if stepping:
-                gradient = path_gradient(problem, best.profile, limits.jerk)
-                path = fit(along_gradient(problem, gradient, limits, step))
-                both = _Sections(problem.path, path).runs
-                promised.append(promise(gradient, problem.path, path, both, limits, step))
+                along, gradient = problem.path, path_gradient(problem, best.profile, limits.jerk)
+                length = step[along.move[gradient.piece, 0]]
+                path = fit(along_gradient(along, gradient, limits, length))
+                both = _Sections(along, path).runs
+                promised.append(promise(gradient, along, path, both, limits, length))
             else:
                 path = fit(at_speed_of(problem, best.profile, limits))
             if turn == rounds:
@@ -117,18 +120,19 @@ def faster(
             count = int(better.sum())
             if count:
                 best = other if better.all() else _joined(best, other, sections, better, join)
-            elif stepping:
-                step *= _SHORTER
+            if stepping:
+                step[~better[np.searchsorted(sections.last, np.arange(len(step)))]] *= _SHORTER
             times.append(best.time)
     return best, Gain(tuple(times), tuple(promised), len(sections), count)
 
 
 class _Sections:
-    """The runs of two paths of one program between the stops that both have: offsets in both."""
+    """What lies between the stops that two paths of one program have: offsets of runs in both, last moves."""
 
     def __init__(self, first: Path, other: Path) -> None:
         ends = [_stops(path) for path in (first, other)]
         common = np.intersect1d(ends[0], ends[1])
+        self.last = np.append(common, first.move.max())
         self.runs = [
             np.concatenate(
                 [[0], np.searchsorted(_last_moves(path), common, side="right"), [len(path.runs) - 1]]

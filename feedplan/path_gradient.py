@@ -32,6 +32,8 @@ _CELLS, _PLACES = 3, (0.05, 0.95)
 _NEAR = 0.5
 # Where all axes use less of acceleration and jerk than the first, or a speed reaches the second, p stays.
 _IDLE, _AT_SPEED = 0.9, 0.999
+# The greatest multiplier, in parts of the time that a place takes: where p has no room, any would do.
+_DEAREST = 3.0
 # Next to rest, where p is less than this part of the greatest of the run, p stays too.
 _REST = 2e-3
 
@@ -165,7 +167,8 @@ class _Program:
         may[spline.column[known]] = False
         self._index = np.where(may, np.cumsum(may) - 1, -1)
         self._free = int(may.sum())
-        self._limits: list[tuple[Any, Array]] = []
+        self._limits: list[tuple[Any, Array, Array]] = []
+        self._most = _DEAREST * width / np.sqrt(np.maximum(p, 1e-300))
         moving = np.flatnonzero(~known)
         time = width[moving] / np.sqrt(p[moving])
         self._time = float(time.sum())
@@ -185,27 +188,31 @@ class _Program:
 
     def limit(self, at: NDArray[np.int64], values: Array, most: Array) -> None:
         """Σ values · change of the coefficients at a place is at most `most`."""
-        self._limits.append((self._matrix(at, values), most))
+        self._limits.append((self._matrix(at, values), most, self._most[at]))
 
     def multipliers(self) -> list[Array]:
         """Those of the limits, a list for each call of `limit` [s]."""
         import clarabel
         from scipy import sparse
 
-        counts = [len(most) for _, most in self._limits]
+        counts = [len(most) for _, most, _ in self._limits]
         if not self._free:
             return [np.zeros(count) for count in counts]
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
+        rows = sum(counts)
+        # By how much each limit gives way.
+        way, none = sparse.identity(rows), sparse.csr_matrix((rows, rows))
+        limits = sparse.vstack([matrix for matrix, _, _ in self._limits])
         found = clarabel.DefaultSolver(
-            sparse.triu(self._curvature).tocsc(),
-            self._cost,
-            sparse.vstack([matrix for matrix, _ in self._limits]).tocsc(),
-            np.concatenate([most for _, most in self._limits]),
-            [clarabel.NonnegativeConeT(sum(counts))],
+            sparse.block_diag([sparse.triu(self._curvature), none]).tocsc(),
+            np.concatenate([self._cost, *(most / self._time for _, _, most in self._limits)]),
+            sparse.bmat([[limits, -way], [None, -way]]).tocsc(),
+            np.concatenate([*(most for _, most, _ in self._limits), np.zeros(rows)]),
+            [clarabel.NonnegativeConeT(2 * rows)],
             settings,
         ).solve()
-        multiplier = np.array(found.z)
+        multiplier = np.array(found.z)[:rows]
         if not np.isfinite(multiplier).all():
             raise SolverError(f"Clarabel finds no gradient of the time along the path: {found.status}")
         return np.split(self._time * multiplier, np.cumsum(counts)[:-1])

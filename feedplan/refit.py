@@ -53,19 +53,17 @@ def at_speed_of(problem: Problem, profile: SpeedProfile, limits: FitLimits) -> M
     return _motion(path, np.union1d(path.runs, rests), piece, u, p, nothing, nothing, limits)
 
 
-def along_gradient(problem: Problem, at: PathGradient, limits: FitLimits, step: float) -> Motion:
-    """The motion whose path is less than that of a plan by a step along the gradient."""
-    path = problem.path
-    runs = path.runs
+def along_gradient(path: Path, at: PathGradient, limits: FitLimits, step: Array) -> Motion:
+    """The motion of a plan, its path less a step along the gradient; `step` (m,) is the length by place."""
     second_weight, third_weight = _weights(path, at, limits)
-    second = at.second - step * at.by_second / second_weight
+    second = at.second - step[:, None] * at.by_second / second_weight
     # Without limits of jerk the third derivatives count nothing.
-    third = at.third - step * at.by_third / np.where(third_weight > 0.0, third_weight, 1.0)
-    return _motion(path, runs, at.piece, at.u, at.p, second, third, limits)
+    third = at.third - step[:, None] * at.by_third / np.where(third_weight > 0.0, third_weight, 1.0)
+    return _motion(path, path.runs, at.piece, at.u, at.p, second, third, limits)
 
 
 def promise(
-    at: PathGradient, path: Path, other: Path, runs: list[NDArray[np.int64]], limits: FitLimits, step: float
+    at: PathGradient, path: Path, other: Path, runs: list[NDArray[np.int64]], limits: FitLimits, step: Array
 ) -> float:
     """The time [s] that the sections promise to save on which the other path is faster to second order.
 
@@ -78,7 +76,7 @@ def promise(
     saved = np.zeros(len(place))
     of_orders = (second - at.second, at.by_second), (third - at.third, at.by_third)
     for weight, (change, by) in zip(_weights(path, at, limits), of_orders, strict=True):
-        saved -= (at.width[:, None] * (by * change + 0.5 / step * weight * change**2)).sum(axis=1)
+        saved -= (at.width[:, None] * (by * change + 0.5 / step[:, None] * weight * change**2)).sum(axis=1)
     first = np.searchsorted(at.piece, path.runs[runs[0][:-1]])
     return float(np.maximum(np.add.reduceat(saved, first), 0.0).sum())
 
