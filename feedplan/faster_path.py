@@ -88,14 +88,14 @@ def faster(
     makes a path for a motion and `follow` plans it; `join` states the problem along a path.
     """
     best, times, promised = first, [first.time], list[float]()
-    sections, count = _Sections(first.path, first.path), 0
+    sections, count, stopped = _Sections(first.path, first.path), 0, first.profile.stopped
     # The length of the next step, by move.
     step = np.ones(int(first.path.move.max()) + 1)
     # What can be planned along one path need not be along another; the best so far holds.
     with suppress(InfeasibleError, SolverError):
         # Of a step after the last round only the promise is wanted.
         for turn in range(rounds + (rounds > 1)):
-            if not (_excess(best) > _WORTH_TRYING).any():
+            if stopped or not (_excess(best) > _WORTH_TRYING).any():
                 break
             problem, stepping = best.problem, turn > 0 and best.problem.joints is None
             if turn == rounds and not stepping:
@@ -111,6 +111,8 @@ def faster(
             if turn == rounds:
                 break
             other = follow(path)
+            # The time limit is for all plans.
+            stopped = other.profile.stopped
             sections = _Sections(best.path, other.path)
             before, after = (
                 _sums(each.profile.run_times, runs)

@@ -85,6 +85,7 @@ def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Array) -> P
 
     spline = _Spline.of(path.runs, size, piece, part, degree=max(uses) - 1)
     program = _Program(spline, p, width, free=moves & busy, known=~moves)
+    moves &= program.touched
     stays = np.flatnonzero(moves & (fast | ~busy))
     program.limit(stays, spline.value[stays], np.zeros(len(stays)))
     changes = np.zeros((2, *second.shape))
@@ -167,6 +168,8 @@ class _Program:
         may[spline.column[known]] = False
         self._index = np.where(may, np.cumsum(may) - 1, -1)
         self._free = int(may.sum())
+        # The places at which p may change.
+        self.touched = (self._index[spline.column] >= 0).any(axis=1)
         self._limits: list[tuple[Any, Array, Array]] = []
         self._most = _DEAREST * width / np.sqrt(np.maximum(p, 1e-300))
         moving = np.flatnonzero(~known)

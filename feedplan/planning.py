@@ -478,7 +478,7 @@ def plan(
             return profile
 
         profile = solved(problem)
-    if refits and program is not None and not profile.stopped:
+    if refits and program is not None:
         fit = partial(build_path, program, machine, tolerance, corners=Corners.SMOOTH)
 
         def follow(path: Path) -> Followed:
