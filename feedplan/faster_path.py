@@ -32,6 +32,8 @@ MAX_ROUNDS = 3
 _WORTH_TRYING = 1e-3
 # A section that is shorter by less than this part is none the faster.
 _ROUNDING = 1e-9
+# A step is planned only if it promises to save this part of the time.
+_PROMISING = 1e-5
 # Where a step does not gain, the next one is shorter by this factor.
 _SHORTER = 0.3
 
@@ -97,17 +99,14 @@ def faster(
         for turn in range(rounds + (rounds > 1)):
             if stopped or not (_excess(best) > _WORTH_TRYING).any():
                 break
-            problem, stepping = best.problem, turn > 0 and best.problem.joints is None
-            if turn == rounds and not stepping:
-                break
+            stepping = turn > 0 and best.problem.joints is None
             if stepping:
-                along, gradient = problem.path, path_gradient(problem, best.profile, limits.jerk)
-                length = step[along.move[gradient.piece, 0]]
-                path = fit(along_gradient(along, gradient, limits, length))
-                both = _Sections(along, path).runs
-                promised.append(promise(gradient, along, path, both, limits, length))
-            else:
-                path = fit(at_speed_of(problem, best.profile, limits))
+                path, saving = _stepped(best, limits, step, fit)
+                promised.append(saving)
+                if saving < _PROMISING * best.time:
+                    break
+            elif turn < rounds:
+                path = fit(at_speed_of(best.problem, best.profile, limits))
             if turn == rounds:
                 break
             other = follow(path)
@@ -126,6 +125,16 @@ def faster(
                 step[~better[np.searchsorted(sections.last, np.arange(len(step)))]] *= _SHORTER
             times.append(best.time)
     return best, Gain(tuple(times), tuple(promised), len(sections), count)
+
+
+def _stepped(
+    best: Followed, limits: FitLimits, step: NDArray[np.float64], fit: Callable[[Motion], Path]
+) -> tuple[Path, float]:
+    """The path a step along the gradient from the best, and what it promises to save [s]."""
+    along, gradient = best.problem.path, path_gradient(best.problem, best.profile, limits.jerk)
+    length = step[along.move[gradient.piece, 0]]
+    path = fit(along_gradient(along, gradient, limits, length))
+    return path, promise(gradient, along, path, _Sections(along, path).runs, limits, length)
 
 
 class _Sections:
