@@ -22,6 +22,7 @@
 mod axis_way;
 mod clock;
 mod lengths;
+mod phase;
 mod rate;
 
 use std::rc::Rc;
@@ -34,6 +35,8 @@ use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::Coefficients;
 use feedplan_planner::phase_law::PhaseLaw;
 pub use lengths::{Counts, PiecePath};
+pub use phase::Phase;
+use phase::{Part, SLOW};
 pub use rate::{TipSpeed, MAX_TIP};
 
 /// A step's length is met within this part of the step. 1e-6 would do for the length; four digits more keep the second
@@ -47,27 +50,8 @@ const JERK_STEP_ERROR: f64 = 1e-13;
 const OFF_TURN: f64 = 3e-5;
 /// The same where C' vanishes; the length grows with the square of the part at least.
 const OFF_CUSP: f64 = 1e-3;
-/// C' vanishes at an end where |C'|² is below this part of that in the middle of the phase.
-const SLOW: f64 = 1e-8;
 /// Tangents of a straight line differ from it by at most this part of the longest one (rounding).
 const OFF_LINE: f64 = 1e-14;
-
-/// One phase of a profile: `value` is the constant of its law, u0 < u1 local parameters, p at both ends, and where the jerk
-/// is limited the acceleration along the path.
-#[derive(Clone, Copy, Debug)]
-pub struct Phase {
-    pub piece: u32,
-    pub law: PhaseLaw,
-    pub axis: u8,
-    pub value: f64,
-    pub u0: f64,
-    pub u1: f64,
-    pub p0: f64,
-    pub p1: f64,
-    pub duration: f64,
-    pub a0: f64,
-    pub a1: f64,
-}
 
 /// Velocity, acceleration and jerk of every axis.
 #[derive(Clone, Copy, Debug)]
@@ -358,23 +342,6 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
     /// The piece of the phase with its table of lengths.
     pub fn path(&self) -> &PiecePath<'a, M> {
         &self.path
-    }
-}
-
-/// A share of the whole measure of a phase, counted from its start or from its end.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    from_start: bool,
-    share: f64,
-}
-
-impl Part {
-    fn nearer_end(self) -> Self {
-        if self.share <= 0.5 {
-            self
-        } else {
-            Self { from_start: !self.from_start, share: 1.0 - self.share }
-        }
     }
 }
 

@@ -11,6 +11,7 @@
 
 mod check;
 mod chunk;
+mod path_data;
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -21,9 +22,9 @@ use rayon::prelude::*;
 use self::check::check;
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
-use crate::phase_motion::{Counts, Phase, PhaseMotion, PiecePath, Rates, State, TipSpeed};
+pub use self::path_data::PathData;
+use crate::phase_motion::{Phase, PhaseMotion, PiecePath, Rates, State};
 use feedplan_geometry::quadratic::{dot, norm};
-use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
 /// More setpoints than this are refused: their indices and arrays would serve nobody.
@@ -76,21 +77,6 @@ pub struct Resume {
     u: f64,
 }
 
-/// What a path gives: the curve that the axes follow; where the feed is about another one, and where laws of jerk are,
-/// the Bernstein coefficients of the squares of their speeds per parameter, with offsets; the source lines of the
-/// pieces, runs as piece offsets, and the pauses before the first run and after each.
-pub struct PathData<const M: usize> {
-    pub curve: Arc<CompositeCurve<M>>,
-    pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
-    pub way_speed: Option<(Vec<f64>, Vec<usize>)>,
-    /// What the axes count in the feed on each piece; empty where that is not by shares.
-    pub feed_share: Vec<[f64; M]>,
-    pub lines: Vec<i32>,
-    pub runs: Vec<usize>,
-    pub start_dwell: f64,
-    pub dwell: Vec<f64>,
-}
-
 /// A profile on its path, ready to be read at any setpoint.
 pub struct Sampler<const M: usize> {
     path: Arc<PathData<M>>,
@@ -102,26 +88,6 @@ pub struct Sampler<const M: usize> {
     count: usize,
     /// The path ends at a speed: the last setpoint has its true time.
     ends_moving: bool,
-}
-
-impl<const M: usize> PathData<M> {
-    /// Piece i with the lengths that laws are about.
-    fn piece(&self, i: usize) -> PiecePath<'_, M> {
-        let [feed, way] = [&self.tip_speed, &self.way_speed].map(|speed| {
-            speed.as_ref().map(|(coefficients, offsets)| {
-                let coefficients = &coefficients[offsets[i]..offsets[i + 1]];
-                Counts::Tip(TipSpeed { coefficients, width: self.curve.width[i] })
-            })
-        });
-        let shares = self.feed_share.get(i).filter(|share| **share != [1.0; M]).copied();
-        let feed = feed.or(shares.map(Counts::Shares)).unwrap_or(Counts::Axes);
-        PiecePath::new(self.curve.piece(i), feed, way.unwrap_or(Counts::Axes))
-    }
-
-    /// The motion on a phase.
-    fn motion(&self, phase: &Phase) -> PhaseMotion<'_, M> {
-        PhaseMotion::new(Rc::new(self.piece(phase.piece as usize)), phase)
-    }
 }
 
 impl<const M: usize> Sampler<M> {

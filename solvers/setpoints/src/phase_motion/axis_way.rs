@@ -5,7 +5,7 @@
 //! q'_k ≥ 0. On rational pieces q'_k = h/ω² and its integral is m/ω.
 
 use super::clock::Even;
-use super::{Part, Phase};
+use super::phase::{Part, Phase};
 use feedplan_geometry::inverse_length::Located;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::norm;
@@ -70,6 +70,9 @@ impl Way {
         // Exact where q'_k is linear.
         let g = (low * low + part * (high - low) * (high + low)).sqrt();
         let mut x = if low + g > 0.0 { part * (low + high) / (low + g) } else { part };
+        if self.h.degree() <= 1 && self.omega.degree() == 0 {
+            return (x.min(1.0), 0);
+        }
         let (mut from, mut to) = (0.0, 1.0);
         for round in 1..=MAX_ROUNDS {
             if !(from < x && x < to) {

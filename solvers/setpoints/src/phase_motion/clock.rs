@@ -3,8 +3,8 @@
 //! Parts are counted from the end of the phase that is nearer in time, so that nothing is lost next to rest.
 
 use super::lengths::{fill, PiecePath};
+use super::phase::{Part, Phase, SLOW};
 use super::rate::{FromRest, Line};
-use super::{Part, Phase, SLOW};
 use feedplan_geometry::arc_length::{quadrature, Disc, Integrand, Node, Table};
 use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_geometry::spline::speed::greatest_ratio;

@@ -3,8 +3,8 @@
 
 use std::cell::OnceCell;
 
+use super::phase::{Phase, SLOW};
 use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
-use super::{Phase, SLOW};
 use feedplan_geometry::arc_length::{quadrature, tabulate, Integrand, Node, Table};
 use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_geometry::newton;

@@ -1,6 +1,6 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
-use super::PathData;
+use super::path_data::PathData;
 use crate::phase_motion::{flaw, Phase, MAX_TIP};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
