@@ -1,11 +1,12 @@
 //! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
 
-use super::curve::{distance, from_to, inner, length, Curves, Segment};
+use super::curve::Curves;
 use super::deviation::{settled, window};
-use super::moves::Neighbours;
+use super::neighbours::Neighbours;
 use super::profile_clock::Reader;
-use super::setpoints::Row;
+use super::rows::Row;
 use super::tracking::{is_step, Plan};
+use super::vectors::{distance, from_to, inner, length, Segment};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
@@ -58,9 +59,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
     /// Recorded velocity and acceleration against the profile's.
     fn recorded(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
         let (Some(profile), limits, nearest) = (&mut self.profile, self.limits, &row.nearest) else { return };
-        let here = profile.go_to(nearest.place);
         if let Some(recorded) = row.velocity {
-            let velocity = profile.velocity(&here);
+            let velocity = nearest.velocity;
             let away = rounding + nearest.off.max(0.0) + nearest.late;
             let rest = self.plan.path.width[nearest.place.piece] - nearest.place.u;
             let at_joint = nearest.place.u.min(rest) <= PLACE_TOLERANCE;
@@ -74,6 +74,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
             }
         }
         if let Some(recorded) = row.acceleration {
+            let here = profile.go_to(nearest.place);
             let range = profile.accelerations(&here, row.t, limits.period);
             let mut off: [f64; M] =
                 std::array::from_fn(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));

@@ -7,10 +7,12 @@
 
 use rayon::prelude::*;
 
-use super::curve::{distance, Followed};
-use super::moves::{Move, Neighbours, Programmed};
-use super::nearest::distance_to_piece;
+use super::curve::Followed;
+use super::moves::{Move, Programmed};
+use super::nearest::{distance_to_piece, outwards};
+use super::neighbours::{Followers, Neighbours};
 use super::phases::Phases;
+use super::vectors::distance;
 use super::{tell, Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
 /// Even places of a piece of degree 2, and as many again between two of them where it comes near its tolerance.
@@ -56,7 +58,6 @@ pub(crate) fn audit_path<const M: usize>(
                 tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
             }
         }
-        let curve = path.curve::<M>(i);
         for k in 0..path.axes {
             for q in [path.start::<M>(i)[k], path.end::<M>(i)[k]] {
                 offer_travel(tally, limits, k, q, time, line);
@@ -65,7 +66,7 @@ pub(crate) fn audit_path<const M: usize>(
             let reach = control.iter().skip(k).step_by(path.stride);
             let worst = tally.get(Check::Travel, k).ratio;
             if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
-                for q in curve.extremes(k) {
+                for q in path.curve::<M>(i).extremes(k) {
                     offer_travel(tally, limits, k, q, time, line);
                 }
             }
@@ -180,9 +181,6 @@ fn piece_to_moves<const M: usize>(
     }
 }
 
-/// First and last piece that follow a move.
-pub type Followers = (usize, usize);
-
 /// The pieces near every move. A move that no piece names lies between those of the moves around it.
 fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
     let mut named: Vec<Option<Followers>> = vec![None; moves];
@@ -255,24 +253,6 @@ fn move_to_pieces<const M: usize>(
     tally.samples += places as u64 + 1;
 }
 
-/// `from`, then its neighbours on both sides by turns, within `least` to `most`.
-pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = usize> {
-    let (mut after, mut before, mut turn) = (from + 1, from, false);
-    let others = std::iter::from_fn(move || {
-        turn = if after > most { false } else { before <= least || !turn };
-        if turn {
-            after += 1;
-            Some(after - 1)
-        } else {
-            (before > least).then(|| {
-                before -= 1;
-                before
-            })
-        }
-    });
-    std::iter::once(from).chain(others)
-}
-
 /// When the tool enters each piece, and when it leaves the last one, in s.
 fn entry_times(path: &Followed, phases: Option<&Phases>) -> Vec<f64> {
     let mut times = vec![0.0; path.len() + 1];
@@ -313,12 +293,6 @@ mod tests {
     use super::*;
     use crate::curve::Pieces;
     use crate::{Sided, FEEDS};
-
-    #[test]
-    fn places_are_looked_at_from_near_to_far() {
-        assert_eq!(outwards(2, 1, 5).collect::<Vec<_>>(), [2, 3, 1, 4, 5]);
-        assert_eq!(outwards(5, 5, 5).collect::<Vec<_>>(), [5]);
-    }
 
     /// Two pieces of degree 2 along X, with numbers that may be none.
     fn numbers(x: f64, weights: &[f64], width: f64) -> f64 {

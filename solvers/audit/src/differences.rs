@@ -3,8 +3,8 @@
 //! A first difference over its time is a mean velocity, a second difference a mean acceleration: where one
 //! exceeds a limit the motion does. A position is known to `EPS` of its magnitude and a time to `EPS` of its own.
 
-use super::curve::{from_to, inner, length};
-use super::setpoints::Row;
+use super::rows::Row;
+use super::vectors::{from_to, inner, length};
 use super::{Limits, EPS, PASS_EXCESS, PASS_MARK, ROUNDINGS};
 
 /// Setpoints on end.

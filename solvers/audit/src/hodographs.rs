@@ -3,8 +3,8 @@
 //! C = P_0 + N/ω, polynomial where ω = 1. The coefficients of the derivatives of N and ω are differences of theirs; sums of
 //! positive weights of these lose no digits (scheme of Schumaker and Volk 1986). The quotient rule makes the derivatives of C.
 
-use super::curve::{length, vector_of};
 use super::polygon::{Polygon, MOST};
+use super::vectors::{length, vector_of};
 
 /// Coefficients of a function of the piece, times binomials.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];
@@ -109,6 +109,16 @@ impl<const M: usize> Hodographs<M> {
         vector_of(|k| self.start[k] + way[k])
     }
 
+    /// dC/dt.
+    #[inline]
+    pub fn slope(&self, t: f64, rest: f64) -> [f64; M] {
+        if self.rational {
+            self.local::<2>(t, rest)[1]
+        } else {
+            sum(&self.rows[1][..self.degree], t, rest)
+        }
+    }
+
     /// C and its first R − 1 derivatives by t.
     #[inline]
     pub fn derivatives<const R: usize>(&self, t: f64, rest: f64) -> [[f64; M]; R] {
@@ -165,7 +175,7 @@ fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize) -> ([Rows<M>; 4
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::distance;
+    use crate::vectors::distance;
 
     #[test]
     fn places_are_those_of_the_polygon_and_each_derivative_is_that_of_the_one_before() {
@@ -187,7 +197,7 @@ mod tests {
                         assert!((slope - here[order + 1][k]).abs() < 1e-7 * scale, "{order} at {t}");
                     }
                 }
-                assert!(!weights.is_empty() || crate::curve::length(&here[2]) <= hodographs.bounds()[0]);
+                assert!(!weights.is_empty() || crate::vectors::length(&here[2]) <= hodographs.bounds()[0]);
             }
         }
     }

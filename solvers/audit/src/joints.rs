@@ -4,6 +4,6 @@ pub mod formula;
 pub mod path;
 mod phase_jerk;
 mod phase_motion;
-pub mod profile;
+pub mod plan;
+pub(crate) mod profile;
 pub mod setpoints;
-mod speed_by_length;

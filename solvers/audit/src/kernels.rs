@@ -3,7 +3,8 @@
 
 use crate::curve::Followed;
 use crate::deviation::{audit_deviation, audit_path};
-use crate::joints::profile::{audit_joint_profile, JointAudit};
+use crate::joints::plan::JointAudit;
+use crate::joints::profile::audit_joint_profile;
 use crate::joints::setpoints::JointSetpoints;
 use crate::moves::Programmed;
 use crate::phases::Phases;

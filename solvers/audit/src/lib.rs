@@ -4,11 +4,13 @@
 //! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `curve`, `polygon`, `hodographs`, `nearest`; the program: `moves`, `deviation`. The profile: `phases`, `phase_motion`,
-//! `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `profile`. Setpoints: `setpoints`, `differences`; with their plan
-//! `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
+//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `deviation`. The
+//! profile: `phases`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
+//! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
 
 mod against_plan;
+mod arc_slope;
+mod chord;
 pub mod curve;
 mod deviation;
 mod differences;
@@ -17,6 +19,7 @@ pub mod joints;
 pub mod kernels;
 pub mod moves;
 mod nearest;
+mod neighbours;
 mod peak;
 mod phase_by_length;
 mod phase_jerk;
@@ -26,9 +29,11 @@ pub mod phases;
 mod polygon;
 mod profile;
 pub mod profile_clock;
+mod rows;
 pub mod setpoints;
 mod speed_by_length;
 pub mod tracking;
+mod vectors;
 
 /// Told of how many more phases, pieces or moves have been looked at; it may end the audit by unwinding.
 pub type Seen<'a> = &'a (dyn Fn(usize) + Sync);
@@ -204,12 +209,26 @@ impl<const M: usize> Tally<M> {
     /// Keeps the value if no worse one was seen. What is not a number is the worst there is.
     #[inline(always)]
     pub fn offer(&mut self, check: Check, axis: usize, value: f64, limit: f64, time: f64, line: i32) {
+        self.offer_at(check, axis, value, limit, line, || time);
+    }
+
+    /// The same where the time is computed only for a value that is kept.
+    #[inline(always)]
+    pub fn offer_at(
+        &mut self,
+        check: Check,
+        axis: usize,
+        value: f64,
+        limit: f64,
+        line: i32,
+        time: impl FnOnce() -> f64,
+    ) {
         let ratio = if value <= 0.0 { 0.0 } else { value / limit };
         // The negated comparison also holds for a NaN, which must not get lost.
         #[allow(clippy::neg_cmp_op_on_partial_ord)]
         if !(ratio <= self.worst[check as usize][axis].ratio) {
             let value = if value < 0.0 { 0.0 } else { value };
-            self.offer_ratio(check, axis, Worst { value, limit, ratio, time, line });
+            self.offer_ratio(check, axis, Worst { value, limit, ratio, time: time(), line });
         }
     }
 

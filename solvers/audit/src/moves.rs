@@ -1,10 +1,11 @@
 //! The programmed path as the audit sees it: straight moves, true arcs and helices, splines, and distances from them.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
-use super::curve::{distance, vector, Pieces, Segment};
-use super::deviation::{outwards, Followers};
-use super::nearest::distance_to_piece;
+use super::arc_slope::{Arc, ArcSlope};
+use super::curve::Pieces;
+use super::nearest::{distance_to_piece, outwards};
+use super::vectors::{distance, vector, Segment};
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
 #[derive(Clone, Copy)]
@@ -38,11 +39,11 @@ pub struct Programmed<'a> {
 pub struct Move<'a, const M: usize> {
     pub from: [f64; M],
     pub to: [f64; M],
-    shape: Shape<'a>,
+    pub(super) shape: Shape<'a>,
 }
 
 #[derive(Clone, Copy)]
-enum Shape<'a> {
+pub(super) enum Shape<'a> {
     Line,
     Arc(Arc),
     /// The pieces from `first` to `last`.
@@ -51,19 +52,6 @@ enum Shape<'a> {
         first: usize,
         last: usize,
     },
-}
-
-/// What makes a move an arc: it turns in the plane of the axes `a` and `b`, all others move evenly.
-#[derive(Clone, Copy, Debug)]
-struct Arc {
-    a: usize,
-    b: usize,
-    centre: [f64; 2],
-    start_angle: f64,
-    sweep: f64,
-    /// Radius at the start and its change to the end: programs round their numbers.
-    radius: f64,
-    widening: f64,
 }
 
 impl<'a> Programmed<'a> {
@@ -173,7 +161,7 @@ impl<const M: usize> Move<'_, M> {
 
     /// Distance of `q` from the nearest place of the move, in mm. The search ends at a place
     /// within `enough`; of a spline it starts at the piece `expected`, which becomes the nearest one.
-    fn distance(&self, q: &[f64; M], expected: &mut usize, enough: f64) -> f64 {
+    pub(super) fn distance(&self, q: &[f64; M], expected: &mut usize, enough: f64) -> f64 {
         match &self.shape {
             Shape::Line => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
             Shape::Arc(arc) => self.distance_to_arc(arc, q, enough),
@@ -198,7 +186,7 @@ impl<const M: usize> Move<'_, M> {
 
     /// Distance from the nearest of all local minima and both ends, or from a place within `enough`.
     fn distance_to_arc(&self, arc: &Arc, q: &[f64; M], enough: f64) -> f64 {
-        let slope = ArcSlope::new(self, arc, q);
+        let slope = ArcSlope::new([&self.from, &self.to], arc, q);
         let off = |t: f64| distance(q, &self.on_arc(arc, t));
         let mut nearest = distance(q, &self.from).min(distance(q, &self.to)).min(off(slope.beside()));
         if nearest <= enough {
@@ -220,172 +208,6 @@ impl<const M: usize> Move<'_, M> {
             }
         });
         nearest
-    }
-}
-
-/// A Newton step of so many radians is the last one: its error is about the square of that.
-const CLOSE: f64 = 1e-8;
-
-/// Steps towards a root; halving alone needs some 55.
-const MOST_STEPS: usize = 100;
-
-/// (P(t) − q)·P'(t) on an arc or helix P: where it turns from negative to positive the distance has a local minimum.
-struct ArcSlope {
-    arc: Arc,
-    /// From the centre to `q` in the plane, and the angle from there to the start, counted along the arc.
-    arm: [f64; 2],
-    behind: f64,
-    /// Off the plane: the square of the way, and its product with the way from the start to `q`.
-    rise_sq: f64,
-    risen: f64,
-}
-
-/// The slope and its rates at `t`.
-#[derive(Clone, Copy)]
-struct Rates {
-    t: f64,
-    rates: [f64; 4],
-}
-
-impl ArcSlope {
-    fn new<const M: usize>(helix: &Move<M>, arc: &Arc, q: &[f64; M]) -> Self {
-        let arm = [q[arc.a] - arc.centre[0], q[arc.b] - arc.centre[1]];
-        let behind = (arc.start_angle - arm[1].atan2(arm[0])) * arc.sweep.signum();
-        let (mut rise_sq, mut risen) = (0.0, 0.0);
-        for k in (0..M).filter(|&k| k != arc.a && k != arc.b) {
-            let rise = helix.to[k] - helix.from[k];
-            rise_sq += rise * rise;
-            risen += rise * (q[k] - helix.from[k]);
-        }
-        Self { arc: *arc, arm, behind, rise_sq, risen }
-    }
-
-    /// The place at the angle of `q` that is the nearest to its height.
-    fn beside(&self) -> f64 {
-        let level = if self.rise_sq > 0.0 { self.risen / self.rise_sq } else { 0.0 };
-        let sweep = self.arc.sweep.abs();
-        let turn = ((self.behind + level.clamp(0.0, 1.0) * sweep) / TAU).round();
-        ((turn * TAU - self.behind) / sweep).clamp(0.0, 1.0)
-    }
-
-    /// At least how far the places between two are from `q`: by their height alone.
-    fn off_height(&self, from: f64, to: f64) -> f64 {
-        let outside = (from * self.rise_sq - self.risen).max(self.risen - to * self.rise_sq);
-        if outside > 0.0 {
-            outside / self.rise_sq.sqrt()
-        } else {
-            0.0
-        }
-    }
-
-    /// Calls `each` with the ends of the parts of the arc between angles square to that of `q`.
-    ///
-    /// The second rate is 0 where the tangent of the angle from `q` is 3 widening / (sweep radius). That falls along the
-    /// arc, or is 0 all along, and the tangent rises, so it happens once in each part.
-    fn each_half_turn(&self, mut each: impl FnMut(&Rates, &Rates)) {
-        let mut half_turn = (self.behind / PI - 0.5).floor() + 0.5;
-        let mut from = self.at(0.0);
-        while from.t < 1.0 {
-            half_turn += 1.0;
-            let to = self.at(((half_turn * PI - self.behind) / self.arc.sweep.abs()).min(1.0));
-            each(&from, &to);
-            from = to;
-        }
-    }
-
-    fn at(&self, t: f64) -> Rates {
-        let Arc { sweep, widening, .. } = self.arc;
-        let radius = self.arc.radius + t * widening;
-        let (sin, cos) = (self.arc.start_angle + t * sweep).sin_cos();
-        // `q` seen from the centre: along the radius and across it.
-        let along = self.arm[0] * cos + self.arm[1] * sin;
-        let across = self.arm[1] * cos - self.arm[0] * sin;
-        let way_sq = widening * widening + self.rise_sq;
-        let slope = widening * (radius - along) - sweep * radius * across + (t * self.rise_sq - self.risen);
-        let first = way_sq + sweep * (sweep * radius * along - 2.0 * widening * across);
-        let second = sweep * sweep * (3.0 * widening * along + sweep * radius * across);
-        let third = sweep.powi(3) * (4.0 * widening * across - sweep * radius * along);
-        Rates { t, rates: [slope, first, second, third] }
-    }
-
-    /// Where rate `K`, which only rises or only falls between two places, is 0: by Newton's method, halved where it strays.
-    /// The second place where the rate does not change its sign.
-    fn root<const K: usize>(&self, from: &Rates, to: &Rates) -> Rates {
-        let falls = from.rates[K] > 0.0;
-        if from.rates[K] * to.rates[K] >= 0.0 {
-            return *to;
-        }
-        let (mut a, mut b) = (from.t, to.t);
-        let close = CLOSE / self.arc.sweep.abs().max(1.0);
-        let mut here = self.at(a + (b - a) * (from.rates[K] / (from.rates[K] - to.rates[K])));
-        for _ in 0..MOST_STEPS {
-            if (here.rates[K] > 0.0) == falls {
-                a = here.t;
-            } else {
-                b = here.t;
-            }
-            let step = here.rates[K] / here.rates[K + 1];
-            let newton = here.t - step;
-            let strays = !(newton >= a && newton <= b);
-            here = self.at(if strays { 0.5 * (a + b) } else { newton });
-            if (!strays && step.abs() <= close) || here.t <= a || here.t >= b {
-                break;
-            }
-        }
-        here
-    }
-}
-
-/// Some moves that places along a path are measured against, one after the other.
-#[derive(Clone, Default)]
-pub struct Neighbours<'a, const M: usize> {
-    moves: Vec<(usize, Move<'a, M>)>,
-    /// The one nearest to the place before: mostly nearest to the next one too.
-    nearest: usize,
-    /// Of each move the piece that was nearest last.
-    expected: Vec<usize>,
-}
-
-impl<'a, const M: usize> Neighbours<'a, M> {
-    /// Takes other moves.
-    pub fn replace(&mut self, program: &Programmed<'a>, numbers: impl Iterator<Item = usize>) {
-        let known = self.moves.first().zip(self.expected.first()).map(|(first, piece)| (first.0, *piece));
-        self.moves.clear();
-        self.moves.extend(numbers.map(|number| (number, program.get(number))));
-        self.nearest = 0;
-        self.expected.clear();
-        let expected = |number: usize| known.filter(|known| known.0 == number).map_or(0, |known| known.1);
-        self.expected.extend(self.moves.iter().map(|(number, _)| expected(*number)));
-    }
-
-    /// Expects the nearest place of a spline to be as far along it as `piece` is along the pieces that follow it.
-    pub fn start_at(&mut self, followers: &[Followers], piece: usize) {
-        for ((number, programmed), expected) in self.moves.iter().zip(&mut self.expected) {
-            if let Shape::Spline { first, last, .. } = programmed.shape {
-                let (from, to) = followers[*number];
-                let share = piece.saturating_sub(from) as f64 / (to + 1).saturating_sub(from).max(1) as f64;
-                *expected = (first + (share * (last + 1 - first) as f64) as usize).min(last);
-            }
-        }
-    }
-
-    /// Distance of `q` from the nearest move, or from the first that is within `enough`; a NaN if there is one.
-    pub fn distance(&mut self, q: &[f64; M], enough: f64) -> f64 {
-        let mut least = f64::INFINITY;
-        let first = self.nearest;
-        for m in (first..self.moves.len()).chain(0..first) {
-            let away = self.moves[m].1.distance(q, &mut self.expected[m], enough);
-            if away.is_nan() {
-                return away;
-            }
-            if away < least {
-                (least, self.nearest) = (away, m);
-            }
-            if least <= enough {
-                break;
-            }
-        }
-        least
     }
 }
 

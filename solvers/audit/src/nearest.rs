@@ -1,6 +1,7 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
-use super::curve::{distance, length, Curve, Followed, Quadratic};
+use super::curve::{Curve, Followed, Quadratic};
+use super::vectors::{distance, length};
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -266,6 +267,24 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
     }
 }
 
+/// `from`, then its neighbours on both sides by turns, within `least` to `most`.
+pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = usize> {
+    let (mut after, mut before, mut turn) = (from + 1, from, false);
+    let others = std::iter::from_fn(move || {
+        turn = if after > most { false } else { before <= least || !turn };
+        if turn {
+            after += 1;
+            Some(after - 1)
+        } else {
+            (before > least).then(|| {
+                before -= 1;
+                before
+            })
+        }
+    });
+    std::iter::once(from).chain(others)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -357,5 +376,11 @@ mod tests {
             prop_assert!(found <= dense + 1e-12);
             prop_assert!(found >= dense - 2e-3);
         }
+    }
+
+    #[test]
+    fn places_are_looked_at_from_near_to_far() {
+        assert_eq!(outwards(2, 1, 5).collect::<Vec<_>>(), [2, 3, 1, 4, 5]);
+        assert_eq!(outwards(5, 5, 5).collect::<Vec<_>>(), [5]);
     }
 }

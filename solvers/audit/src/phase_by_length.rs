@@ -4,11 +4,12 @@
 //! over |C'|. With g = |C'|: g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³; then the velocity is C' u̇, the acceleration
 //! C' ü + C'' u̇², and the jerk C' u⃛ + 3 C'' u̇ ü + C''' u̇³.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
-use super::curve::{inner, length, vector_of, Curve};
-use super::phase_time::{kronrod, MOST_HALVINGS, RULES_AGREE};
+use super::curve::Curve;
+use super::phase_time::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
 use super::speed_by_length::{Pace, SpeedByLength};
+use super::vectors::{inner, length, vector_of};
 use super::{EPS, ROUNDINGS};
 
 /// Where |C'| is below this share of its size the piece has no direction to speak of.
@@ -30,57 +31,88 @@ pub struct Rates<const M: usize> {
     pub velocity: Rounded<M>,
     pub acceleration: Rounded<M>,
     pub jerk: Rounded<M>,
-    /// Curvature in 1/mm, and |C'|.
+    /// Of the path, with its curvature |K| in 1/mm, |dK/ds| in 1/mm², and |C'|.
+    pub direction: [f64; M],
     pub curvature: f64,
+    pub change_of_curvature: f64,
     pub slope: f64,
+}
+
+/// An interval on which the rule is good: the distance of its start from the anchor and the length up to there, and the same of
+/// its middle.
+#[derive(Clone, Copy)]
+struct Measured {
+    start: [f64; 2],
+    middle: [f64; 2],
+}
+
+/// A place of a phase: u, the length from the anchor, and the motion along the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub u: f64,
+    pub way: f64,
+    pub pace: Pace,
+}
+
+/// By how much, at most, rates between two places may differ as vectors from those at the nearer one, and the curvature too;
+/// and the greatest speed along the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Change {
+    pub velocity: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+    pub curvature: f64,
+    pub most_speed: f64,
 }
 
 /// A phase ready to be evaluated at any u.
 #[derive(Clone)]
 pub struct PhaseByLength<const M: usize> {
-    curve: Rc<Curve<M>>,
+    curve: Arc<Curve<M>>,
+    /// What each axis counts in the length.
+    scale: [f64; M],
     u: [f64; 2],
     anchored_at_end: bool,
     duration: f64,
     speed: SpeedByLength,
-    /// Distances of u from the anchor, and lengths up to there, between which the rule is good.
-    lengths: Vec<[f64; 2]>,
+    /// Where the rule is good, in order, and the distance of the last end from the anchor and the length up to there.
+    measured: Vec<Measured>,
+    whole: [f64; 2],
 }
 
 impl<const M: usize> PhaseByLength<M> {
     /// Between two parameters, with the speed that `speed` makes of the whole length; lengths and times count from the anchor.
     pub fn new(
-        curve: Rc<Curve<M>>,
+        curve: Arc<Curve<M>>,
+        scale: [f64; M],
         u: [f64; 2],
         anchored_at_end: bool,
         duration: f64,
         speed: impl FnOnce(f64) -> SpeedByLength,
     ) -> Self {
         let nothing = SpeedByLength::Constant { speed: 0.0 };
-        let mut phase = Self { curve, u, anchored_at_end, duration, speed: nothing, lengths: vec![[0.0; 2]] };
+        let (measured, whole) = (Vec::with_capacity(1), [0.0; 2]);
+        let mut phase = Self { curve, scale, u, anchored_at_end, duration, speed: nothing, measured, whole };
         phase.measure(0.0, u[1] - u[0], &mut { MOST_HALVINGS });
-        phase.speed = speed(phase.length());
+        phase.speed = speed(phase.whole[1]);
         phase
     }
 
-    fn length(&self) -> f64 {
-        self.lengths[self.lengths.len() - 1][1]
-    }
-
-    /// The length between two distances from the anchor, and its doubt.
-    fn length_between(&self, from: f64, to: f64) -> [f64; 2] {
-        let [u0, u1] = self.u;
-        let at = |d: f64| if self.anchored_at_end { u1 - d } else { u0 + d };
-        kronrod(|d| length(&self.curve.derivative(at(d))), from, to)
+    /// |C'| at a distance from the anchor, as the axes count.
+    fn slope(&self, d: f64) -> f64 {
+        let tangent = self.curve.derivative(if self.anchored_at_end { self.u[1] - d } else { self.u[0] + d });
+        length(&vector_of::<M>(|k| self.scale[k] * tangent[k]))
     }
 
     /// Adds the lengths of parts between two distances from the anchor.
     fn measure(&mut self, from: f64, to: f64, halvings: &mut u32) {
-        let [fine, doubt] = self.length_between(from, to);
+        let ([fine, doubt], half) = kronrod_halves(|d| self.slope(d), from, to);
         let middle = 0.5 * (from + to);
         let good = doubt.abs() <= RULES_AGREE * fine;
         if good || *halvings == 0 || !(from < middle && middle < to) {
-            self.lengths.push([to, self.length() + fine]);
+            let before = self.whole[1];
+            self.measured.push(Measured { start: [from, before], middle: [middle, before + half] });
+            self.whole = [to, before + fine];
             return;
         }
         *halvings -= 1;
@@ -88,35 +120,57 @@ impl<const M: usize> PhaseByLength<M> {
         self.measure(middle, to, halvings);
     }
 
-    /// Time since the start of the phase at u, and the motion along the path there.
-    pub fn passage(&self, u: f64) -> (f64, Pace) {
+    /// The place at u.
+    pub fn place(&self, u: f64) -> Place {
         let d = if self.anchored_at_end { self.u[1] - u } else { u - self.u[0] };
-        let last = self.lengths.len() - 1;
-        let row = self.lengths[..last].partition_point(|row| row[0] <= d).max(1) - 1;
-        let [from, way] = self.lengths[row];
-        let way = if d >= self.lengths[last][0] {
-            self.length()
-        } else if d > from {
-            way + self.length_between(from, d)[0]
+        let row = self.measured.partition_point(|interval| interval.start[0] <= d).max(1) - 1;
+        let Measured { start, middle } = self.measured[row];
+        let [from, before] = if d < middle[0] - EPS * self.u[1] { start } else { middle };
+        let way = if d >= self.whole[0] {
+            self.whole[1]
+        } else if d > from + EPS * self.u[1] {
+            // On half of an interval Gauss's rule is closer than it was on the whole one.
+            before + gauss(|d| self.slope(d), from, d)
         } else {
-            way
+            before
         };
-        let (time, pace) = self.speed.after(way);
+        let mut pace = self.speed.pace(way);
         if self.anchored_at_end {
-            (self.duration - time, Pace { a: -pace.a, ..pace })
+            pace.a = -pace.a;
+        }
+        Place { u, way, pace }
+    }
+
+    /// Time since the start of the phase at a place.
+    pub fn since(&self, place: &Place) -> f64 {
+        let time = self.speed.time(place.way);
+        if self.anchored_at_end {
+            self.duration - time
         } else {
-            (time, pace)
+            time
         }
     }
 
-    /// C' at u.
-    pub fn tangent(&self, u: f64) -> [f64; M] {
-        self.curve.derivative(u)
+    /// Whether an axis moves anywhere on the piece.
+    pub fn moves(&self, axis: usize) -> bool {
+        self.curve.derivative_size()[axis] > 0.0
+    }
+
+    /// Whether the speed is constant.
+    pub fn is_steady(&self) -> bool {
+        matches!(self.speed, SpeedByLength::Constant { .. })
+    }
+
+    /// Velocity of every axis at a place.
+    pub fn velocity(&self, place: &Place) -> [f64; M] {
+        let tangent = self.curve.derivative(place.u);
+        let size = length(&tangent);
+        vector_of(|k| if size > 0.0 { tangent[k] / size * place.pace.v } else { 0.0 })
     }
 
     /// Time of the whole phase by its law.
     pub fn time(&self) -> f64 {
-        self.speed.after(self.length()).0
+        self.speed.time(self.whole[1])
     }
 
     /// u at a time since the start of the phase.
@@ -124,7 +178,7 @@ impl<const M: usize> PhaseByLength<M> {
         let [mut low, mut high] = self.u;
         for _ in 0..MOST_STEPS {
             let middle = 0.5 * (low + high);
-            if self.passage(middle).0 < time {
+            if self.since(&self.place(middle)) < time {
                 low = middle;
             } else {
                 high = middle;
@@ -133,17 +187,10 @@ impl<const M: usize> PhaseByLength<M> {
         0.5 * (low + high)
     }
 
-    /// The speed, where it is constant.
-    pub fn constant_speed(&self) -> Option<f64> {
-        match self.speed {
-            SpeedByLength::Constant { speed } => Some(speed),
-            _ => None,
-        }
-    }
-
-    /// Velocity, acceleration and jerk at u; none where the piece has no direction.
-    pub fn rates(&self, u: f64, pace: Pace) -> Option<Rates<M>> {
-        rates(&self.curve, u, pace).map(|mut rates| {
+    /// Velocity, acceleration and jerk at a place, where all axes count as they are; none where the piece has no direction.
+    pub fn rates(&self, place: &Place) -> Option<Rates<M>> {
+        let pace = place.pace;
+        rates(&self.curve, place.u, pace).map(|mut rates| {
             // Where the length is rounded v is another one.
             let way_rounding = EPS * self.curve.width() * rates.slope;
             let gained = pace.a.abs() * way_rounding;
@@ -158,26 +205,50 @@ impl<const M: usize> PhaseByLength<M> {
         })
     }
 
-    /// By how much velocity, acceleration and jerk at constant speed may differ, as vectors, from those at the nearer one of
-    /// two places, and the curvature too.
+    /// What differs between two places in the order of travel, where |C'| is known.
     ///
-    /// K = dT/ds and its derivatives from bounds of those of C: C'' = g² K + g' T, C''' = g³ K' + 3 g g' K + g'' T,
+    /// With T the direction and K = dT/ds the velocity is T v, the acceleration T a + K v², the jerk T j + 3 K v a + K' v³.
+    /// K and its derivatives are bounded by those of C: C'' = g² K + g' T, C''' = g³ K' + 3 g g' K + g'' T,
     /// C'''' = g⁴ K'' + 6 g² g' K' + (4 g g'' + 3 g'²) K + g''' T, |g'| ≤ |C''|, and so on.
-    pub fn change_at_most(&self, speed: f64, from: f64, to: f64) -> [f64; 4] {
+    pub fn change_at_most(&self, [from, to]: [&Place; 2], known: [&Rates<M>; 2]) -> Change {
         let [m2, m3, m4] = self.curve.bounds();
-        let half = 0.5 * (to - from);
-        let ends = [from, to].map(|u| length(&self.curve.derivative(u)));
-        let g = ends[0].min(ends[1]) - m2 * half;
+        let half = 0.5 * (to.u - from.u);
+        let most_known = |of: fn(&Rates<M>) -> f64| of(known[0]).max(of(known[1]));
+        let g = known[0].slope.min(known[1].slope) - m2 * half;
+        let [v, a, j] = self.speed.ranges([&from.pace, &to.pace], (to.way - from.way).abs());
         if g.is_nan() || g <= 0.0 {
-            return [f64::INFINITY; 4];
+            let wide = f64::INFINITY;
+            return Change {
+                velocity: wide,
+                acceleration: wide,
+                jerk: wide,
+                curvature: wide,
+                most_speed: v[1],
+            };
         }
+        // Roughly from the bounds alone for the second derivative of K; by that from both places for the others.
         let k = m2 / (g * g);
         let dg2 = m3 + m2 * m2 / g;
-        let dk = (m3 + 3.0 * g * m2 * k + dg2) / g.powi(3);
-        let dg3 = m4 + 3.0 * m2 * m3 / g + 3.0 * m2.powi(3) / (g * g);
-        let ddk = (m4 + 6.0 * g * g * m2 * dk + (4.0 * g * dg2 + 3.0 * m2 * m2) * k + dg3) / g.powi(4);
-        let way = half * (ends[0].max(ends[1]) + m2 * half);
-        [k * speed * way, dk * speed.powi(2) * way, ddk * speed.powi(3) * way, dk * way]
+        let dk = (m3 + 3.0 * g * m2 * k + dg2) / (g * g * g);
+        let dg3 = m4 + 3.0 * m2 * m3 / g + 3.0 * m2 * m2 * m2 / (g * g);
+        let ddk = (m4 + 6.0 * g * g * m2 * dk + (4.0 * g * dg2 + 3.0 * m2 * m2) * k + dg3) / (g * g * g * g);
+        let way = half * (most_known(|rates| rates.slope) + m2 * half);
+        let dk = dk.min(most_known(|rates| rates.change_of_curvature) + ddk * way);
+        let k = k.min(most_known(|rates| rates.curvature) + dk * way);
+        let [change_v, change_a, change_j] = [v, a, j].map(|[least, most]| most - least);
+        let [most_a, most_j] = [a, j].map(|[least, most]| most.max(-least));
+        let [least_v, most_v] = v;
+        let (square, cube) = (most_v * most_v, most_v * most_v * most_v);
+        Change {
+            velocity: k * way * most_v + change_v,
+            acceleration: way * (k * most_a + dk * square) + change_a + k * (square - least_v * least_v),
+            jerk: way * (k * most_j + 3.0 * dk * most_v * most_a + ddk * cube)
+                + change_j
+                + 3.0 * k * (most_v * change_a + most_a * change_v)
+                + dk * (cube - least_v * least_v * least_v),
+            curvature: dk * way,
+            most_speed: most_v,
+        }
     }
 }
 
@@ -194,7 +265,8 @@ pub fn rates<const M: usize>(curve: &Curve<M>, u: f64, pace: Pace) -> Option<Rat
     let across: [f64; M] = vector_of(|k| second[k] - along2 * direction[k]);
     let du = pace.v / g;
     let ddu = (pace.a - along2 * du * du) / g;
-    let taken = inner(&across, &across) / g * du.powi(3);
+    let turned = inner(&across, &across) / g;
+    let taken = turned * du.powi(3);
     let dddu = (pace.j - taken - du * (3.0 * along2 * ddu + along3 * du * du)) / g;
     // What is rounded in C', C'' and C''' is felt in ü and u⃛ as well.
     let (most1, most2, most3) = (length(&size1), length(&size2), length(&size3));
@@ -224,13 +296,24 @@ pub fn rates<const M: usize>(curve: &Curve<M>, u: f64, pace: Pace) -> Option<Rat
             unit * (size1[k] * dddu.abs() + first[k].abs() * most_dddu + du * inside)
         }),
     };
-    Some(Rates { velocity, acceleration, jerk, curvature: length(&across) / (g * g), slope: g })
+    let change: [f64; M] =
+        vector_of(|k| third[k] - 3.0 * along2 / g * across[k] - (along3 + turned) * direction[k]);
+    Some(Rates {
+        velocity,
+        acceleration,
+        jerk,
+        direction,
+        curvature: length(&across) / (g * g),
+        change_of_curvature: length(&change) / (g * g * g),
+        slope: g,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::{distance, Quadratic};
+    use crate::curve::Quadratic;
+    use crate::vectors::distance;
 
     #[test]
     fn on_a_parabola_acceleration_and_jerk_are_those_of_its_parameter() {
@@ -255,34 +338,50 @@ mod tests {
     fn at_rest_where_the_tangent_vanishes_the_length_starts_with_the_cube_of_the_time() {
         // x = u³ by s = t³: u̇ = 1, but at u = 0 both v and C' vanish.
         let points = [[0.0; 2], [0.0; 2], [0.0; 2], [1.0, 0.0]];
-        let curve = Rc::new(Curve::general(crate::polygon::Polygon::new(points.into_iter(), &[]), 1.0));
+        let curve = Arc::new(Curve::general(crate::polygon::Polygon::new(points.into_iter(), &[]), 1.0));
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
         let speed = |_| SpeedByLength::Jerk { start, duration: 1.0 };
-        let phase = PhaseByLength::new(curve, [0.0, 1.0], false, 1.0, speed);
+        let phase = PhaseByLength::new(curve, [1.0; 2], [0.0, 1.0], false, 1.0, speed);
         for u in [0.01, 0.5, 1.0] {
-            let (time, pace) = phase.passage(u);
-            assert!((time - u).abs() < 1e-14 && (pace.v - 3.0 * u * u).abs() < 1e-13, "{u}");
+            let place = phase.place(u);
+            let (time, v) = (phase.since(&place), place.pace.v);
+            assert!((time - u).abs() < 1e-14 && (v - 3.0 * u * u).abs() < 1e-13, "{u}");
         }
-        assert_eq!(phase.passage(0.0).1.v, 0.0);
+        assert_eq!(phase.place(0.0).pace.v, 0.0);
         assert!((phase.place_at(0.3) - 0.3).abs() < 1e-14);
     }
 
     #[test]
     fn nothing_between_two_places_changes_more_than_its_bound() {
         let points = [[0.0, 0.0], [1.0, 0.3], [2.0, 0.9], [3.2, 0.8], [4.0, 0.1], [5.0, 0.4]];
-        let curve = Rc::new(Curve::general(crate::polygon::Polygon::new(points.into_iter(), &[]), 5.0));
-        let speed = 3.0;
-        let steady = |_| SpeedByLength::Constant { speed };
-        let phase = PhaseByLength::new(curve, [0.0, 5.0], false, 1.0, steady);
-        let at = |u: f64| phase.rates(u, Pace { v: speed, a: 0.0, j: 0.0 }).unwrap();
-        for i in 0..20 {
-            let [from, to] = [i, i + 1].map(|i| 0.25 * f64::from(i));
-            let [velocity, acceleration, jerk, curvature] = phase.change_at_most(speed, from, to);
-            let (near, middle) = (at(from), at(0.5 * (from + to)));
-            assert!(distance(&near.velocity.value, &middle.velocity.value) <= velocity);
-            assert!(distance(&near.acceleration.value, &middle.acceleration.value) <= acceleration);
-            assert!(distance(&near.jerk.value, &middle.jerk.value) <= jerk);
-            assert!((near.curvature - middle.curvature).abs() <= curvature);
+        let curve = Arc::new(Curve::general(crate::polygon::Polygon::new(points.into_iter(), &[]), 5.0));
+        let speeds: [fn(f64) -> SpeedByLength; 4] = [
+            |_| SpeedByLength::Constant { speed: 3.0 },
+            |length| SpeedByLength::cubic([9.0, 4.0], [1.0, 2.0], length),
+            |length| SpeedByLength::cubic([1.0, 9.0], [3.0, -1.0], length),
+            |_| SpeedByLength::Jerk { start: Pace { v: 3.0, a: -2.0, j: 1.0 }, duration: 2.5 },
+        ];
+        for (speed, anchored_at_end) in speeds.into_iter().flat_map(|speed| [(speed, false), (speed, true)]) {
+            let phase = PhaseByLength::new(curve.clone(), [1.0; 2], [0.0, 5.0], anchored_at_end, 2.5, speed);
+            let at = |u: f64| {
+                let place = phase.place(u);
+                (place, phase.rates(&place).unwrap())
+            };
+            for i in 0..20 {
+                let [from, to] = [i, i + 1].map(|i| 0.25 * f64::from(i));
+                let ((first, near), (last, far)) = (at(from), at(to));
+                let bound = phase.change_at_most([&first, &last], [&near, &far]);
+                for share in [0.1, 0.3, 0.5] {
+                    let (place, there) = at(from + share * (to - from));
+                    assert!(place.pace.v <= bound.most_speed * (1.0 + 1e-12));
+                    assert!(distance(&near.velocity.value, &there.velocity.value) <= bound.velocity);
+                    assert!(
+                        distance(&near.acceleration.value, &there.acceleration.value) <= bound.acceleration
+                    );
+                    assert!(distance(&near.jerk.value, &there.jerk.value) <= bound.jerk);
+                    assert!((near.curvature - there.curvature).abs() <= bound.curvature);
+                }
+            }
         }
     }
 }

@@ -3,10 +3,11 @@
 //! Where the path's curvature jumps A does so too, however smooth v is. A third difference of setpoints that lies half-way
 //! over such a step shows 3/4 of it over the period as a jerk: with more than the limit of that alone, setpoints break it.
 
-use super::curve::{distance, length, Curves};
+use super::curve::Curves;
 use super::phase_by_length::rates;
 use super::phases::Phases;
 use super::speed_by_length::Pace;
+use super::vectors::{distance, length};
 use super::{Check, Limits, Tally, EPS, PASS_EXCESS, ROUNDINGS};
 
 /// Pieces that meet at a smaller angle than this, in rad, meet without a corner.

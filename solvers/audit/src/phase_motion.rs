@@ -8,8 +8,8 @@ mod law;
 
 pub use law::{Law, Pole};
 
-use super::curve::{from_to, inner, length};
 use super::polygon::Polygon;
+use super::vectors::{from_to, inner, length};
 use super::EPS;
 
 /// Slopes of tangents are taken over this part of the phase.

@@ -14,6 +14,9 @@ const WEIGHTS: [f64; 4] =
 const INNER_WEIGHTS: [f64; 2] = [5.0 / 9.0, 8.0 / 9.0];
 const OUTER_WEIGHTS: [f64; 2] = [0.361_326_288_494_254_1, 1.277_347_423_011_491_7];
 
+/// What the differences of the values at each pair of nodes add to half of the integral in the first half.
+const ODD_WEIGHTS: [f64; 3] = [0.057_380_543_663_243_626, 0.117_373_057_543_216_43, 0.239_427_071_874_871_92];
+
 /// Gauss's rule can agree with Kronrod's by chance, so the error of the other rule counts as well, by this share: on smooth
 /// functions it is then about as large as that of Gauss's rule.
 const CHANCE: f64 = 3e-3;
@@ -30,10 +33,31 @@ pub(super) const MOST_HALVINGS: u32 = 400;
 
 /// The integral of f from a to b by Kronrod's rule, and how far the others are from it.
 #[inline(always)]
-pub(super) fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
+pub fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let pairs = NODES.map(|node| f(middle - half * node) + f(middle + half * node));
     by_rules(pairs, f(middle), half)
+}
+
+/// The integral of f from a to b by Gauss's rule of 3 points.
+#[inline(always)]
+pub(super) fn gauss(f: impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let both = f(middle - half * NODES[1]) + f(middle + half * NODES[1]);
+    half * (INNER_WEIGHTS[1] * f(middle) + INNER_WEIGHTS[0] * both)
+}
+
+/// The same as `kronrod`, and the integral of the first half, by the polynomial through the values at all nodes.
+#[inline(always)]
+pub(super) fn kronrod_halves(f: impl Fn(f64) -> f64, a: f64, b: f64) -> ([f64; 2], f64) {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let values = NODES.map(|node| [f(middle - half * node), f(middle + half * node)]);
+    let whole = by_rules(values.map(|[before, after]| before + after), f(middle), half);
+    let mut odd = 0.0;
+    for (weight, [before, after]) in ODD_WEIGHTS.into_iter().zip(values) {
+        odd += weight * (before - after);
+    }
+    (whole, 0.5 * whole[0] + half * odd)
 }
 
 /// The integral and its doubt from the sums of the values at each pair of nodes and the value in the middle.
@@ -147,10 +171,7 @@ impl<const M: usize> PhaseMotion<M> {
     /// Time of an interval so short that the 3-point rule is enough, in s.
     #[inline]
     fn short_time(&self, y0: f64, y1: f64) -> f64 {
-        let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
-        let both = self.integrand(middle - half * NODES[1]) + self.integrand(middle + half * NODES[1]);
-        let sum = INNER_WEIGHTS[1] * self.integrand(middle) + INNER_WEIGHTS[0] * both;
-        self.time_scale * half * sum
+        self.time_scale * gauss(|y| self.integrand(y), y0, y1)
     }
 
     /// Axis accelerations near `y` as a difference quotient over a thousandth of the phase, or less where p changes
@@ -176,9 +197,10 @@ impl<const M: usize> PhaseMotion<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::{inner, Curve, Quadratic};
+    use crate::curve::{Curve, Quadratic};
     use crate::phases::Phases;
     use crate::polygon::Polygon;
+    use crate::vectors::inner;
 
     /// One phase on one piece.
     fn one_phase(
@@ -231,6 +253,16 @@ mod tests {
             }
             let exact = if degree % 2 == 0 { 2.0 / f64::from(degree + 1) } else { 0.0 };
             assert!((sum - exact).abs() < 1e-15, "degree {degree}: {sum} instead of {exact}");
+        }
+    }
+
+    #[test]
+    fn the_first_half_of_the_rule_is_that_of_a_polynomial() {
+        for degree in 0..=6 {
+            let ([whole, _], half) = kronrod_halves(|x| (x - 0.3_f64).powi(degree), 1.0, 4.0);
+            let exact = |x: f64| (x - 0.3).powi(degree + 1) / f64::from(degree + 1);
+            assert!((whole / (exact(4.0) - exact(1.0)) - 1.0).abs() < 1e-14, "{degree}");
+            assert!((half / (exact(2.5) - exact(1.0)) - 1.0).abs() < 1e-14, "{degree}");
         }
     }
 

@@ -1,11 +1,12 @@
 //! The phases of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
-use super::curve::{inner, length, Curve, Followed};
+use super::curve::{Curve, Followed};
 use super::phase_by_length::PhaseByLength;
 use super::phase_motion::{Law, PhaseMotion, Shape};
 use super::speed_by_length::{Pace, SpeedByLength};
+use super::vectors::{inner, length, vector_of};
 use super::{EPS, ROUNDINGS};
 
 /// The profile's arrays, one entry a phase; see `feedplan.profile.SpeedProfile`.
@@ -89,16 +90,24 @@ impl Phases<'_> {
             && (is_by_length(self.kind[i]) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
     }
 
-    /// Phase `i` on its piece, where its speed is known by the length of the path; its numbers must be good.
-    pub fn by_length<const M: usize>(&self, i: usize, curve: &Rc<Curve<M>>) -> Option<PhaseByLength<M>> {
+    /// Phase `i` on its piece, where its speed is known by the length of the path, in which each axis counts by its `scale`;
+    /// its numbers must be good.
+    pub fn by_length<const M: usize>(
+        &self,
+        i: usize,
+        curve: &Arc<Curve<M>>,
+        scale: &[f64; M],
+    ) -> Option<PhaseByLength<M>> {
         let kind = self.kind[i];
         let at_feed = kind == FEED && self.counted::<M>(i) == [1.0; M];
         if !is_by_length(kind) && !at_feed {
             return None;
         }
         let u = [self.u0[i], self.u1[i]];
-        let mut speeds =
-            [(u[0], self.p0[i]), (u[1], self.p1[i])].map(|(u, p)| length(&curve.derivative(u)) * p.sqrt());
+        let mut speeds = [(u[0], self.p0[i]), (u[1], self.p1[i])].map(|(u, p)| {
+            let tangent = curve.derivative(u);
+            length(&vector_of::<M>(|k| scale[k] * tangent[k])) * p.sqrt()
+        });
         // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
         let anchored_at_end = kind != FEED && speeds[1] < speeds[0];
         let mut a = [self.a0[i], self.a1[i]];
@@ -112,7 +121,7 @@ impl Phases<'_> {
             PATH_JERK => SpeedByLength::Jerk { start: Pace { v: speeds[0], a: a[0], j: value }, duration },
             _ => SpeedByLength::cubic(speeds.map(|v| v * v), a, length),
         };
-        Some(PhaseByLength::new(curve.clone(), u, anchored_at_end, duration, speed))
+        Some(PhaseByLength::new(curve.clone(), *scale, u, anchored_at_end, duration, speed))
     }
 
     /// Phase `i` on its piece, where its p is known by the parameter; its numbers must be good.

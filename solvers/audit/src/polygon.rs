@@ -12,7 +12,7 @@
 
 mod nearest;
 
-use super::curve::{inner, length};
+use super::vectors::{inner, length};
 
 /// Greatest degree.
 pub const MOST: usize = 9;
@@ -299,7 +299,7 @@ fn first_direction<'a, const M: usize>(mut steps: impl Iterator<Item = &'a [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::distance;
+    use crate::vectors::distance;
 
     /// A quarter of a circle of radius 10 about (1000, 0).
     fn quarter() -> Polygon<2> {

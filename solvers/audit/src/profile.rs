@@ -10,13 +10,14 @@ mod by_length;
 
 use rayon::prelude::*;
 
-use super::curve::{length, Curves, Followed};
-use super::phase_by_length::PhaseByLength;
+use super::chord::chord_error;
+use super::curve::{Curves, Followed};
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
 use super::phases::Phases;
+use super::vectors::length;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
-use by_length::Looker;
+use by_length::{Look, Looker};
 
 /// Even intervals of a phase.
 const INTERVALS: usize = 8;
@@ -91,19 +92,21 @@ impl<const M: usize> Auditor<'_, M> {
         }
         let (curve, share) = (curves.get(piece), (u1 - u0) / width);
         let width_rounding = EPS * width / (u1 - u0);
-        let by_length = phases.by_length(i, &curve);
+        let by_length = phases.by_length(i, &curve, &[1.0; M]);
         if self.limits.judges_jerk {
             self.jerks().alone(i, width_rounding, by_length.is_some(), line, tally);
         }
         if let Some(motion) = by_length {
-            let feeds = self.path.feeds(piece);
-            Looker { motion: &motion, limits: self.limits, feeds, start: time, line }.phase(
-                [u0, u1],
-                share,
-                curve.turns(),
-                tally,
-            );
-            self.ends_by_length(i, &motion, line, tally);
+            let looker = Looker {
+                motion: &motion,
+                limits: self.limits,
+                feeds: self.path.feeds(piece),
+                covered: curve.turns() as f64 * share,
+                start: time,
+                line,
+            };
+            let ends = looker.phase([u0, u1], tally);
+            self.ends_by_length(i, &ends, line, tally);
             self.duration(i, motion.time(), width_rounding, line, tally);
             return;
         }
@@ -133,19 +136,17 @@ impl<const M: usize> Auditor<'_, M> {
 
     /// The recorded p at both ends against the speed by the length, as a jump of axis velocity. A place is known to its
     /// rounding: over that way the axis may accelerate.
-    fn ends_by_length(&self, i: usize, motion: &PhaseByLength<M>, line: i32, tally: &mut Tally<M>) {
+    fn ends_by_length(&self, i: usize, ends: &[Option<Look<M>>; 2], line: i32, tally: &mut Tally<M>) {
         let phases = self.phases;
-        let ends = [(phases.u0[i], phases.p0[i], 0.0), (phases.u1[i], phases.p1[i], phases.duration[i])];
-        for (u, p, since) in ends {
-            let (_, pace) = motion.passage(u);
-            let Some(rates) = motion.rates(u, pace) else { continue };
-            let tangent = motion.tangent(u);
-            let size = length(&tangent);
-            let recorded = size * p.sqrt();
-            let way = ROUNDINGS * EPS * self.path.width[phases.piece[i] as usize] * size;
+        let known = [(phases.p0[i], 0.0), (phases.p1[i], phases.duration[i])];
+        for (look, (p, since)) in ends.iter().zip(known) {
+            let Some(Look { place, rates, .. }) = look else { continue };
+            let recorded = rates.slope * p.sqrt();
+            let way = ROUNDINGS * EPS * self.path.width[phases.piece[i] as usize] * rates.slope;
             for k in 0..self.limits.axes {
-                let cosine = tangent[k].abs() / size;
-                let [slow, fast] = [pace.v.min(recorded), pace.v.max(recorded)].map(|speed| cosine * speed);
+                let cosine = rates.direction[k].abs();
+                let [slow, fast] =
+                    [place.pace.v.min(recorded), place.pace.v.max(recorded)].map(|speed| cosine * speed);
                 let gained = 2.0 * self.limits.acceleration.greatest(k) * way * cosine;
                 let reached = (slow * slow + gained).sqrt().max(slow);
                 let jump = fast - reached - rates.velocity.rounding[k];
@@ -441,32 +442,5 @@ impl<'a, const M: usize> Probe<'a, M> {
     /// The program's time at a time from the anchor.
     fn clock(&self, elapsed: f64) -> f64 {
         self.start + if self.motion.anchored_at_end { self.duration - elapsed } else { elapsed }
-    }
-}
-
-/// How far a circle of this curvature leaves its chord of length `step`. Chords longer than the diameter do not
-/// exist; a path of length `step` stays within half of it of one of its ends.
-pub fn chord_error(step: f64, curvature: f64) -> f64 {
-    let half = 0.5 * step;
-    let reach = half * curvature;
-    if reach < 1.0 {
-        // ρ − √(ρ² − half²), without the cancellation.
-        half * reach / (1.0 + (1.0 - reach * reach).sqrt())
-    } else {
-        half
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_chord_error_is_the_sagitta() {
-        // A 3-4-5 triangle: chord 6 on radius 5 leaves the circle by 1.
-        assert!((chord_error(6.0, 0.2) - 1.0).abs() < 1e-15);
-        assert_eq!(chord_error(6.0, 0.0), 0.0);
-        assert_eq!(chord_error(10.0, 0.2), 5.0);
-        assert_eq!(chord_error(12.0, 0.2), 6.0);
     }
 }

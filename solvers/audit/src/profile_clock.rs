@@ -2,14 +2,14 @@
 //!
 //! The clock starts every run anew: setpoints may wait at a stop for their next period.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
-use super::curve::{length, Curve, Curves, Followed};
+use super::curve::{Curve, Curves, Followed};
 use super::nearest::Place;
-use super::phase_by_length::PhaseByLength;
+use super::phase_by_length::{self, PhaseByLength};
 use super::phase_motion::PhaseMotion;
 use super::phases::Phases;
-use super::speed_by_length::Pace;
+use super::vectors::length;
 use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// A switch of the acceleration this share of a period away counts as at the setpoint.
@@ -36,6 +36,8 @@ pub struct Reader<'a, const M: usize> {
     run: usize,
     curves: Curves<'a, M>,
     motion: Motion<M>,
+    /// Where it was last.
+    last: Option<(Place, Passage)>,
 }
 
 /// The motion on a phase.
@@ -52,16 +54,16 @@ pub struct Passage {
     how: How,
 }
 
-/// The motion along the path, or the integration variable of a phase by its parameter.
+/// The place on a phase by length, or the integration variable of a phase by its parameter.
 #[derive(Clone, Copy)]
 enum How {
-    Pace(Pace),
+    Place(phase_by_length::Place),
     Y(f64),
 }
 
 impl<const M: usize> Motion<M> {
-    fn new(phases: &Phases, phase: usize, curve: &Rc<Curve<M>>) -> Self {
-        match phases.by_length(phase, curve) {
+    fn new(phases: &Phases, phase: usize, curve: &Arc<Curve<M>>) -> Self {
+        match phases.by_length(phase, curve, &[1.0; M]) {
             Some(motion) => Self::ByLength(motion),
             None => Self::ByParameter(phases.by_parameter(phase, curve)),
         }
@@ -70,8 +72,8 @@ impl<const M: usize> Motion<M> {
     fn passage(&self, u: f64, [u0, u1]: [f64; 2], duration: f64) -> Passage {
         match self {
             Self::ByLength(motion) => {
-                let (since, pace) = motion.passage(u);
-                Passage { u, since, how: How::Pace(pace) }
+                let place = motion.place(u);
+                Passage { u, since: motion.since(&place), how: How::Place(place) }
             }
             Self::ByParameter(motion) => {
                 let y = motion.y_at(if motion.anchored_at_end { u1 - u } else { u - u0 });
@@ -84,11 +86,7 @@ impl<const M: usize> Motion<M> {
 
     fn velocity(&self, here: &Passage) -> [f64; M] {
         match (self, here.how) {
-            (Self::ByLength(motion), How::Pace(pace)) => {
-                let tangent = motion.tangent(here.u);
-                let size = length(&tangent);
-                tangent.map(|q| if size > 0.0 { q / size * pace.v } else { 0.0 })
-            }
+            (Self::ByLength(motion), How::Place(place)) => motion.velocity(&place),
             (Self::ByParameter(motion), How::Y(y)) => motion.velocity(y),
             _ => [f64::NAN; M],
         }
@@ -97,7 +95,7 @@ impl<const M: usize> Motion<M> {
     /// Accelerations, and what of them may be rounding.
     fn acceleration(&self, here: &Passage) -> ([f64; M], [f64; M]) {
         match (self, here.how) {
-            (Self::ByLength(motion), How::Pace(pace)) => match motion.rates(here.u, pace) {
+            (Self::ByLength(motion), How::Place(place)) => match motion.rates(&place) {
                 Some(rates) => (rates.acceleration.value, rates.acceleration.rounding),
                 None => ([0.0; M], [f64::INFINITY; M]),
             },
@@ -163,7 +161,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     pub fn new(clock: &ProfileClock<'a>, path: &Followed<'a>) -> Self {
         let mut curves = Curves::new(path.pieces);
         let motion = Motion::new(&clock.phases, 0, &curves.get(clock.phases.piece[0] as usize));
-        let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, curves, motion };
+        let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, curves, motion, last: None };
         reader.enter(0);
         reader
     }
@@ -187,6 +185,9 @@ impl<'a, const M: usize> Reader<'a, M> {
     /// Goes to the phase that holds a place, the earlier one of two that meet there. A place on a motionless piece
     /// is the start of what comes next.
     pub fn go_to(&mut self, place: Place) -> Passage {
+        if let Some((_, passage)) = self.last.filter(|(last, _)| *last == place) {
+            return passage;
+        }
         if !self.holds(self.phase, place) {
             let next = (self.phase + 1).min(self.clock.phases.len() - 1);
             let phase = if self.holds(next, place) { next } else { self.find(place) };
@@ -196,7 +197,9 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
         let (phases, phase) = (&self.clock.phases, self.phase);
         let u = if phases.piece[phase] as usize == place.piece { place.u } else { phases.u0[phase] };
-        self.motion.passage(u, self.ends(phase), phases.duration[phase])
+        let passage = self.motion.passage(u, self.ends(phase), phases.duration[phase]);
+        self.last = Some((place, passage));
+        passage
     }
 
     /// Axis velocities of the profile at a place of the reader's phase.

@@ -7,10 +7,11 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::against_plan::Comparison;
-use super::curve::{distance, length, vector};
 use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
-use super::tracking::{Nearest, Plan};
+use super::rows::{Nearest, Row};
+use super::tracking::Plan;
+use super::vectors::{distance, length, vector};
 use super::{Check, Limits, Seen, Tally, PLACE_TOLERANCE};
 
 /// Setpoints before and after the one at which an acceleration is judged.
@@ -32,25 +33,6 @@ pub struct Chunk<'a> {
     pub velocity: Option<&'a [f64]>,
     pub acceleration: Option<&'a [f64]>,
     pub line: Option<&'a [i32]>,
-}
-
-/// One setpoint.
-#[derive(Clone, Copy, Debug)]
-pub struct Row<const M: usize> {
-    pub t: f64,
-    pub q: [f64; M],
-    pub velocity: Option<[f64; M]>,
-    pub acceleration: Option<[f64; M]>,
-    pub line: i32,
-    /// Its place on the path, where there is a path.
-    pub nearest: Nearest,
-}
-
-impl<const M: usize> Row<M> {
-    fn is_finite(&self) -> bool {
-        let recorded = self.velocity.iter().chain(&self.acceleration).flatten();
-        self.t.is_finite() && self.q.iter().chain(recorded).all(|number| number.is_finite())
-    }
 }
 
 /// The audit of a stream.

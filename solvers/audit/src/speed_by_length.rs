@@ -44,24 +44,66 @@ impl SpeedByLength {
         Self::Cubic { c, length }
     }
 
-    /// The time from the anchor to a length, and the motion there; not a number where it cannot be integrated.
-    pub fn after(&self, way: f64) -> (f64, Pace) {
+    /// The time from the anchor to a length; not a number where it cannot be integrated.
+    pub fn time(&self, way: f64) -> f64 {
         match self {
-            Self::Constant { speed } => (way / speed, Pace { v: *speed, a: 0.0, j: 0.0 }),
-            Self::Jerk { start, duration } => {
-                let time = time_at_jerk(start, *duration, way);
-                (time, start.after(time))
+            Self::Constant { speed } => way / speed,
+            Self::Jerk { start, duration } => time_at_jerk(start, *duration, way),
+            Self::Cubic { c, length } => {
+                let slowness = |x: f64| length / square(c, x).sqrt();
+                integral(&slowness, 0.0, way / length, &mut { MOST_HALVINGS })
             }
+        }
+    }
+
+    /// The motion at a length from the anchor.
+    pub fn pace(&self, way: f64) -> Pace {
+        match self {
+            Self::Constant { speed } => Pace { v: *speed, a: 0.0, j: 0.0 },
+            Self::Jerk { start, .. } => start.after(self.time(way)),
             Self::Cubic { c, length } => {
                 let x = way / length;
                 let slope = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]);
                 let bend = 2.0 * c[2] + 6.0 * c[3] * x;
                 let v = square(c, x).sqrt();
-                let time = integral(&|x: f64| length / square(c, x).sqrt(), 0.0, x, &mut { MOST_HALVINGS });
-                (time, Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) })
+                Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }
             }
         }
     }
+
+    /// The ranges of v, a and j between two places that are so long a way apart, in the order of travel.
+    pub fn ranges(&self, [from, to]: [&Pace; 2], way: f64) -> [[f64; 2]; 3] {
+        match self {
+            Self::Constant { speed } => [[*speed; 2], [0.0; 2], [0.0; 2]],
+            // v between its coefficients in Bernstein form by time, a linear.
+            Self::Jerk { start: Pace { j, .. }, .. } => {
+                let gained = 0.5 * from.a * (to.a - from.a) / j;
+                let inner = from.v + if gained.is_finite() { gained } else { 0.0 };
+                [range(&[from.v, inner, to.v]), range(&[from.a, to.a]), range(&[from.j, to.j])]
+            }
+            // The same of v² and a by the length; v″ of that is linear.
+            Self::Cubic { .. } => {
+                let third = 2.0 / 3.0 * way;
+                let ends = [from.v * from.v, to.v * to.v];
+                let square = [ends[0], ends[0] + third * from.a, ends[1] - third * to.a, ends[1]];
+                let v = range(&square).map(|square| square.max(0.0).sqrt());
+                let a = range(&[from.a, (square[2] - square[1]) / third, to.a]);
+                let per_speed = range(&[from.j / from.v, to.j / to.v]);
+                let j = range(&[
+                    per_speed[0] * v[0],
+                    per_speed[0] * v[1],
+                    per_speed[1] * v[0],
+                    per_speed[1] * v[1],
+                ]);
+                [v, a, j]
+            }
+        }
+    }
+}
+
+/// The least and the greatest of some numbers.
+fn range(numbers: &[f64]) -> [f64; 2] {
+    numbers.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| [least.min(*x), most.max(*x)])
 }
 
 /// Time at constant jerk from the anchor to a length; beyond the phase's own at its mean speed.
@@ -131,12 +173,12 @@ mod tests {
         let speed = SpeedByLength::Jerk { start, duration: 2.0 };
         for t in [1e-9, 1e-3, 0.5, 1.9, 2.0] {
             let t: f64 = t;
-            let (time, pace) = speed.after(t.powi(3));
+            let (time, pace) = (speed.time(t.powi(3)), speed.pace(t.powi(3)));
             assert!((time / t - 1.0).abs() < 1e-15, "{t}");
             assert!((pace.v / (3.0 * t * t) - 1.0).abs() < 1e-14 && (pace.a / (6.0 * t) - 1.0).abs() < 1e-14);
         }
         // 1 % beyond the end takes 1 % more.
-        assert!((speed.after(8.08).0 - 2.02).abs() < 1e-14);
+        assert!((speed.time(8.08) - 2.02).abs() < 1e-14);
     }
 
     #[test]
@@ -145,7 +187,7 @@ mod tests {
         let speed = SpeedByLength::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
         for t in [0.01, 0.2, 0.4] {
             let way = 5.0 * t + 15.0 * t * t;
-            let (time, Pace { v, a, j }) = speed.after(way);
+            let (time, Pace { v, a, j }) = (speed.time(way), speed.pace(way));
             assert!((time - t).abs() < 1e-12);
             assert!((v - 5.0 - 30.0 * t).abs() < 1e-13 && (a - 30.0).abs() < 1e-13 && j.abs() < 1e-12);
         }

@@ -6,11 +6,12 @@
 
 use rayon::prelude::*;
 
-use super::curve::{distance, from_to, inner, length, Curves, Followed};
+use super::curve::{Curves, Followed};
 use super::moves::Programmed;
 use super::nearest::{Found, Place, Search};
 use super::profile_clock::{ProfileClock, Reader};
-use super::setpoints::Row;
+use super::rows::{Nearest, Row};
+use super::vectors::{distance, from_to, inner, length};
 use super::{tell, Limits, Seen, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// Setpoints a thread takes at a time.
@@ -35,31 +36,6 @@ pub struct Plan<'a> {
     pub path: Followed<'a>,
     pub profile: Option<ProfileClock<'a>>,
     pub program: Option<Programmed<'a>>,
-}
-
-/// Where a setpoint is.
-#[derive(Clone, Copy, Debug)]
-pub struct Nearest {
-    pub place: Place,
-    /// Greatest coordinate of the piece, in mm.
-    pub magnitude: f64,
-    /// Distance from the path, and along it from where the profile is at that time, in mm.
-    pub off: f64,
-    pub late: f64,
-    /// How much of `late` is allowed, in mm.
-    pub allowed: f64,
-}
-
-impl Default for Nearest {
-    fn default() -> Self {
-        Self {
-            place: Place { piece: 0, u: 0.0 },
-            magnitude: 0.0,
-            off: 0.0,
-            late: 0.0,
-            allowed: PLACE_TOLERANCE,
-        }
-    }
 }
 
 impl Plan<'_> {
@@ -148,8 +124,6 @@ struct Finder<'a, const M: usize> {
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
     curves: Curves<'a, M>,
-    /// How far u went to the last setpoint, where that was on the same piece.
-    step: f64,
     /// No setpoint gets farther in a period or two, in mm, unless it breaks a limit.
     reach: f64,
 }
@@ -159,10 +133,10 @@ impl<'a, const M: usize> Finder<'a, M> {
         let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
         let curves = Curves::new(plan.path.pieces);
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, curves, step: 0.0, reach }
+        Self { plan, limits, profile, curves, reach }
     }
 
-    fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest {
+    fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest<M> {
         let (path, limits) = (&self.plan.path, self.limits);
         // From the place before; where that is not known or not to be trusted, from where the profile was then.
         let known = previous.filter(|before| {
@@ -183,7 +157,9 @@ impl<'a, const M: usize> Finder<'a, M> {
         let rounding = ROUNDINGS * EPS * magnitude * (path.axes as f64).sqrt();
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
         let close = PLACE_TOLERANCE + rounding;
-        let guess = known.filter(|_| self.profile.is_some()).and_then(|_| self.guess(from, &row.q, close));
+        let guess = known
+            .filter(|_| self.profile.is_some())
+            .and_then(|before| self.guess(from, before.nearest.step, &row.q, close));
         let mut judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));
             (late - rounding).max(0.0)
@@ -194,15 +170,19 @@ impl<'a, const M: usize> Finder<'a, M> {
             None => Search { path, reach: self.reach, close, judge, allowed }.next_place(from, &row.q),
         };
         let place = found.place;
-        self.step = if place.piece == from.piece { place.u - from.u } else { 0.0 };
+        let step = if place.piece == from.piece { place.u - from.u } else { 0.0 };
         let late = if found.error.is_finite() { found.error } else { 0.0 };
-        Nearest { place, magnitude, off: found.distance - rounding, late, allowed }
+        let velocity = self.profile.as_mut().map_or([f64::NAN; M], |profile| {
+            let here = profile.go_to(place);
+            profile.velocity(&here)
+        });
+        Nearest { place, step, magnitude, off: found.distance - rounding, late, allowed, velocity }
     }
 
     /// The place of a setpoint by Newton's method from where the last step leads, on the same piece or the next one, with its
     /// distance; none where that strays or is not close.
-    fn guess(&mut self, from: Place, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
-        let (mut piece, mut u) = (from.piece, from.u + self.step);
+    fn guess(&mut self, from: Place, step: f64, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
+        let (mut piece, mut u) = (from.piece, from.u + step);
         let mut curve = self.curves.get(piece);
         for _ in 0..MOST_GUESSES {
             if u > curve.width() {
@@ -232,11 +212,4 @@ impl<'a, const M: usize> Finder<'a, M> {
 /// between is not looked at.
 pub fn is_step(from: f64, to: f64, period: f64) -> bool {
     to > from && to - from <= 2.0 * period
-}
-
-impl Nearest {
-    /// Whether the setpoint is on the path, where the profile is at its time.
-    pub fn is_good(&self) -> bool {
-        self.off <= PLACE_TOLERANCE && self.late <= self.allowed
-    }
 }

@@ -16,7 +16,7 @@ use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::joints::formula::Formula;
 use feedplan_audit::joints::path::{JointPath, Words};
-use feedplan_audit::joints::profile::JointAudit;
+use feedplan_audit::joints::plan::JointAudit;
 use feedplan_audit::joints::setpoints::JointSetpoints;
 use feedplan_audit::kernels::JointKernels;
 use feedplan_audit::setpoints::Chunk;

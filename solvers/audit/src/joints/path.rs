@@ -1,7 +1,10 @@
 //! Where the joints are along a path, and how fast they move with it: by the kinematics' formula at places of the path.
 
+use std::sync::Arc;
+
 use super::formula::{Formula, Jet};
-use crate::curve::{length, Curve, Followed};
+use crate::curve::{Curve, Followed};
+use crate::vectors::length;
 use crate::{EPS, ROUNDINGS};
 
 pub const TURN: f64 = 360.0;
@@ -47,13 +50,14 @@ pub struct Piece<'a, const M: usize> {
     pub run: usize,
     pub line: i32,
     pub width: f64,
-    pub curve: Curve<M>,
+    pub curve: Arc<Curve<M>>,
     words: &'a Words,
     /// What each axis counts in the way that the feed is about: X, Y, Z where these move, else the others.
     pub counts: [f64; M],
     /// Whether only the direction turns, so that the feed is in degrees of it.
     turns: bool,
-    way_scale: [f64; M],
+    /// What each axis of the path counts in its length.
+    pub way_scale: [f64; M],
     xyz: [f64; M],
     ijk: [usize; 3],
     size: f64,
@@ -109,7 +113,7 @@ impl JointPath<'_> {
 
     pub fn piece<const M: usize>(&self, number: usize) -> Piece<'_, M> {
         let run = self.run_of(number);
-        let curve = self.path.curve::<M>(number);
+        let curve = Arc::new(self.path.curve::<M>(number));
         let words = &self.words[self.words_of[run]];
         let flag = |flags: &[bool], k: usize| flags.get(k).copied().unwrap_or(false);
         let rows = self.path.rows(number);
@@ -195,11 +199,6 @@ impl<const M: usize> Piece<'_, M> {
         let (first, last) = (self.direction(start), self.direction(end));
         let across = length(&cross(first, last));
         across.atan2((0..3).map(|k| first[k] * last[k]).sum()).to_degrees()
-    }
-
-    /// Way along the path in all its axes, per u.
-    pub fn way_slope(&self, u: f64) -> f64 {
-        length(&times(&self.way_scale, &self.curve.derivative(u)))
     }
 
     fn fill<const N: usize>(&self, table: &mut [Jet<N>], jet: impl Fn(usize) -> Jet<N>) {

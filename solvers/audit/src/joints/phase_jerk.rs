@@ -7,11 +7,12 @@ use rayon::prelude::*;
 
 use super::path::{Bends, Piece, Work};
 use super::phase_motion::ROUNDING;
-use super::profile::JointAudit;
-use super::speed_by_length::{paces, Pace};
-use crate::curve::length;
+use super::plan::JointAudit;
 use crate::peak::peaks;
+use crate::phase_by_length::PhaseByLength;
 use crate::phases::{is_by_length, PATH_JERK};
+use crate::speed_by_length::Pace;
+use crate::vectors::length;
 use crate::{Check, Seen, Tally, PASS_EXCESS};
 
 /// Steps of a phase that covers its whole piece, for each degree, and at least.
@@ -37,7 +38,7 @@ struct Rates<const M: usize> {
 fn rates<const M: usize>(piece: &Piece<M>, u: f64, pace: impl Fn(f64) -> Pace, work: &mut Work) -> Rates<M> {
     let Bends { joints: [(q1, e1), (q2, e2), (q3, e3)], way } = piece.bends(u, work);
     let [(g, _), (dg, dg_error), (ddg, ddg_error)] = way;
-    let Pace { v, a, j, .. } = pace(g);
+    let Pace { v, a, j } = pace(g);
     let du = v / g;
     let ddu = (a - dg * du * du) / g;
     let ddu_error = dg_error * du * du / g;
@@ -102,11 +103,9 @@ impl<const M: usize> JointAudit<'_, M> {
         let steps = (covered.ceil() as usize).max(LEAST);
         let share = |i: usize| i as f64 / steps as f64;
         let u: Vec<f64> = (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
-        let used: Vec<Use<M>> = u
-            .iter()
-            .zip(paces(piece, phases, phase, &u))
-            .map(|(&u, pace)| self.look(piece, u, pace, start, work, tally))
-            .collect();
+        let Some(motion) = phases.by_length(phase, &piece.curve, &piece.way_scale) else { return };
+        let mut look = |u: f64, tally: &mut Tally<M>| self.look(piece, &motion, u, start, work, tally);
+        let used: Vec<Use<M>> = u.iter().map(|&u| look(u, tally)).collect();
         for i in 1..steps {
             let of = |i: usize| used[i].iter().flatten().copied();
             let checks = [Check::Acceleration, Check::Jerk].into_iter();
@@ -114,8 +113,7 @@ impl<const M: usize> JointAudit<'_, M> {
             let worst = worst.map(|(check, k)| tally.get(check, k).ratio);
             for x in peaks([of(i - 1), of(i), of(i + 1)], worst) {
                 let at = u[i] + 0.5 * x * (u[i + 1] - u[i - 1]);
-                let pace = paces(piece, phases, phase, &[u0, at, u1])[1];
-                self.look(piece, at, pace, start, work, tally);
+                look(at, tally);
             }
         }
     }
@@ -124,14 +122,15 @@ impl<const M: usize> JointAudit<'_, M> {
     fn look(
         &self,
         piece: &Piece<M>,
+        motion: &PhaseByLength<M>,
         u: f64,
-        pace: Pace,
         start: f64,
         work: &mut Work,
         tally: &mut Tally<M>,
     ) -> Use<M> {
-        let (limits, time) = (&self.limits, start + pace.time);
-        let Rates { acceleration, jerk, .. } = rates(piece, u, |_| pace, work);
+        let (limits, place) = (&self.limits, motion.place(u));
+        let time = || start + motion.since(&place);
+        let Rates { acceleration, jerk, .. } = rates(piece, u, |_| place.pace, work);
         tally.samples += 1;
         let mut used = [[0.0; M]; 2];
         for k in 0..self.path.joints {
@@ -140,7 +139,7 @@ impl<const M: usize> JointAudit<'_, M> {
             for (row, (check, rate, limit)) in of.into_iter().enumerate() {
                 let value = rate.0[k].abs() - rate.1[k];
                 used[row][k] = value.max(0.0).copysign(rate.0[k]) / limit;
-                tally.offer(check, k, value, limit, time, piece.line);
+                tally.offer_at(check, k, value, limit, piece.line, time);
             }
         }
         used
@@ -192,7 +191,7 @@ impl<const M: usize> JointAudit<'_, M> {
             return;
         }
         let before: Piece<M> = self.path.piece(number);
-        let pace = |p: f64, a: f64| move |g: f64| Pace { v: g * p.sqrt(), a, j: 0.0, time: 0.0 };
+        let pace = |p: f64, a: f64| move |g: f64| Pace { v: g * p.sqrt(), a, j: 0.0 };
         let into = rates(&before, phases.u1[phase - 1], pace(phases.p1[phase - 1], from), work);
         let out = rates(piece, phases.u0[phase], pace(phases.p0[phase], to), work);
         let turn = length::<M>(&std::array::from_fn(|k| out.direction[k] - into.direction[k]));

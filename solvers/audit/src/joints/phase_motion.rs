@@ -2,11 +2,11 @@
 //!
 //! On a phase of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and a way Δq_k
 //! takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the way over it; where p is linear
-//! in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by Gauss's rule; where jerk is limited, speed
+//! in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by Kronrod's rule; where jerk is limited, speed
 //! and time follow from the length of the way along the path.
 
 use super::path::{Piece, Place};
-use super::speed_by_length::{gauss, gauss_halved, paces};
+use crate::phase_time::kronrod;
 use crate::phases::{
     is_by_length, Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE,
 };
@@ -68,10 +68,13 @@ pub fn motion<const M: usize>(
     } else {
         0.0
     };
-    let by_way = is_by_length(kind);
-    let u: Vec<f64> = places.iter().map(|place| place.u).collect();
-    let paces = if by_way { paces(piece, phases, phase, &u) } else { Vec::new() };
-    let (u0, u1) = (u[0], u[last]);
+    let by_length =
+        if is_by_length(kind) { phases.by_length(phase, &piece.curve, &piece.way_scale) } else { None };
+    let along: Vec<_> =
+        by_length.iter().flat_map(|motion| places.iter().map(|place| motion.place(place.u))).collect();
+    let since: Vec<f64> =
+        by_length.iter().flat_map(|motion| along.iter().map(|place| motion.since(place))).collect();
+    let (u0, u1) = (places[0].u, places[last].u);
     let feed_sq = [places[0].feed_slope.powi(2) * p[0], places[last].feed_slope.powi(2) * p[1]];
     let line = |u: f64| (feed_sq[0] + (feed_sq[1] - feed_sq[0]) * ((u - u0) / (u1 - u0))).sqrt();
     let (p_slow, u_slow) = if p[0] <= p[1] { (p[0], u0) } else { (p[1], u1) };
@@ -96,7 +99,7 @@ pub fn motion<const M: usize>(
             PARAMETER_ACCELERATION => ((p_slow + 2.0 * value * (place.u - u_slow)).sqrt(), ROUNDING),
             FEED => (value.sqrt() / place.feed_slope, ROUNDING),
             SPEED_LINE => (line(place.u) / place.feed_slope, ROUNDING),
-            _ => (paces[i].v / place.way_slope, ROUNDING),
+            _ => (along[i].pace.v / place.way_slope, ROUNDING),
         };
         // Where rounding hides how the phase's own joint moves, its recorded ends tell: p changes little there.
         let known = 0.5 * (p[1] - p[0]).abs() / p[0].max(p[1]) + ROUNDING;
@@ -138,11 +141,11 @@ pub fn motion<const M: usize>(
                 by_joint([a, b], step, way, unknown, accelerates.then_some(value.abs()), rounding)
             }
         };
-        if by_way {
-            time = paces[i].time - paces[i - 1].time;
+        if by_length.is_some() {
+            time = since[i] - since[i - 1];
             // The rounding of a time, not only of a step.
             if time > 0.0 {
-                let longest = paces[1..].iter().map(|pace| pace.time.abs()).fold(0.0, f64::max);
+                let longest = since[1..].iter().map(|since| since.abs()).fold(0.0, f64::max);
                 error = ROUNDING * (1.0 + longest / time);
             }
         }
@@ -174,9 +177,11 @@ fn sign(x: f64) -> f64 {
 }
 
 /// ∫ du/√p over a step, and the share of it that may be wrong.
-fn integrated(a: f64, b: f64, rounding: f64, mut rate: impl FnMut(f64) -> f64) -> (f64, f64) {
-    let (coarse, fine) = (gauss(a, b, &mut rate), gauss_halved(a, b, &mut rate));
-    (fine, (fine - coarse).abs() / fine + rounding)
+fn integrated(a: f64, b: f64, rounding: f64, rate: impl Fn(f64) -> f64) -> (f64, f64) {
+    let [whole, early, late] =
+        [[a, b], [a, 0.5 * (a + b)], [0.5 * (a + b), b]].map(|[a, b]| kronrod(&rate, a, b)[0]);
+    let fine = early + late;
+    (fine, (fine - whole).abs() / fine + rounding)
 }
 
 /// The time of a step by the way of the phase's own joint, which may have a constant acceleration, and the share of it that may

@@ -5,12 +5,13 @@
 
 use rayon::prelude::*;
 
-use super::path::{JointPath, Piece, Place, TURN};
+use super::path::{Piece, Place, TURN};
 use super::phase_jerk::audit_jerk;
 use super::phase_motion::{motion, State, ROUNDING};
-use crate::curve::length;
+use super::plan::JointAudit;
 use crate::phases::{is_by_length, Phases};
-use crate::{Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
+use crate::vectors::length;
+use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
 
 /// Places of a phase, as shares of the variable in which √p is linear where p is: close at the ends, where accelerations have
 /// their extremes.
@@ -21,15 +22,6 @@ const CHUNK: usize = 2048;
 
 /// The chord error is measured with tangents this share of the piece apart.
 const TANGENTS: f64 = 1e-4;
-
-/// What an audit of joints knows.
-pub struct JointAudit<'a, const M: usize> {
-    pub path: JointPath<'a>,
-    pub phases: Phases<'a>,
-    pub limits: Limits<M>,
-    /// When each phase begins, and the last one ends.
-    pub starts: &'a [f64],
-}
 
 /// A phase at its places.
 struct Measured<'a, const M: usize> {
@@ -204,11 +196,6 @@ impl<const M: usize> JointAudit<'_, M> {
     /// A jump of a joint's velocity that means nothing: what the pass mark adds in that time.
     fn negligible(&self, joint: usize, time: f64) -> f64 {
         PASS_EXCESS * self.limits.acceleration.least(joint) * time.max(self.limits.period)
-    }
-
-    /// Whether a phase is the first of a run.
-    pub fn is_first(&self, phase: usize) -> bool {
-        self.phases.runs.binary_search(&(phase as i64)).is_ok()
     }
 
     /// Offers what a phase shows by itself.

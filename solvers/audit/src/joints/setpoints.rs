@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::path::{Piece, Place, Work};
 use super::phase_motion::{motion, ROUNDING};
-use super::profile::JointAudit;
-use crate::curve::{length, Segment};
+use super::plan::JointAudit;
 use crate::setpoints::Chunk;
+use crate::vectors::{length, Segment};
 use crate::{Check, Tally, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// How far a setpoint may lie from its place, as a share of its step.

@@ -10,7 +10,7 @@
 //!
 //! Where v is by the length of the path see `phase_by_length`.
 
-use crate::curve::{inner, length};
+use crate::vectors::{inner, length};
 
 /// N and D, with the values at the anchor.
 #[derive(Clone, Copy, Debug)]

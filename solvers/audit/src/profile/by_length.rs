@@ -1,24 +1,26 @@
 //! Audits one phase whose speed is known by the length of the path, at as many places as its motion needs.
 //!
-//! Velocity, acceleration and jerk are taken at a few places, more where the phase covers more of its piece. Between two of
-//! them:
-//! * at constant speed the derivatives of the curve bound how much each rate can change (`PhaseByLength::change_at_most`): where
-//!   the bound stays below all limits nothing else is measured, where it is wide the interval is halved;
-//! * elsewhere a parabola through three places tells where a rate near its limit is greatest, and it is measured there.
+//! Velocity, acceleration and jerk of every axis are taken at both ends. `PhaseByLength::change_at_most` bounds how much each of
+//! them can differ between two places:
+//! * where all that it leaves possible is below what was found elsewhere, nothing else is measured;
+//! * where the bound is wide the interval is halved;
+//! * elsewhere a parabola through three places tells where a rate is greatest, and it is measured there.
 
-use super::chord_error;
+use crate::chord::chord_error;
 use crate::peak::peaks;
-use crate::phase_by_length::PhaseByLength;
-use crate::{curve, Check, Limits, Tally, FEEDS};
-
-/// Places of a phase that covers its whole piece, for each degree; of a phase from rest; and at least.
-const PLACES: f64 = 5.0;
-const SPEEDS: f64 = 10.0;
-const LEAST: usize = 4;
+use crate::phase_by_length::{PhaseByLength, Place, Rates};
+use crate::vectors::length;
+use crate::{Check, Limits, Tally, FEEDS, PASS_EXCESS};
 
 /// The next places are this part of the distance beside a vertex, and are taken so often at most.
 const CLOSER: f64 = 0.5;
 const MOST_REFINED: u32 = 3;
+
+/// A parabola follows the rates on so many intervals of a phase that covers its whole piece, for each degree, and of one from
+/// rest; and at least where the bound is wide.
+const PLACES: f64 = 5.0;
+const SPEEDS: f64 = 10.0;
+const LEAST: f64 = 4.0;
 
 /// Bounds wider than this share of a limit are not trusted to a parabola; an interval is halved so often at most.
 const WIDE: f64 = 0.1;
@@ -28,10 +30,8 @@ const MOST_HALVINGS: u32 = 6;
 /// error.
 #[derive(Clone, Copy)]
 struct Use<const M: usize> {
-    u: f64,
     rates: [[f64; M]; 3],
     tip: [f64; FEEDS + 1],
-    curvature: f64,
 }
 
 impl<const M: usize> Use<M> {
@@ -40,45 +40,89 @@ impl<const M: usize> Use<M> {
     }
 }
 
+/// What a place shows.
+#[derive(Clone, Copy)]
+pub struct Look<const M: usize> {
+    pub place: Place,
+    pub rates: Rates<M>,
+    used: Use<M>,
+}
+
+/// What a bound says of all places between two.
+struct Between {
+    /// Whether none of them can use more of a limit than is known.
+    is_certain: bool,
+    /// Whether all of them use about as much as the two.
+    is_narrow: bool,
+    is_unbounded: bool,
+}
+
 /// Where and when a phase is, and the limits that hold there.
 pub struct Looker<'a, const M: usize> {
     pub motion: &'a PhaseByLength<M>,
     pub limits: &'a Limits<M>,
     pub feeds: [f64; FEEDS],
+    /// The part of its piece that the phase covers, in degrees of it.
+    pub covered: f64,
     pub start: f64,
     pub line: i32,
 }
 
 impl<const M: usize> Looker<'_, M> {
-    /// `share` is that of the phase in its piece, of so many `turns`.
-    pub fn phase(&self, [u0, u1]: [f64; 2], share: f64, turns: usize, tally: &mut Tally<M>) {
-        let [from, to] = [u0, u1].map(|u| self.motion.passage(u).1.v);
+    /// Looks at a phase between two parameters; what both ends show, where the piece has a direction.
+    pub fn phase(&self, [u0, u1]: [f64; 2], tally: &mut Tally<M>) -> [Option<Look<M>>; 2] {
+        let ends = [u0, u1].map(|u| self.look(u, tally));
         // At most 1, as speeds are positive; a profile of rubbish has any numbers.
-        let change = ((to - from).abs() / from.max(to)).min(1.0);
-        let wanted = (PLACES * turns as f64 * share).max(SPEEDS * change);
-        let count = (wanted.ceil() as usize).max(LEAST);
-        let mut last: [Option<Use<M>>; 2] = [None; 2];
-        for i in 0..=count {
-            let x = i as f64 / count as f64;
-            let here = self.look(u0 * (1.0 - x) + u1 * x, tally);
-            if let (Some(before), Some(here), Some(speed)) = (last[1], here, self.motion.constant_speed()) {
-                self.between(speed, &before, &here, 0, tally);
+        let change = match &ends {
+            [Some(from), Some(to)] => {
+                let [from, to] = [from.place.pace.v, to.place.pace.v];
+                ((to - from).abs() / from.max(to)).min(1.0)
             }
-            if let ([Some(first), Some(middle)], Some(here)) = (last, here) {
-                self.refine([&first, &middle, &here], 0, tally);
-            }
-            last = [last[1], here];
+            _ => 1.0,
+        };
+        let intervals = PLACES * self.covered + SPEEDS * change;
+        self.between(ends.each_ref().map(Option::as_ref), [u0, u1], (0, intervals), tally);
+        ends
+    }
+
+    /// Looks between two places where a bound leaves open what lies there.
+    fn between(
+        &self,
+        ends: [Option<&Look<M>>; 2],
+        u: [f64; 2],
+        (halvings, intervals): (u32, f64),
+        tally: &mut Tally<M>,
+    ) {
+        let bound = match ends {
+            [Some(from), Some(to)] => self.bound(from, to, tally),
+            _ => Between { is_certain: false, is_narrow: false, is_unbounded: true },
+        };
+        if bound.is_certain {
+            return;
         }
+        let middle = 0.5 * (u[0] + u[1]);
+        let here = self.look(middle, tally);
+        let least = if bound.is_narrow { 0.0 } else { LEAST };
+        let enough = f64::from(2 << halvings) >= intervals.max(least);
+        let is_followed = bound.is_narrow || bound.is_unbounded || !self.motion.is_steady();
+        if halvings == MOST_HALVINGS || enough && is_followed {
+            if let ([Some(from), Some(to)], Some(here)) = (ends, &here) {
+                self.refine([from, here, to], 0, tally);
+            }
+            return;
+        }
+        self.between([ends[0], here.as_ref()], [u[0], middle], (halvings + 1, intervals), tally);
+        self.between([here.as_ref(), ends[1]], [middle, u[1]], (halvings + 1, intervals), tally);
     }
 
     /// Looks where parabolas through three even places say that a rate is greater than any so far, and beside it: one rate
     /// after the other.
-    fn refine(&self, places: [&Use<M>; 3], depth: u32, tally: &mut Tally<M>) {
-        let [first, middle, last] = places;
-        for x in peaks(places.map(Use::all), worst(tally)) {
-            let half = 0.5 * (last.u - first.u);
-            let centre = middle.u + x * half;
-            let side = CLOSER * half.min(centre - first.u).min(last.u - centre);
+    fn refine(&self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
+        let [first, middle, last] = places.map(|look| look.place.u);
+        for x in peaks(places.map(|look| look.used.all()), worst(tally)) {
+            let half = 0.5 * (last - first);
+            let centre = middle + x * half;
+            let side = CLOSER * half.min(centre - first).min(last - centre);
             let around = [centre - side, centre, centre + side].map(|u| self.look(u, tally));
             if let ([Some(a), Some(b), Some(c)], true) = (around, depth < MOST_REFINED) {
                 self.refine([&a, &b, &c], depth + 1, tally);
@@ -87,13 +131,15 @@ impl<const M: usize> Looker<'_, M> {
     }
 
     /// Offers what a place shows.
-    fn look(&self, u: f64, tally: &mut Tally<M>) -> Option<Use<M>> {
+    fn look(&self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
         let (limits, line) = (self.limits, self.line);
-        let (since, pace) = self.motion.passage(u);
-        let rates = self.motion.rates(u, pace)?;
-        let time = self.start + since;
+        let place = self.motion.place(u);
+        let rates = self.motion.rates(&place)?;
+        // Asked for where a limit is used more than before, which is seldom.
+        let time = || self.start + self.motion.since(&place);
         tally.samples += 1;
-        let mut used = Use { u, rates: [[0.0; M]; 3], tip: [0.0; FEEDS + 1], curvature: rates.curvature };
+        let mut used = Use { rates: [[0.0; M]; 3], tip: [0.0; FEEDS + 1] };
+        let judged = if limits.judges_jerk { 3 } else { 2 };
         for k in 0..M {
             let of = [
                 (Check::Velocity, &rates.velocity, limits.velocity.of(k, rates.velocity.value[k])),
@@ -104,62 +150,65 @@ impl<const M: usize> Looker<'_, M> {
                 ),
                 (Check::Jerk, &rates.jerk, limits.jerk[k]),
             ];
-            for (row, (check, rate, limit)) in of.into_iter().enumerate() {
+            for (row, (check, rate, limit)) in of.into_iter().enumerate().take(judged) {
                 let value = rate.value[k].abs() - rate.rounding[k];
                 used.rates[row][k] = value.max(0.0).copysign(rate.value[k]) / limit;
-                if check != Check::Jerk || limits.judges_jerk {
-                    tally.offer(check, k, value, limit, time, line);
-                } else {
-                    used.rates[row][k] = 0.0;
-                }
+                tally.offer_at(check, k, value, limit, line, time);
             }
         }
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let speed = curve::length(&limits.counted(feed, &rates.velocity.value))
-                - curve::length(&limits.counted(feed, &rates.velocity.rounding));
+            let speed = length(&limits.counted(feed, &rates.velocity.value))
+                - length(&limits.counted(feed, &rates.velocity.rounding));
             used.tip[feed] = speed / limit;
-            tally.offer(Check::Feed, 0, speed, limit, time, line);
+            tally.offer_at(Check::Feed, 0, speed, limit, line, time);
         }
         if limits.chord_tolerance.is_finite() {
-            let speed = curve::length(&rates.velocity.value) - curve::length(&rates.velocity.rounding);
+            let speed = length(&rates.velocity.value) - length(&rates.velocity.rounding);
             let error = chord_error(speed * limits.period, rates.curvature);
             used.tip[FEEDS] = error / limits.chord_tolerance;
-            tally.offer(Check::Chord, 0, error, limits.chord_tolerance, time, line);
+            tally.offer_at(Check::Chord, 0, error, limits.chord_tolerance, line, time);
         }
-        Some(used)
+        Some(Look { place, rates, used })
     }
 
-    /// At constant speed: looks at the middle of two places as long as a bound leaves open what lies between them.
-    fn between(&self, speed: f64, from: &Use<M>, to: &Use<M>, halvings: u32, tally: &mut Tally<M>) {
+    /// What the bound between two places says beside what has been found so far.
+    fn bound(&self, from: &Look<M>, to: &Look<M>, tally: &Tally<M>) -> Between {
         let limits = self.limits;
-        let [velocity, acceleration, jerk, curvature] = self.motion.change_at_most(speed, from.u, to.u);
-        let (mut most, mut widest) = (0.0_f64, 0.0_f64);
-        for k in 0..limits.axes {
+        let change = self.motion.change_at_most([&from.place, &to.place], [&from.rates, &to.rates]);
+        let (mut is_certain, mut widest) = (true, 0.0_f64);
+        let mut weigh = |check: Check, axis: usize, most: f64, change: f64| {
+            is_certain &= most <= tally.get(check, axis).ratio + PASS_EXCESS;
+            widest = widest.max(change);
+        };
+        let checks = [
+            (Check::Velocity, change.velocity),
+            (Check::Acceleration, change.acceleration),
+            (Check::Jerk, change.jerk),
+        ];
+        let judged = if limits.judges_jerk { 3 } else { 2 };
+        for k in (0..limits.axes).filter(|&k| self.motion.moves(k)) {
             let least = [limits.velocity.least(k), limits.acceleration.least(k), limits.jerk[k]];
-            let judged = if limits.judges_jerk { 3 } else { 2 };
-            for (row, change) in [velocity, acceleration, jerk].into_iter().enumerate().take(judged) {
+            for (row, (check, change)) in checks.into_iter().enumerate().take(judged) {
                 let change = change / least[row];
-                most = most.max(from.rates[row][k].abs().max(to.rates[row][k].abs()) + change);
-                widest = widest.max(change);
+                let most = from.used.rates[row][k].abs().max(to.used.rates[row][k].abs());
+                weigh(check, k, most + change, change);
             }
         }
+        for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
+            let known = from.used.tip[feed].max(to.used.tip[feed]);
+            // No share of the speed along the path is greater than that speed.
+            let most = (known + change.velocity / limit).min(change.most_speed / limit);
+            weigh(Check::Feed, 0, most, most - known);
+        }
         if limits.chord_tolerance.is_finite() {
-            let curved = from.curvature.max(to.curvature) + curvature;
-            let error = chord_error(speed * limits.period, curved) / limits.chord_tolerance;
-            most = most.max(error);
-            widest = widest.max(error - from.tip[FEEDS].max(to.tip[FEEDS]));
+            let curved = from.rates.curvature.max(to.rates.curvature) + change.curvature;
+            let most = chord_error(change.most_speed * limits.period, curved) / limits.chord_tolerance;
+            weigh(Check::Chord, 0, most, most - from.used.tip[FEEDS].max(to.used.tip[FEEDS]));
         }
-        let certain = most <= 1.0 || widest <= WIDE;
-        // Pieces with weights have no bounds.
-        if certain || widest == f64::INFINITY && velocity == f64::INFINITY || halvings == MOST_HALVINGS {
-            return;
-        }
-        let Some(middle) = self.look(0.5 * (from.u + to.u), tally) else { return };
-        self.between(speed, from, &middle, halvings + 1, tally);
-        self.between(speed, &middle, to, halvings + 1, tally);
+        let is_unbounded = change.velocity == f64::INFINITY;
+        Between { is_certain: is_certain && !is_unbounded, is_narrow: widest <= WIDE, is_unbounded }
     }
 }
-
 /// The worst shares so far, in the order of `Use::all`; all feeds are one check.
 fn worst<const M: usize>(tally: &Tally<M>) -> impl Iterator<Item = f64> + '_ {
     let of_axes = [Check::Velocity, Check::Acceleration, Check::Jerk].into_iter();
@@ -173,16 +222,16 @@ fn worst<const M: usize>(tally: &Tally<M>) -> impl Iterator<Item = f64> + '_ {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::{length, Curve};
+    use crate::curve::Curve;
     use crate::phases::Phases;
     use crate::polygon::Polygon;
     use crate::Sided;
     use proptest::prelude::*;
-    use std::rc::Rc;
+    use std::sync::Arc;
 
     /// A phase on part of a curve, with the speeds and the accelerations along the path at its ends.
     fn phase(
-        curve: &Rc<Curve<2>>,
+        curve: &Arc<Curve<2>>,
         kind: u8,
         [u0, u1]: [f64; 2],
         speeds: [f64; 2],
@@ -206,7 +255,7 @@ mod tests {
             pieces: 1,
             runs: &[0, 1],
         }
-        .by_length(0, curve)
+        .by_length(0, curve, &[1.0; 2])
         .unwrap()
     }
 
@@ -224,7 +273,7 @@ mod tests {
             flat: bool,
         ) {
             let points: Vec<[f64; 2]> = (0..=degree).map(|i| [i as f64, bends[i]]).collect();
-            let curve = Rc::new(Curve::general(Polygon::new(points.into_iter(), &[]), degree as f64));
+            let curve = Arc::new(Curve::general(Polygon::new(points.into_iter(), &[]), degree as f64));
             let width = curve.width();
             let from = 0.8 * width * cut[0];
             let u = [from, from + 0.2 * width * (0.1 + 0.9 * cut[1])];
@@ -233,7 +282,7 @@ mod tests {
             let mut most = [[0.0_f64; 2]; 3];
             for i in 0..=2000 {
                 let at = u[0] + (u[1] - u[0]) * f64::from(i) / 2000.0;
-                let rates = motion.rates(at, motion.passage(at).1).unwrap();
+                let rates = motion.rates(&motion.place(at)).unwrap();
                 for (row, rate) in [rates.velocity, rates.acceleration, rates.jerk].iter().enumerate() {
                     for k in 0..2 {
                         most[row][k] = most[row][k].max(rate.value[k].abs());
@@ -258,8 +307,9 @@ mod tests {
                 end_speeds: [0.0; 2],
             };
             let mut tally = Tally::default();
-            let looker = Looker { motion: &motion, limits: &limits, feeds: [f64::INFINITY; FEEDS], start: 0.0, line: 1 };
-            looker.phase(u, (u[1] - u[0]) / width, curve.turns(), &mut tally);
+            let (feeds, covered) = ([f64::INFINITY; FEEDS], curve.turns() as f64 * (u[1] - u[0]) / width);
+            let looker = Looker { motion: &motion, limits: &limits, feeds, covered, start: 0.0, line: 1 };
+            looker.phase(u, &mut tally);
             for (row, check) in [Check::Velocity, Check::Acceleration, Check::Jerk].into_iter().enumerate() {
                 for k in (0..2).filter(|&k| most[row][k] > 1e-6) {
                     prop_assert!(tally.get(check, k).ratio > 1.0, "{check:?} {k}: {}", tally.get(check, k).ratio);

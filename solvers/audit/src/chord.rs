@@ -1,0 +1,28 @@
+//! The chord error: how far the path leaves the straight line between two setpoints, from speed and curvature.
+
+/// How far a circle of this curvature leaves its chord of length `step`. Chords longer than the diameter do not
+/// exist; a path of length `step` stays within half of it of one of its ends.
+pub fn chord_error(step: f64, curvature: f64) -> f64 {
+    let half = 0.5 * step;
+    let reach = half * curvature;
+    if reach < 1.0 {
+        // ρ − √(ρ² − half²), without the cancellation.
+        half * reach / (1.0 + (1.0 - reach * reach).sqrt())
+    } else {
+        half
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chord_error_is_the_sagitta() {
+        // A 3-4-5 triangle: chord 6 on radius 5 leaves the circle by 1.
+        assert!((chord_error(6.0, 0.2) - 1.0).abs() < 1e-15);
+        assert_eq!(chord_error(6.0, 0.0), 0.0);
+        assert_eq!(chord_error(10.0, 0.2), 5.0);
+        assert_eq!(chord_error(12.0, 0.2), 6.0);
+    }
+}

@@ -1,0 +1,61 @@
+//! One setpoint of a stream, and where it is on the path of its plan.
+
+use super::nearest::Place;
+use super::PLACE_TOLERANCE;
+
+/// One setpoint.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<const M: usize> {
+    pub t: f64,
+    pub q: [f64; M],
+    pub velocity: Option<[f64; M]>,
+    pub acceleration: Option<[f64; M]>,
+    pub line: i32,
+    /// Its place on the path, where there is a path.
+    pub nearest: Nearest<M>,
+}
+
+impl<const M: usize> Row<M> {
+    pub fn is_finite(&self) -> bool {
+        let recorded = self.velocity.iter().chain(&self.acceleration).flatten();
+        self.t.is_finite() && self.q.iter().chain(recorded).all(|number| number.is_finite())
+    }
+}
+
+/// Where a setpoint is.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearest<const M: usize> {
+    pub place: Place,
+    /// How far u went to it from the place of the setpoint before, where that is on the same piece.
+    pub step: f64,
+    /// Greatest coordinate of the piece, in mm.
+    pub magnitude: f64,
+    /// Distance from the path, and along it from where the profile is at that time, in mm.
+    pub off: f64,
+    pub late: f64,
+    /// How much of `late` is allowed, in mm.
+    pub allowed: f64,
+    /// Of the profile there; not a number where that is not known.
+    pub velocity: [f64; M],
+}
+
+impl<const M: usize> Default for Nearest<M> {
+    fn default() -> Self {
+        Self {
+            place: Place { piece: 0, u: 0.0 },
+            step: 0.0,
+            magnitude: 0.0,
+            off: 0.0,
+            late: 0.0,
+            allowed: PLACE_TOLERANCE,
+            velocity: [f64::NAN; M],
+        }
+    }
+}
+
+impl<const M: usize> Nearest<M> {
+    /// Whether the setpoint is on the path, where the profile is at its time.
+    pub fn is_good(&self) -> bool {
+        self.off <= PLACE_TOLERANCE && self.late <= self.allowed
+    }
+}
