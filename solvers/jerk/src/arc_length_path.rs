@@ -14,8 +14,8 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use crate::curvature_jumps::{passages, Jump, Passage};
-use crate::jerk_limited::{Geometry, PathPoint, SpeedCap};
 use crate::path_limits::chord_speed;
+use crate::path_problem::{Geometry, PathPoint, SpeedCap};
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::{self, derivatives};

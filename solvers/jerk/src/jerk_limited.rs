@@ -14,7 +14,7 @@
 //! | `rest_ramp` | the start from rest and the stop: constant jerk, w ∝ s^(4/3), or constant acceleration, w ∝ s |
 //! | `initial_plan`, `prepare` | a first plan within all limits |
 //! | `constraints`, `exact`, `relaxed` | the limits as slacks; the true problem and its convex relaxation |
-//! | `interior_point`, `newton`, `band` | the primal-dual interior-point method on one window |
+//! | `interior_point`, `newton`, `working_space`, `band` | the primal-dual interior-point method on one window |
 //! | `intersample_check`, `window` | the limits between the collocation points |
 //! | `windows` | paths of any length |
 //! | `held` | where the feed is held, and the stretches between such places |
@@ -29,6 +29,7 @@
 mod band;
 mod constraints;
 mod exact;
+mod forms;
 mod grid;
 mod held;
 mod hermite;
@@ -42,178 +43,18 @@ mod model;
 mod newton;
 pub mod on_path;
 mod prepare;
-mod profile;
+pub(crate) mod profile;
 mod relaxed;
-mod rest_ramp;
+pub(crate) mod rest_ramp;
 mod sides;
 mod speed_envelope;
 mod speed_limit;
 mod turns;
 mod window;
+mod window_end;
 mod windows;
+mod working_space;
 
-use std::time::Instant;
-
-use feedplan_geometry::watch::Watch;
-use feedplan_planner::problem::Both;
-
-pub use profile::Profile;
-pub use rest_ramp::Ramp;
-
-/// Derivatives of the axes by the arc length at a point of the path, and the speed cap there.
-#[derive(Clone, Copy, Debug)]
-pub struct PathPoint<const M: usize> {
-    /// q', in mm (or degrees) per mm.
-    pub first: [f64; M],
-    /// q'', per mm more.
-    pub second: [f64; M],
-    /// q''', per mm² more.
-    pub third: [f64; M],
-    /// The greatest speed along the path by feed and chord error, in mm/s; infinite where neither limits it.
-    pub speed_cap: f64,
-}
-
-/// A path of smooth pieces between knots.
-pub trait Geometry<const M: usize>: Sync {
-    /// Arc lengths of the ends of the pieces, in mm, strictly rising, from 0 where the path begins at rest. q' is
-    /// continuous at all knots; q'' may jump where the problem caps the speed, q''' anywhere.
-    fn knots(&self) -> &[f64];
-
-    /// Derivatives at the arc length s on a piece, which may be one of its ends.
-    fn at(&self, piece: usize, s: f64) -> PathPoint<M>;
-}
-
-/// Greatest magnitudes of each axis, in mm/s, mm/s² and mm/s³; all but jerk for positive and for negative values.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits<const M: usize> {
-    pub velocity: Both<M>,
-    pub acceleration: Both<M>,
-    pub jerk: [f64; M],
-}
-
-/// A speed cap, and tighter limits of jerk around it, as setpoints show a jump of q'' as jerk.
-#[derive(Clone, Copy, Debug)]
-pub struct SpeedCap {
-    /// Arc length, in mm.
-    pub s: f64,
-    /// In mm/s; infinite for no cap.
-    pub speed: f64,
-    /// The limits of jerk are tighter up to this distance to both sides, in mm.
-    pub reach: f64,
-    /// The part, less than 1, by which they are lower.
-    pub share: f64,
-}
-
-impl SpeedCap {
-    pub fn new(s: f64, speed: f64) -> Self {
-        Self { s, speed, reach: 0.0, share: 0.0 }
-    }
-}
-
-/// How a path begins or ends.
-#[derive(Clone, Copy, Debug)]
-pub enum End {
-    Rest,
-    /// At rest for no time where the path turns back, with an acceleration away from the end of at most this in mm/s²,
-    /// above 0. The lower bound holds for all accelerations up to the greatest.
-    Turn {
-        acceleration: f64,
-        greatest: f64,
-    },
-    /// A speed above 0 in mm/s and an acceleration along the path in mm/s². Only some iterations lead to a plan.
-    Moving {
-        speed: f64,
-        acceleration: f64,
-    },
-    /// The speed in mm/s, above 0, that is held beyond the end. The lower bound holds for every motion beyond it.
-    Held {
-        speed: f64,
-    },
-}
-
-impl End {
-    /// In mm/s.
-    pub fn speed(&self) -> f64 {
-        match *self {
-            Self::Moving { speed, .. } | Self::Held { speed } => speed,
-            Self::Rest | Self::Turn { .. } => 0.0,
-        }
-    }
-}
-
-pub struct Problem<'a, G, const M: usize> {
-    pub geometry: &'a G,
-    pub limits: Limits<M>,
-    /// Strictly rising in s, with speeds above 0.
-    pub caps: &'a [SpeedCap],
-    pub ends: [End; 2],
-}
-
-/// Accuracy and effort of a plan.
-#[derive(Clone, Copy, Debug)]
-pub struct Effort<'a> {
-    /// Number of intervals while r = w^(3/4) doubles at its greatest slope: 16 cost less than 1e-4 of the time.
-    pub resolution: f64,
-    /// Complementarity gap at which iterations stop, as a part of the time.
-    pub tolerance: f64,
-    /// Most iterations for each window.
-    pub max_iterations: usize,
-    /// When a plan must be ready, whatever its quality.
-    pub deadline: Option<Instant>,
-    /// Paths of more intervals than this are solved in overlapping windows of about this many intervals.
-    pub window: usize,
-    /// Whether a lower bound is computed too.
-    pub proves: bool,
-    /// Takes the progress and may cancel the work.
-    pub watch: Watch<'a>,
-}
-
-impl Default for Effort<'_> {
-    fn default() -> Self {
-        Self {
-            resolution: 16.0,
-            tolerance: 1e-7,
-            max_iterations: 400,
-            deadline: None,
-            window: 4000,
-            proves: false,
-            watch: Watch::default(),
-        }
-    }
-}
-
-impl Effort<'_> {
-    /// Whether the deadline has passed.
-    pub fn expired(&self) -> bool {
-        self.deadline.is_some_and(|end| Instant::now() >= end)
-    }
-}
-
-#[derive(Clone, Debug, PartialEq)]
-pub enum Fault {
-    /// The input is wrong, as the sentence says.
-    Input(String),
-    /// No valid plan was found near this arc length, in mm: no speed is possible, or a moving end is out of reach.
-    NoPlan { s: f64 },
-}
-
-#[derive(Clone, Debug)]
-pub struct Plan {
-    pub profile: Profile,
-    /// In s.
-    pub time: f64,
-    /// A lower bound on the time, in s, as `lower_bound` proves it; NaN without proof.
-    pub lower_bound: f64,
-    /// Whether every window reached its optimum.
-    pub converged: bool,
-    /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.
-    /// It is no bound, and it has no meaning where the deadline stopped the iterations.
-    pub excess: f64,
-    /// Newton steps, averaged over the intervals.
-    pub iterations: f64,
-}
-
-/// The plan of least time.
-pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
-    windows::solve(problem, effort)
-}
+pub use crate::path_problem::{Effort, End, Fault, Geometry, Limits, PathPoint, Problem, SpeedCap};
+pub use profile::{Plan, Profile};
+pub use windows::plan;

@@ -5,7 +5,9 @@
 //! the arc length. All stay what they are where a phase is cut at the end of a piece. Lengths in mm, times in s.
 
 use crate::arc_length_path::{speed_sq, ArcLengthPath};
-use crate::jerk_limited::{Geometry, Profile, Ramp};
+use crate::jerk_limited::profile::Profile;
+use crate::jerk_limited::rest_ramp::Ramp;
+use crate::path_problem::Geometry;
 use crate::s_curve::{Section, SegmentEnd};
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::phase_law::PhaseLaw;

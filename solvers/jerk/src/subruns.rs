@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use crate::arc_length_path::{
     path_point, per_feed, piece, speed_sq, straight, tool_curvature, Part, MAX_RATE,
 };
-use crate::jerk_limited::Limits;
 use crate::jerk_profile::JerkProfile;
+use crate::path_problem::Limits;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;

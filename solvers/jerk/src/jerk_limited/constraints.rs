@@ -13,12 +13,12 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
+use super::forms::Form;
 use super::hermite::{self, combine, local, BEND, SLOPE, VALUE};
-use super::interior_point::WindowEnd;
-use super::model::Form;
 use super::sides::Sides;
-use super::{Geometry, Limits, PathPoint};
-use crate::lanes::{Lanes, Register};
+use super::window_end::WindowEnd;
+use crate::path_problem::{Geometry, Limits, PathPoint};
+use feedplan_geometry::lanes::{Lanes, Register};
 
 const INWARDS: Lanes = Lanes::new([1.0 / 3.0, 0.0, 0.0, -1.0 / 3.0]);
 

@@ -3,9 +3,10 @@
 use fearless_simd::Simd;
 
 use super::constraints::{Constraints, RowLayout};
+use super::forms::{expand, fall, pace, Local};
 use super::hermite::{combine, duration_on, AT_NODES, WEIGHTS};
-use super::model::{expand, fall, pace, Local, Model};
-use crate::lanes::{Lanes, Register};
+use super::model::Model;
+use feedplan_geometry::lanes::{Lanes, Register};
 
 /// w^(−1/2) at the collocation points of each interval, as the slacks were last evaluated.
 #[derive(Default)]

@@ -6,8 +6,8 @@ use super::speed_envelope::{Change, EnvelopeSample, Slopes, ROUNDING};
 use std::ops::Range;
 
 use super::constraints::Constraints;
-use super::interior_point::WindowEnd;
-use super::{Geometry, Problem, SpeedCap};
+use super::window_end::WindowEnd;
+use crate::path_problem::{Geometry, Problem, SpeedCap};
 
 /// r counts as changing where it uses more than this part of its greatest slope.
 const CHANGING: f64 = 0.02;
@@ -188,8 +188,8 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
 mod tests {
     use super::super::rest_ramp::Ramp;
     use super::super::speed_envelope::sample_envelope;
-    use super::super::{Limits, PathPoint};
     use super::*;
+    use crate::path_problem::{Limits, PathPoint};
     use feedplan_geometry::watch::Watch;
 
     struct Line;

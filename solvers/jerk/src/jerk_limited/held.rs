@@ -10,9 +10,9 @@ use feedplan_geometry::elementary::Elementary;
 use rayon::prelude::*;
 
 use super::speed_envelope::{Change, Slopes, ROUNDING};
-use super::{End, Geometry, Limits, PathPoint, SpeedCap};
 use crate::arc_length_path::{path_point, piece, ArcLengthPath, Junction};
 use crate::path_limits::{bounded, Curve, Shape};
+use crate::path_problem::{End, Geometry, Limits, PathPoint, SpeedCap};
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;

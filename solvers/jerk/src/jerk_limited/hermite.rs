@@ -5,7 +5,7 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use crate::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::{Lanes, Register};
 
 /// Collocation points, where the limits are enforced, as parts of the interval's length.
 pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];

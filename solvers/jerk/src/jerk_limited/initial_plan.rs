@@ -8,8 +8,8 @@ use feedplan_geometry::elementary::Elementary;
 use std::collections::VecDeque;
 
 use super::constraints::Constraints;
-use super::interior_point::WindowEnd;
 use super::speed_envelope::Slopes;
+use super::window_end::WindowEnd;
 
 /// δ: half the width of the smoothing, in local time.
 const MEAN: f64 = 0.7;

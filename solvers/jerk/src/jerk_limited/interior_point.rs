@@ -7,48 +7,16 @@
 //!
 //! Symbols: λ multipliers, μ mean complementarity λ s per row, σ centring, T time.
 
-use feedplan_geometry::elementary::Elementary;
 use std::time::Instant;
 
-use fearless_simd::{dispatch, Level, Simd};
+use fearless_simd::{dispatch, Simd};
 
-use super::band::{Band, EndCondition};
+use super::band::EndCondition;
 use super::constraints::{Constraints, RowLayout};
-use super::hermite::local;
 use super::model::Model;
-use super::newton::State;
-use super::rest_ramp::Ramp;
-use crate::lanes::{Lanes, LogProduct};
+use super::window_end::WindowEnd;
+use super::working_space::{EndRow, InteriorPoint};
 use feedplan_geometry::watch::Watch;
-
-/// The known values at an end of a window.
-#[derive(Clone, Copy, Debug)]
-pub enum WindowEnd {
-    /// The path begins or ends at rest, with a ramp, and w at most `greatest` at its end.
-    Rest { ramp: Ramp, greatest: f64 },
-    /// w and w' are given.
-    Fixed { w: f64, slope: f64 },
-    /// w and w' may have any values within the limits.
-    Free,
-}
-
-impl WindowEnd {
-    /// The ramp at this end.
-    pub fn ramp(&self) -> Ramp {
-        match *self {
-            Self::Rest { ramp, .. } => ramp,
-            Self::Fixed { .. } | Self::Free => Ramp { length: 0.0, power: Ramp::JERK },
-        }
-    }
-
-    /// Whether a spline that ends with these values meets this end.
-    pub fn is_met(&self, end_w: f64, end_slope: f64) -> bool {
-        match *self {
-            Self::Rest { .. } | Self::Free => true,
-            Self::Fixed { w, slope } => (end_w, end_slope) == (w, slope),
-        }
-    }
-}
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
@@ -95,54 +63,6 @@ const MET: f64 = 1e-9;
 const LEAST_STEP: f64 = 1e-6;
 /// λ s stays above this part of the complementarity aimed at.
 pub(super) const LEAST_DUAL: f64 = 1e-4;
-
-/// Working space, reused from window to window.
-pub struct InteriorPoint<X, const M: usize> {
-    /// What instructions the processor has.
-    pub(super) level: Level,
-    pub(super) model: X,
-    pub(super) band: Band,
-    pub(super) state: State,
-    pub(super) gradient: Vec<f64>,
-    pub(super) rhs: Vec<f64>,
-    pub(super) step: Vec<f64>,
-    pub(super) trial: Vec<f64>,
-    /// Pulls on (w, w') of each station: by the centring with λ s = 1, and by the predictor's products.
-    pub(super) pulls: Vec<[[f64; 2]; 2]>,
-    /// The rows of one interval: small enough for the nearest cache.
-    pub(super) scratch: Vec<Lanes>,
-    pub(super) ends: [Option<EndRow>; 2],
-}
-
-/// The row that limits w at the end of a ramp.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct EndRow {
-    pub station: usize,
-    pub ramp: Ramp,
-    pub greatest: f64,
-    pub slack: f64,
-    pub dual: f64,
-    /// As in `State`.
-    pub step: f64,
-}
-
-impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
-    fn default() -> Self {
-        Self {
-            level: Level::new(),
-            model: X::default(),
-            band: Band::default(),
-            state: State::default(),
-            gradient: vec![],
-            rhs: vec![],
-            step: vec![],
-            trial: vec![],
-            pulls: vec![],
-            scratch: vec![],
-            ends: [None; 2],
-        }
-    }
-}
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Improves the valid plan x = (w_0, w'_0, w_1, …) in place. The start need not meet given ends.
@@ -261,20 +181,6 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         Report { outcome, iterations, time: self.time(simd, rows, ends, x, false), excess }
     }
 
-    #[inline(always)]
-    fn resize(&mut self, count: usize) {
-        let state = &mut self.state;
-        for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
-            vector.resize(count * RowLayout::<M>::COUNT, Lanes::ONE);
-        }
-        state.step.fill(Lanes::ZERO);
-        self.scratch.resize(RowLayout::<M>::COUNT, Lanes::ONE);
-        self.pulls.resize(count + 1, [[0.0; 2]; 2]);
-        for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {
-            vector.resize(2 * count + 2, 0.0);
-        }
-    }
-
     /// Slacks and multipliers of the start. Returns Σ ln s, or None unless the start is strictly inside.
     #[inline(always)]
     fn enter<S: Simd>(
@@ -306,60 +212,6 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             }
         }
         Some(logarithm)
-    }
-
-    /// Slacks of x, or of the trial. Returns Σ ln s, or None if a limit is broken.
-    #[inline(always)]
-    pub(super) fn slacks<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        x: &[f64],
-        trial: bool,
-    ) -> Option<f64> {
-        let mut product = LogProduct::default();
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let slack = RowLayout::<M>::of_mut(&mut self.state.slack, n);
-            self.model.slack(simd, rows, n, &local(x, n, interval.h), trial, slack);
-            let (mut least, mut all) = (slack[0].load(simd), slack[0].load(simd));
-            for slack in &slack[1..] {
-                least = slack.load(simd).min(least);
-                all = all * *slack;
-            }
-            // A NaN is refused as well.
-            if least.least() <= 0.0 || all.sum().is_nan() {
-                return None;
-            }
-            product.take(all.values());
-        }
-        let mut logarithm = product.ln();
-        for row in self.ends.iter_mut().flatten() {
-            row.slack = 1.0 - x[2 * row.station] / row.greatest;
-            if row.slack <= 0.0 {
-                return None;
-            }
-            logarithm += row.slack.natural_log();
-        }
-        Some(logarithm)
-    }
-
-    /// The time of a spline with its ramps, in s; infinite where w is not positive.
-    #[inline(always)]
-    pub(super) fn time<S: Simd>(
-        &self,
-        simd: S,
-        rows: &Constraints<M>,
-        ends: [WindowEnd; 2],
-        x: &[f64],
-        trial: bool,
-    ) -> f64 {
-        let mut time = self.model.time(simd, rows, x, trial);
-        for (kind, w) in ends.iter().zip([x[0], x[x.len() - 2]]) {
-            if let WindowEnd::Rest { ramp, .. } = kind {
-                time += if w > 0.0 { ramp.way() / w.sqrt() } else { f64::INFINITY };
-            }
-        }
-        time
     }
 }
 

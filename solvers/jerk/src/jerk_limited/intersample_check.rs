@@ -6,8 +6,8 @@ use fearless_simd::{dispatch, Level, Simd};
 use super::constraints::Constraints;
 use super::hermite::{self, combine, local, Basis};
 use super::sides::Sides;
-use super::{Geometry, Limits};
-use crate::lanes::{Lanes, Register};
+use crate::path_problem::{Geometry, Limits};
+use feedplan_geometry::lanes::{Lanes, Register};
 
 /// Samples of an interval, its ends included, in groups of four lanes.
 const GROUPS: usize = 3;

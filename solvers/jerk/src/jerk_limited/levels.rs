@@ -5,13 +5,14 @@ use fearless_simd::{dispatch, Level, Simd};
 use super::constraints::{Constraints, RowLayout};
 use super::exact::Exact;
 use super::hermite::{duration_on, local};
-use super::interior_point::{Effort, InteriorPoint};
+use super::interior_point::Effort;
 use super::intersample_check::IntersampleCheck;
 use super::lower_bound::lagrangian;
 use super::model::Model;
 use super::prepare::Prepared;
 use super::relaxed::Relaxed;
-use super::{End, Geometry, Limits, PathPoint, Problem};
+use super::working_space::InteriorPoint;
+use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
 use feedplan_geometry::watch::Watch;
 
 /// A space curve that turns to both sides, its derivatives known by the length.

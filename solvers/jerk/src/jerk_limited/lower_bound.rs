@@ -26,12 +26,14 @@ use fearless_simd::{dispatch, Simd};
 
 use super::constraints::{Constraints, RowLayout};
 use super::exact::Exact;
+use super::forms::{fall, pace, project};
 use super::hermite::{local, MASS};
-use super::interior_point::{Effort, InteriorPoint, Outcome, WindowEnd};
-use super::model::{fall, pace, project};
+use super::interior_point::{Effort, Outcome};
 use super::relaxed::Relaxed;
 use super::speed_limit;
-use crate::lanes::{Lanes, Register};
+use super::window_end::WindowEnd;
+use super::working_space::InteriorPoint;
+use feedplan_geometry::lanes::{Lanes, Register};
 
 /// How the solution of the relaxation begins and ends.
 struct Start {
@@ -365,8 +367,8 @@ mod tests {
 
     use super::super::prepare::Prepared;
     use super::super::window::ramps;
-    use super::super::{End, Geometry, Limits, PathPoint, Problem};
     use super::*;
+    use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
     use feedplan_geometry::watch::Watch;
 
     /// A plane curve that turns to both sides ever more sharply.

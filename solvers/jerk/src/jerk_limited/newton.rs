@@ -4,20 +4,12 @@ use fearless_simd::Simd;
 
 use super::band::EndCondition;
 use super::constraints::{Constraints, RowLayout};
+use super::forms::project;
 use super::hermite::local;
-use super::interior_point::{InteriorPoint, WindowEnd};
-use super::model::{project, Model};
-use crate::lanes::{Lanes, Register};
-
-/// Slacks and multipliers, by the rows of each interval (`RowLayout`).
-#[derive(Default)]
-pub struct State {
-    /// Slacks from `attempt` to `assemble`; after that 1/slack.
-    pub slack: Vec<Lanes>,
-    pub dual: Vec<Lanes>,
-    /// −ds dλ of the predictor, limited in size; after the corrector dλ.
-    pub step: Vec<Lanes>,
-}
+use super::model::Model;
+use super::window_end::WindowEnd;
+use super::working_space::InteriorPoint;
+use feedplan_geometry::lanes::{Lanes, Register};
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Assembles matrix and gradient at x, after `part` of the multipliers' step with λ ≥ `least_dual`/s; returns Σ λ

@@ -9,11 +9,12 @@
 
 use rayon::prelude::*;
 
+use super::held::{caps_between, stretches, Between, Stretch};
+use super::turns::{lower, Line};
+use super::windows;
 use crate::arc_length_path::{ArcLengthPath, Junction, Part};
-use crate::jerk_limited::held::{caps_between, stretches, Between, Stretch};
-use crate::jerk_limited::turns::{lower, Line};
-use crate::jerk_limited::{self, Effort, End, Limits, SpeedCap};
 use crate::jerk_profile::JerkProfile;
+use crate::path_problem::{self, Effort, End, Limits, SpeedCap};
 use crate::s_curve::{self, Segment};
 use crate::subruns::{over_chains, Chain, Subrun};
 use feedplan_planner::problem::{along, Fault, Problem};
@@ -199,15 +200,15 @@ impl<const M: usize> Task<'_, M> {
                 Ok(phases)
             }
             // A moving end has no plan before some iterations.
-            Err(jerk_limited::Fault::NoPlan { .. }) if moving && self.effort.expired() => {
+            Err(path_problem::Fault::NoPlan { .. }) if moving && self.effort.expired() => {
                 Ok(JerkProfile::unplanned())
             }
-            Err(jerk_limited::Fault::Input(what)) => {
+            Err(path_problem::Fault::Input(what)) => {
                 Err(Fault::Input { piece: Some(path.parts[0].piece), what })
             }
-            Err(jerk_limited::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &caps),
-            Err(jerk_limited::Fault::NoPlan { s }) if cuts < CUTS => self.cut(path, s, cuts),
-            Err(jerk_limited::Fault::NoPlan { s }) => {
+            Err(path_problem::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &caps),
+            Err(path_problem::Fault::NoPlan { s }) if cuts < CUTS => self.cut(path, s, cuts),
+            Err(path_problem::Fault::NoPlan { s }) => {
                 let part = path.part(s);
                 Err(Fault::Stuck { piece: path.parts[part].piece, u: path.locate(part, s) })
             }
@@ -221,7 +222,7 @@ impl<const M: usize> Task<'_, M> {
         own: Vec<Stretch>,
         junctions: &[Junction],
         caps: &[SpeedCap],
-    ) -> Result<Vec<JerkProfile>, jerk_limited::Fault> {
+    ) -> Result<Vec<JerkProfile>, path_problem::Fault> {
         let planned = own.iter().filter(|stretch| stretch.held.is_none());
         let share = planned.map(|stretch| stretch.ends[1] - stretch.ends[0]).sum::<f64>() / path.total();
         let resolution = (self.effort.resolution / (1.0 + FINER * (1.0 / share - 1.0)).sqrt())
@@ -239,7 +240,7 @@ impl<const M: usize> Task<'_, M> {
                 match planned {
                     Ok(Some(phases)) => all[i].1 = Some(phases),
                     Ok(None) => {}
-                    Err(jerk_limited::Fault::NoPlan { .. }) if all.len() > 1 => failed.push(i),
+                    Err(path_problem::Fault::NoPlan { .. }) if all.len() > 1 => failed.push(i),
                     Err(fault) => return Err(fault),
                 }
             }
@@ -264,7 +265,7 @@ impl<const M: usize> Task<'_, M> {
         effort: &Effort,
         junctions: &[Junction],
         caps: &[SpeedCap],
-    ) -> Result<JerkProfile, jerk_limited::Fault> {
+    ) -> Result<JerkProfile, path_problem::Fault> {
         let Stretch { ends, states, held } = *stretch;
         let watch = effort.watch.part((ends[1] - ends[0]) / path.total());
         let mut phases = JerkProfile::default();
@@ -275,13 +276,13 @@ impl<const M: usize> Task<'_, M> {
             self.kinks(path, junctions, |_| feed * feed, ends, &mut phases);
             return Ok(phases);
         }
-        let problem = jerk_limited::Problem {
+        let problem = path_problem::Problem {
             geometry: &Between::new(path, ends),
             limits: self.limits,
             caps: caps_between(caps, ends),
             ends: states,
         };
-        let plan = jerk_limited::plan(&problem, &Effort { watch, ..*effort })?;
+        let plan = windows::plan(&problem, &Effort { watch, ..*effort })?;
         phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
         phases.stopped = !plan.converged && effort.expired();
         phases.lower_bound.push(plan.lower_bound);
@@ -386,8 +387,8 @@ impl<const M: usize> Task<'_, M> {
         let speeds = ends.map(|end| end.speed());
         let possible = |speeds: [f64; 2]| {
             let ends = speeds.map(|speed| end_of(speed, [0.0; 2]));
-            let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps, ends };
-            jerk_limited::plan(&problem, &effort).is_ok()
+            let problem = path_problem::Problem { geometry: path, limits: self.limits, caps, ends };
+            windows::plan(&problem, &effort).is_ok()
         };
         // The end is at fault where the start alone can be met.
         let at = usize::from(speeds[0] == 0.0 || (speeds[1] > 0.0 && possible([speeds[0], 0.0])));

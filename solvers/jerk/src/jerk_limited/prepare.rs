@@ -6,12 +6,12 @@ use rayon::prelude::*;
 use super::constraints::Constraints;
 use super::grid::Grid;
 use super::initial_plan;
-use super::interior_point::WindowEnd;
 use super::intersample_check::IntersampleCheck;
 use super::rest_ramp::{self, Ramp};
 use super::speed_envelope::{sample_envelope, Slopes};
 use super::window::Window;
-use super::{Effort, End, Fault, Geometry, Limits, Problem};
+use super::window_end::WindowEnd;
+use crate::path_problem::{Effort, End, Fault, Geometry, Limits, Problem};
 use feedplan_geometry::watch::Watch;
 
 /// Intervals that one thread takes at a time.

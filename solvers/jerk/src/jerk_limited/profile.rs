@@ -70,6 +70,22 @@ fn on_ramp(distance: f64, ramp: Ramp, greatest: f64, sign: f64) -> [f64; 3] {
     [w, sign * slope, bend]
 }
 
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub profile: Profile,
+    /// In s.
+    pub time: f64,
+    /// A lower bound on the time, in s, as `lower_bound` proves it; NaN without proof.
+    pub lower_bound: f64,
+    /// Whether every window reached its optimum.
+    pub converged: bool,
+    /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.
+    /// It is no bound, and it has no meaning where the deadline stopped the iterations.
+    pub excess: f64,
+    /// Newton steps, averaged over the intervals.
+    pub iterations: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

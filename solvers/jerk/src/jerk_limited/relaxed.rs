@@ -9,9 +9,10 @@
 use fearless_simd::Simd;
 
 use super::constraints::{Constraints, RowLayout};
+use super::forms::{expand, fall, pace, project, Local};
 use super::hermite::{local, MASS};
-use super::model::{expand, fall, pace, project, Local, Model};
-use crate::lanes::{Lanes, Register};
+use super::model::Model;
+use feedplan_geometry::lanes::{Lanes, Register};
 
 /// The variables y of the relaxation, four lanes for each interval.
 pub struct Relaxed {

@@ -5,7 +5,7 @@
 use feedplan_geometry::elementary::Elementary;
 use std::ops::Range;
 
-use super::{Geometry, Limits, PathPoint, SpeedCap};
+use crate::path_problem::{Geometry, Limits, PathPoint, SpeedCap};
 use feedplan_planner::problem::lesser;
 
 /// The length of a ramp, as a part of the length on which constant jerk reaches the acceleration or the speed …

@@ -1,8 +1,9 @@
 //! A rough estimate of the speed along a path, from the axes' derivatives, their limits and the speed caps: the lower
 //! envelope of r = w^(3/4), at samples dense enough to lay the grid by. r is linear in s under constant jerk from rest.
 
-use super::interior_point::WindowEnd;
-use super::{rest_ramp, Fault, Geometry, Limits, PathPoint, SpeedCap};
+use super::rest_ramp;
+use super::window_end::WindowEnd;
+use crate::path_problem::{Fault, Geometry, Limits, PathPoint, SpeedCap};
 use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, lesser, Both};

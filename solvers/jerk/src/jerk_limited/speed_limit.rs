@@ -185,8 +185,8 @@ fn difference<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Geometry, Limits, PathPoint};
     use super::*;
+    use crate::path_problem::{Geometry, Limits, PathPoint};
 
     /// A plane curve with the curvature c s, seen from the middle of its length.
     struct Clothoid(f64);

@@ -4,8 +4,10 @@
 use super::constraints::Constraints;
 use super::exact::Exact;
 use super::hermite::duration;
-use super::interior_point::{Effort, InteriorPoint, Outcome, Report, WindowEnd};
+use super::interior_point::{Effort, Outcome, Report};
 use super::intersample_check::IntersampleCheck;
+use super::window_end::WindowEnd;
+use super::working_space::InteriorPoint;
 
 /// Greatest use of a limit that counts as kept: rounding, and the error of peaks between samples.
 pub const HELD: f64 = 1.0 + 4e-7;

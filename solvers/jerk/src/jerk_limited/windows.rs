@@ -11,12 +11,15 @@ use rayon::prelude::*;
 
 use super::exact::Exact;
 use super::hermite::duration;
-use super::interior_point::{self, InteriorPoint, WindowEnd};
+use super::interior_point;
 use super::lower_bound::{self, Part, Planned};
 use super::prepare::{Prepared, PREPARING};
+use super::profile::{Plan, Profile};
 use super::relaxed::Relaxed;
 use super::window::{ramps, WindowReport};
-use super::{Effort, Fault, Geometry, Plan, Problem, Profile};
+use super::window_end::WindowEnd;
+use super::working_space::InteriorPoint;
+use crate::path_problem::{Effort, Fault, Geometry, Problem};
 
 /// Windows reach this many stop times of the first plan (the optimum takes a third or more) and intervals beyond their
 /// cuts.
@@ -30,11 +33,8 @@ const BLENDS: [usize; 4] = [8, 4, 2, 1];
 /// Greatest use of a limit by a blend: a little more than that of a window.
 const BLENDED: f64 = 1.0 + 5e-7;
 
-/// See `jerk_limited::plan`.
-pub fn solve<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    effort: &Effort,
-) -> Result<Plan, Fault> {
+/// The plan of least time.
+pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let prepared = Prepared::new(problem, effort)?;
     let mut x = prepared.x.clone();
     let run = Run { prepared: &prepared, effort, stations: &prepared.grid.stations };
