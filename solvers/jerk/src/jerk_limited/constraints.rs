@@ -11,6 +11,8 @@
 //!
 //! The slack of the jerk is convex in w: its tangent at a valid plan is a safe inner constraint.
 
+use std::ops::Range;
+
 use fearless_simd::{dispatch, Level, Simd};
 
 use super::forms::Form;
@@ -160,6 +162,11 @@ impl<const M: usize> Constraints<M> {
             acceleration: Sides::new(&limits.acceleration),
             per_jerk: limits.jerk.map(|j| 1.0 / j),
         }
+    }
+
+    /// The constraints on a range of the intervals.
+    pub fn part(&self, range: Range<usize>) -> Self {
+        Self { intervals: self.intervals[range].to_vec(), ..*self }
     }
 
     /// Acceleration and jerk/√w of each axis, over A and J.

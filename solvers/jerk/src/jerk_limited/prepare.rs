@@ -1,5 +1,7 @@
 //! What the solver starts from: the checked problem, its grid, the known ends, and a first plan within all limits.
 
+use std::ops::Range;
+
 use feedplan_geometry::elementary::Elementary;
 use rayon::prelude::*;
 
@@ -28,6 +30,8 @@ pub struct Prepared<'a, G, const M: usize> {
     pub ends: [WindowEnd; 2],
     /// The ends of every motion that the lower bound is for.
     pub bound_ends: [WindowEnd; 2],
+    /// The constraints on all intervals, where one window takes them all.
+    rows: Option<Constraints<M>>,
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
     /// The time to stop from the greatest speed, in s.
@@ -53,7 +57,9 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         )?;
         let grid = Grid::new(&samples, slopes, problem.caps, &ends, effort.resolution);
         watch.check();
-        let mut prepared = Self { problem, grid, ends, bound_ends, x: vec![], stop_time: 0.0, watch };
+        let whole = || grid.constraints(problem, 0..grid.pieces.len());
+        let rows = (grid.pieces.len() <= effort.window).then(whole);
+        let mut prepared = Self { problem, grid, ends, bound_ends, rows, x: vec![], stop_time: 0.0, watch };
         prepared.begin(slopes)?;
         Ok(prepared)
     }
@@ -95,7 +101,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             self.watch.check();
             let first = chunk * CHUNK;
-            let rows = self.grid.constraints(self.problem, first..first + out.len());
+            let rows = self.constraints(first..first + out.len());
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);
             for (n, out) in out.iter_mut().enumerate() {
                 *out = f(&rows, n, x);
@@ -104,9 +110,16 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out
     }
 
+    fn constraints(&self, range: Range<usize>) -> Constraints<M> {
+        match &self.rows {
+            Some(rows) => rows.part(range),
+            None => self.grid.constraints(self.problem, range),
+        }
+    }
+
     /// The window of a range of intervals.
-    pub fn window(&self, range: std::ops::Range<usize>) -> Window<M> {
-        let rows = self.grid.constraints(self.problem, range.clone());
+    pub fn window(&self, range: Range<usize>) -> Window<M> {
+        let rows = self.constraints(range.clone());
         let stations = &self.grid.stations[range.start..=range.end];
         let pieces = &self.grid.pieces[range];
         let check =
