@@ -1,7 +1,7 @@
 //! Numbers of axes: those of random cases, and those that kernels are compiled for.
 
 /// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
-#[macro_export]
+#[macro_export(local_inner_macros)]
 macro_rules! for_axes {
     ($count:expr, $m:ident, $call:expr) => {
         match $count {
@@ -17,7 +17,7 @@ macro_rules! for_axes {
                 const $m: usize = 6;
                 $call
             }
-            few => $crate::for_few_axes!(few, $m, $call),
+            few => for_few_axes!(few, $m, $call),
         }
     };
 }

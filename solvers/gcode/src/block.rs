@@ -3,6 +3,9 @@
 //! A G code is a number of tenths (G5.1 is 51). Two codes of one group exclude each other in a block. The groups are those
 //! of RS-274/NGC; a code in no group is not read.
 
+use super::fault::{fault, Outcome};
+use super::number::integer;
+
 /// Bit of a letter in `Block::words`.
 #[inline(always)]
 pub const fn bit(letter: u8) -> u32 {
@@ -247,6 +250,15 @@ impl Block {
     #[inline(always)]
     pub fn get(&self, letter: u8) -> Option<f64> {
         self.has(letter).then(|| self.value(letter))
+    }
+
+    /// The integer that a word gives, at least `least`; None where the block has no such word. `what` is for the message.
+    pub fn count(&self, letter: u8, least: i64, what: &str) -> Outcome<Option<u32>> {
+        let Some(value) = self.get(letter) else { return Ok(None) };
+        match integer(value) {
+            Some(number) if number >= least && number <= i64::from(u32::MAX) => Ok(Some(number as u32)),
+            _ => fault(format!("word {} is no {what}: give an integer from {least}", self.word(letter))),
+        }
     }
 
     /// The word as a message names it.

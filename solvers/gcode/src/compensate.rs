@@ -9,79 +9,12 @@ use std::f64::consts::{PI, TAU};
 
 use super::beside::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
 use super::block::{g_name, Block};
-use super::execute::Interpreter;
+use super::compensation::{Compensation, Last, Phase};
+use super::coordinates::Point;
 use super::fault::{fault, Outcome};
-use super::moves::{Arc, Kind, Point};
+use super::interpreter::Interpreter;
+use super::moves::Kind;
 use super::tolerance::{ENTRY_BEND, NO_CORNER, WHOLE_TURNS};
-use super::words::count;
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Phase {
-    /// After G41 or G42, before the first move.
-    Entering,
-    Following,
-    /// After G40, before the next move.
-    Leaving,
-}
-
-/// The last element of the tool's path in the plane.
-#[derive(Clone, Copy, Debug)]
-struct Last {
-    /// Row of its first move.
-    row: usize,
-    start: Point2,
-    shape: Shape,
-    /// True for the element that brings the tool beside the path: its direction may change.
-    entry: bool,
-    /// The number of turns of the programmed arc, rounded up.
-    turns: f64,
-}
-
-/// The compensation that is on.
-#[derive(Clone, Debug)]
-pub struct Compensation {
-    code: u16,
-    /// 1 for left, -1 for right.
-    side: f64,
-    radius: f64,
-    phase: Phase,
-    /// The axes of the plane, and the axis that arcs turn about.
-    plane: (usize, usize),
-    normal: usize,
-    /// The vector from the centre of a lathe tool's tip to the point that is programmed without compensation; 0 for mills.
-    origin: Point2,
-    /// The point of the programmed path.
-    pub programmed: Point,
-    last: Last,
-}
-
-impl Compensation {
-    /// A point projected onto the plane.
-    fn flat(&self, point: &Point) -> Point2 {
-        [point[self.plane.0], point[self.plane.1]]
-    }
-
-    /// The tool's centre in the plane, where the machine is at a position.
-    fn centre(&self, machine: &Point) -> Point2 {
-        match self.phase {
-            Phase::Following => minus(self.flat(machine), self.origin),
-            _ => self.flat(machine),
-        }
-    }
-
-    /// Moves the machine in the plane so that the tool's centre is at a point.
-    fn put(&self, machine: &mut Point, centre: Point2) {
-        machine[self.plane.0] = centre[0] + self.origin[0];
-        machine[self.plane.1] = centre[1] + self.origin[1];
-    }
-
-    /// An arc of the machine for an arc of the tool's centre about a point of the plane, at the height of `at`.
-    fn arc(&self, centre: Point2, angle: f64, at: &Point) -> Arc {
-        let mut place = *at;
-        self.put(&mut place, centre);
-        Arc { centre: [place[0], place[1], place[2]], normal: self.normal, angle }
-    }
-}
 
 /// The vector from the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for each of the
 /// sides 0 to 9 that may cut.
@@ -139,7 +72,7 @@ impl Interpreter<'_> {
         }
         let (diameter, orientation) = match (code % 10, block.get(b'D')) {
             (1, Some(diameter)) => {
-                (diameter * self.state.unit(), count(block, b'L', 0, "side of a lathe tool")?.unwrap_or(0))
+                (diameter * self.state.unit(), block.count(b'L', 0, "side of a lathe tool")?.unwrap_or(0))
             }
             (1, None) => return fault(format!("{name} has no diameter: give it as D")),
             _ => self.tip_of_tool(block, &name)?,
@@ -186,7 +119,7 @@ impl Interpreter<'_> {
     /// The diameter in mm and the cutting side of the tool that D or H names, or of the tool in the spindle.
     fn tip_of_tool(&mut self, block: &Block, name: &str) -> Outcome<(f64, u32)> {
         let letter = if block.has(b'D') { b'D' } else { b'H' };
-        let number = count(block, letter, 0, "tool number")?;
+        let number = block.count(letter, 0, "tool number")?;
         if self.tools.is_none() {
             return fault(format!(
                 "{name} takes a diameter from the tool table: give one (--tool-table), or G41.1 and G42.1 with D"

@@ -4,12 +4,12 @@
 //! and back to R (G99), or to the height where the series began if that is higher (G98). The path between holes is exact.
 
 use super::block::{g_name, Block, AXES};
-use super::execute::{Interpreter, Topic};
+use super::coordinates::Point;
 use super::fault::{fault, Outcome};
+use super::interpreter::{Interpreter, Topic};
 use super::modal::FeedMode;
-use super::moves::{Control, Kind, Mode, Point, Stop};
+use super::moves::{Control, Kind, Mode, Stop};
 use super::tolerance::MOST_REPEATS;
-use super::words::count;
 
 /// The height above the last depth at which G73 and G83 stop, unless D gives it, in mm: 0.010 inch.
 const PECK_CLEARANCE: f64 = 0.254;
@@ -45,7 +45,7 @@ impl Interpreter<'_> {
                 g_name(motion)
             ));
         }
-        let repeats = count(block, b'L', 1, "number of repetitions")?.unwrap_or(1);
+        let repeats = block.count(b'L', 1, "number of repetitions")?.unwrap_or(1);
         if repeats > MOST_REPEATS {
             return fault(format!(
                 "word {} is more than {MOST_REPEATS} repetitions: check L",

@@ -5,9 +5,9 @@
 
 use super::arithmetic::{finite, function_at, operator_of, Function};
 use super::fault::{fault, foreign, Outcome};
-use super::number::{decimal, spaces};
+use super::number::{decimal, integer, spaces};
 use super::parameters::{is_number, Name, READINGS};
-use super::tolerance::{MAX_DEPTH, NEAR_INTEGER};
+use super::tolerance::MAX_DEPTH;
 
 /// The values of parameters, those that the program sets and those that the machine reports. A value that only one
 /// machine or control can know is a fault.
@@ -279,12 +279,6 @@ impl Formula<'_> {
     fn rest(&self) -> String {
         excerpt(self.source, self.at)
     }
-}
-
-/// The integer that a number stands for, if it is as near as `NEAR_INTEGER`.
-pub fn integer(value: f64) -> Option<i64> {
-    let nearest = value.round();
-    ((value - nearest).abs() <= NEAR_INTEGER && nearest.abs() < 1e15).then_some(nearest as i64)
 }
 
 /// The text from `at` to the end of the line, quoted, in at most 24 characters that can be printed.

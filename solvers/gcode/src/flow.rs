@@ -5,59 +5,12 @@
 use std::cell::OnceCell;
 use std::collections::HashMap;
 
-use super::expression::{excerpt, integer, name_in_brackets};
+use super::expression::{excerpt, name_in_brackets};
 use super::fault::{fault, fault_in, Outcome};
-use super::macros::{loop_label, statement};
-use super::number::{decimal, spaces};
-
-/// The kind of a line of program flow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    Sub,
-    EndSub,
-    Return,
-    Call,
-    If,
-    ElseIf,
-    Else,
-    EndIf,
-    While,
-    EndWhile,
-    Do,
-    /// The `while` that ends a `do`.
-    DoWhile,
-    Repeat,
-    EndRepeat,
-    Break,
-    Continue,
-    /// Fanuc's IF with GOTO or THEN.
-    When,
-    GoTo,
-    /// An O number alone, which begins a program or subprogram.
-    Number,
-}
-
-/// The keywords; where one begins another, the longer one comes first.
-const KEYWORDS: [(&str, Kind); 15] = [
-    ("ENDSUB", Kind::EndSub),
-    ("ENDIF", Kind::EndIf),
-    ("ENDWHILE", Kind::EndWhile),
-    ("ENDREPEAT", Kind::EndRepeat),
-    ("ELSEIF", Kind::ElseIf),
-    ("ELSE", Kind::Else),
-    ("SUB", Kind::Sub),
-    ("RETURN", Kind::Return),
-    ("CALL", Kind::Call),
-    ("IF", Kind::If),
-    ("WHILE", Kind::While),
-    ("DO", Kind::Do),
-    ("REPEAT", Kind::Repeat),
-    ("BREAK", Kind::Break),
-    ("CONTINUE", Kind::Continue),
-];
-
-/// The label of a line; None where it is computed when the line is run.
-pub type Label = Option<Vec<u8>>;
+use super::number::{decimal, integer, spaces};
+use super::statement::{
+    after_line, end_of_line, keyword, loop_label, number_label, statement, Kind, Label, KEYWORDS,
+};
 
 /// A line of program flow.
 #[derive(Clone, Debug)]
@@ -309,33 +262,6 @@ fn label(source: &[u8], at: usize) -> Outcome<Option<(Label, usize)>> {
         }
     }
     Ok(None)
-}
-
-/// A number as a label: O0100 is O100.
-pub fn number_label(value: f64) -> Option<Vec<u8>> {
-    integer(value).filter(|number| *number >= 0).map(|number| number.to_string().into_bytes())
-}
-
-/// The keyword at a place, and the place after it.
-pub fn keyword(source: &[u8], at: usize) -> Option<(Kind, usize)> {
-    let at = spaces(source, at);
-    let rest = source.get(at..)?;
-    KEYWORDS.iter().find_map(|(name, kind)| {
-        rest.get(..name.len())
-            .is_some_and(|text| text.eq_ignore_ascii_case(name.as_bytes()))
-            .then_some((*kind, at + name.len()))
-    })
-}
-
-/// The place of the line end at or after a place.
-pub fn end_of_line(source: &[u8], at: usize) -> usize {
-    let rest = source.get(at..).unwrap_or_default();
-    at + rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(rest.len())
-}
-
-/// The place after the line end at `end`.
-pub fn after_line(source: &[u8], end: usize) -> usize {
-    end + if source.get(end..).is_some_and(|rest| rest.starts_with(b"\r\n")) { 2 } else { 1 }
 }
 
 /// `Numbered::lines` of a text.

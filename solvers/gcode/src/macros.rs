@@ -1,64 +1,15 @@
 //! Fanuc's macros: calls by G65, whose arguments are letters, and the statements IF, WHILE, GOTO and END.
 
 use super::block::{g_name, Block, Group, MGroup};
-use super::expression::{bracket, expression, integer};
+use super::expression::{bracket, expression};
 use super::fault::{fault, Outcome};
-use super::flow::{number_label, Flow, Kind, Label, Step};
-use super::number::{decimal, spaces};
+use super::flow::{Flow, Step};
+use super::number::{decimal, integer, spaces};
 use super::run::{Exit, Frame, Runner};
-use super::words::{count, Lexer};
+use super::words::Lexer;
 
 /// The letters that set the parameters #1 to #26; a blank where no letter does.
 const ARGUMENTS: [u8; 26] = *b"ABCIJKDEF H     QRSTUVWXYZ";
-
-/// The statement whose first letter is at a place: its kind, its label, and the place of its arguments.
-pub fn statement(source: &[u8], at: usize) -> Option<(Kind, Label, usize)> {
-    let rest = source.get(at..)?;
-    let begins = |word: &str| {
-        rest.get(..word.len())
-            .is_some_and(|text| text.eq_ignore_ascii_case(word.as_bytes()))
-            .then(|| spaces(source, at + word.len()))
-    };
-    let open = |place: &usize| source.get(*place) == Some(&b'[');
-    match rest.first()? {
-        b'I' | b'i' => begins("IF").filter(open).map(|place| (Kind::When, None, place)),
-        b'G' | b'g' => begins("GOTO").map(|place| (Kind::GoTo, None, place)),
-        b'W' | b'w' => {
-            let place = begins("WHILE").filter(open)?;
-            Some((Kind::While, loop_label(source, behind_bracket(source, place)?)?.0, place))
-        }
-        b'E' | b'e' => {
-            let (number, end) = decimal(source, begins("END")?)?;
-            Some((Kind::EndWhile, Some(number_label(number)?), end))
-        }
-        _ => None,
-    }
-}
-
-/// The label of `DO 1` at a place, and the place after it.
-pub fn loop_label(source: &[u8], at: usize) -> Option<(Label, usize)> {
-    let at = spaces(source, at);
-    let (number, end) = source
-        .get(at..at + 2)
-        .filter(|text| text.eq_ignore_ascii_case(b"DO"))
-        .and_then(|_| decimal(source, at + 2))?;
-    Some((Some(number_label(number)?), end))
-}
-
-/// The place after the bracket that opens at a place.
-fn behind_bracket(source: &[u8], at: usize) -> Option<usize> {
-    let mut depth = 0usize;
-    for (place, byte) in source.iter().enumerate().skip(at) {
-        match byte {
-            b'[' => depth += 1,
-            b']' if depth == 1 => return Some(place + 1),
-            b']' => depth -= 1,
-            b'\n' | b'\r' => return None,
-            _ => {}
-        }
-    }
-    None
-}
 
 impl Runner<'_> {
     /// IF [condition] GOTO or THEN.
@@ -134,7 +85,7 @@ impl Runner<'_> {
         let Some(number) = number else {
             return fault(format!("{name} calls no subprogram: give its number as P"));
         };
-        let times = count(block, b'L', 0, "number of calls")?.unwrap_or(1);
+        let times = block.count(b'L', 0, "number of calls")?.unwrap_or(1);
         Ok(Exit::Fanuc { number, local: name == "M97", times, arguments })
     }
 }

@@ -1,7 +1,7 @@
 //! The state that stays in force from block to block: modes, offsets, feed.
 
-use super::moves::{Control, Mode, Point};
-use super::tip::CoordinateMode;
+use super::coordinates::{CoordinateMode, Point};
+use super::moves::{Control, Mode};
 use super::tolerance::MM_PER_INCH;
 
 /// The unit of an F word.

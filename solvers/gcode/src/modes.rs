@@ -1,8 +1,8 @@
 //! Sets modes by their codes, and saves and restores them by M70 to M73.
 
 use super::block::{Block, Group, AXIS_WORDS};
-use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
+use super::interpreter::Interpreter;
 use super::modal::State;
 use super::moves::{Control, Mode};
 use super::tolerance::FARTHEST;

@@ -2,13 +2,13 @@
 
 use super::arc::{arc, arc_length, Form};
 use super::block::{bits, Block, AXES, AXIS_WORDS};
-use super::execute::Interpreter;
+use super::coordinates::{CoordinateMode, Point};
 use super::fault::{fault, Outcome};
+use super::interpreter::Interpreter;
 use super::modal::{Feed, FeedMode};
-use super::moves::{only_turns, straight_length, Arc, Kind, Point};
-use super::tip::{angle_between, CoordinateMode};
+use super::moves::{only_turns, straight_length, Arc, Kind};
+use super::tip::angle_between;
 use super::tolerance::{FARTHEST_CENTRE, MOST_TURNS, RATES};
-use super::words::count;
 
 /// Words of the centre along X, Y, Z.
 const CENTRE: [u8; 3] = *b"IJK";
@@ -125,7 +125,7 @@ impl Interpreter<'_> {
             );
         }
         let form = self.arc_form(block, &position, u, v)?;
-        let turns = count(block, b'P', 1, "number of turns")?.unwrap_or(1);
+        let turns = block.count(b'P', 1, "number of turns")?.unwrap_or(1);
         if turns > MOST_TURNS {
             return fault(format!("word {} is more than {MOST_TURNS} turns: check P", block.word(b'P')));
         }

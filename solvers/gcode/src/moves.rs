@@ -2,21 +2,16 @@
 //!
 //! Path control, stops and dwells change seldom: their changes are kept, and `columns` makes columns of them.
 
-mod columns;
-mod events;
+pub mod columns;
 
 use std::f64::consts::TAU;
 
 use super::block::rotary;
+use super::coordinates::{CoordinateMode, Direction, Point, UPRIGHT};
+use super::events::Events;
 use super::fault::{fault, Outcome};
-use super::tip::CoordinateMode;
 use super::tolerance::{NO_MOTION, WHOLE_TURNS};
-pub use columns::Columns;
-pub use events::{Events, COMMENT, MESSAGE};
 use feedplan_geometry::spline::CompositeCurve;
-
-/// A point of the machine: X Y Z A B C U V W in mm and degrees.
-pub type Point = [f64; 9];
 
 /// The kind of a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,12 +78,6 @@ pub enum Stop {
     Tool = 5,
     End = 6,
 }
-
-/// A tool direction I, J, K: a unit vector from the tip to the spindle.
-pub type Direction = [f64; 3];
-
-/// The tool direction at the start of a program.
-const UPRIGHT: Direction = [0.0, 0.0, 1.0];
 
 /// A change of the coordinate mode: its first row, the mode, the tool's length in mm (NaN for that of the machine file),
 /// and the start of the row in coordinates of the mode.
@@ -345,6 +334,17 @@ impl Moves {
             }
             None => false,
         }
+    }
+
+    /// Adds an event after the moves so far.
+    pub fn event(&mut self, line: u32, letter: u8, number: f64, p: Option<f64>, q: Option<f64>) {
+        self.events.push(self.kind.len(), line, letter, number, [p, q]);
+    }
+
+    /// Adds a message to the operator, or a comment.
+    pub fn remark(&mut self, line: u32, letter: u8, text: String) {
+        let index = self.events.index_of(text, line);
+        self.event(line, letter, index as f64, None, None);
     }
 
     /// A full stop after the last move; of several causes the last one of `Stop` is kept.

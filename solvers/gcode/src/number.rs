@@ -3,6 +3,8 @@
 //! The grammar is that of RS-274: a sign, digits with at most one point, no exponent. Blanks may stand before the number
 //! and after its sign, since posts pad columns with them, but not inside: `X1 2` is not X12.
 
+use super::tolerance::NEAR_INTEGER;
+
 /// Powers of ten, which an f64 holds exactly.
 const POWERS: [f64; 16] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
@@ -36,6 +38,12 @@ pub fn decimal(source: &[u8], at: usize) -> Option<(f64, usize)> {
         _ => parse(&source[first..at]),
     };
     Some((if negative { -size } else { size }, at))
+}
+
+/// The integer that a number stands for, if it is as near as `NEAR_INTEGER`.
+pub fn integer(value: f64) -> Option<i64> {
+    let nearest = value.round();
+    ((value - nearest).abs() <= NEAR_INTEGER && nearest.abs() < 1e15).then_some(nearest as i64)
 }
 
 /// The first place at or after `at` that is neither a space nor a tab.

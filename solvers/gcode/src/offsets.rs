@@ -1,16 +1,14 @@
 //! Sets the program's zero, by work offsets, G52, G92 and tool lengths; and moves home.
 
 use super::block::{bits, g_name, Block, Group, AXES, AXIS_WORDS};
-use super::execute::{Interpreter, Topic};
+use super::coordinates::{CoordinateMode, Point};
 use super::fault::{fault, Outcome};
+use super::interpreter::{Interpreter, Topic};
 use super::modal::turn;
-use super::moves::Point;
+use super::options::Tool;
 use super::parameters::{
     first_of_system, HOME, MOST_FURTHER, ROTATION, SECOND_HOME, SHIFT, SHIFT_IN_FORCE, SYSTEM,
 };
-use super::tip::CoordinateMode;
-use super::tools::Tool;
-use super::words::count;
 
 impl Interpreter<'_> {
     /// G10: L1, L10 and L11 set a tool of the table, L2 and L20 a work offset.
@@ -29,7 +27,7 @@ impl Interpreter<'_> {
     }
 
     fn set_work_offset(&mut self, block: &Block, from_here: bool) -> Outcome<()> {
-        let system = match count(block, b'P', 0, "work offset")? {
+        let system = match block.count(b'P', 0, "work offset")? {
             Some(0) => self.state.offsets.system,
             Some(number @ 1..=9) => number as usize - 1,
             _ => return fault("G10 needs P0 to P9: P0 is the offset in force, P1 is G54, P9 is G59.3"),
@@ -77,7 +75,7 @@ impl Interpreter<'_> {
     }
 
     fn set_tool_data(&mut self, block: &Block, level: f64) -> Outcome<()> {
-        let Some(number) = count(block, b'P', 1, "tool number")? else {
+        let Some(number) = block.count(b'P', 1, "tool number")? else {
             return fault("G10 sets no tool: give its number as P");
         };
         let mut tool = self.tool_of(number).unwrap_or(Tool {
@@ -101,7 +99,7 @@ impl Interpreter<'_> {
         if let Some(radius) = block.get(b'R') {
             tool.diameter = 2.0 * radius * self.state.unit();
         }
-        if let Some(orientation) = count(block, b'Q', 0, "orientation of a tool")? {
+        if let Some(orientation) = block.count(b'Q', 0, "orientation of a tool")? {
             tool.orientation = orientation;
         }
         let tools = self.tools.get_or_insert_with(Vec::new);
@@ -225,7 +223,7 @@ impl Interpreter<'_> {
 
     fn set_system(&mut self, block: &Block) -> Outcome<()> {
         let wanted = match block.code(Group::System) {
-            Some(code @ (541 | 1540)) => match count(block, b'P', 1, "further work offset")? {
+            Some(code @ (541 | 1540)) => match block.count(b'P', 1, "further work offset")? {
                 Some(number) if number <= MOST_FURTHER => Some(number as usize + 8),
                 _ => {
                     return fault(format!(
@@ -247,7 +245,7 @@ impl Interpreter<'_> {
 
     /// The offset of the tool that H names, or of the tool in the spindle; 0 where no table has it.
     fn length_of_tool(&mut self, block: &Block) -> Outcome<Point> {
-        let number = count(block, b'H', 0, "tool number")?;
+        let number = block.count(b'H', 0, "tool number")?;
         let tool = match number {
             Some(0) => None,
             Some(number) => self.needed_tool(number)?,

@@ -1,9 +1,9 @@
 //! The parameters that report the machine's position, tool and modes; and the assignment of parameters.
 
 use super::block::{rotary, AXES};
-use super::execute::Interpreter;
 use super::expression::Values;
 use super::fault::{fault, Outcome};
+use super::interpreter::Interpreter;
 use super::modal::{FeedMode, State};
 use super::parameters::{Name, READINGS};
 

@@ -6,13 +6,13 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 
 use super::block::Block;
-use super::execute::Interpreter;
 use super::fault::{fault, Fault, Outcome};
 use super::flow::Flow;
+use super::interpreter::Interpreter;
+use super::options::Options;
 use super::parameters::Scope;
 use super::tolerance::{LINES_PER_MOVE, SPARE_LINES};
 use super::words::{Lexer, Line};
-use super::Options;
 
 /// Number of lines that are run between two reports of progress.
 const REPORTED: u32 = 1024;

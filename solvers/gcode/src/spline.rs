@@ -2,32 +2,17 @@
 //! knots), and Fanuc's G6.2 (NURBS with knots). A NURBS of several blocks is one move, in the line of its first block.
 
 use super::block::{bit, bits, g_name, Block, Group, AXES, AXIS_WORDS};
-use super::execute::{Interpreter, Topic};
+use super::coordinates::Point;
 use super::fault::{fault, Outcome};
+use super::interpreter::{Interpreter, Topic};
 use super::modal::{Feed, FeedMode};
-use super::moves::{only_turns, Point};
+use super::nurbs::{check_order, Nurbs};
 use super::tolerance::SAME_PLACE;
-use super::words::count;
-use feedplan_geometry::spline::extract::extract;
-use feedplan_geometry::spline::knots::Spline;
-use feedplan_geometry::spline::{CompositeCurve, MAX_DEGREE};
+use feedplan_geometry::spline::CompositeCurve;
 
 /// The order of a NURBS without L in G5.2, or P in G6.2.
 const ORDER: usize = 3;
 const FANUC_ORDER: usize = 4;
-
-/// A NURBS that is being read.
-pub struct Nurbs {
-    /// 52 or 62.
-    code: u16,
-    line: u32,
-    feed: Feed,
-    order: usize,
-    points: Vec<Point>,
-    weights: Vec<f64>,
-    /// Of G6.2; empty for G5.2.
-    knots: Vec<f64>,
-}
 
 impl Interpreter<'_> {
     /// A block of G5, G5.1, G5.2, G5.3 or G6.2 that begins a spline.
@@ -134,7 +119,7 @@ impl Interpreter<'_> {
     /// The first block of a NURBS.
     fn open(&mut self, block: &Block, code: u16, feed: Feed) -> Outcome<()> {
         let start = self.moves.position;
-        let order = if code == 62 { count(block, b'P', 2, "order")? } else { None };
+        let order = if code == 62 { block.count(b'P', 2, "order")? } else { None };
         let order = order.map_or(if code == 62 { FANUC_ORDER } else { ORDER }, |order| order as usize);
         check_order(block, b'P', order)?;
         let mut nurbs =
@@ -261,44 +246,9 @@ impl Interpreter<'_> {
 
     /// Adds the move along a NURBS that is complete.
     fn close(&mut self, nurbs: &Nurbs) -> Outcome<()> {
-        let (k, n, line) = (nurbs.order, nurbs.points.len(), nurbs.line);
-        if n < k {
-            return fault(format!(
-                "the spline G5.2 of line {line} has {n} control points and its order is {k}: give at least so many, or \
-                 a lower L"
-            ));
-        }
-        let knots = if nurbs.code == 52 {
-            // Clamped and uniform: the first and the last knot k times.
-            (0..n + k).map(|i| (i.clamp(k - 1, n) - (k - 1)) as f64).collect()
-        } else {
-            let knots = &nurbs.knots;
-            let clamped = |part: &[f64]| part.windows(2).all(|pair| pair[0] == pair[1]);
-            if !clamped(&knots[..k]) || !clamped(&knots[n..]) {
-                return fault(format!(
-                    "the spline G6.2 of line {line} does not begin and end with {k} equal knots, so it does not reach \
-                     its end points: repeat them"
-                ));
-            }
-            knots.clone()
-        };
-        let equal = nurbs.weights.iter().all(|weight| *weight == nurbs.weights[0] && *weight > 0.0);
-        let weights = if equal { vec![] } else { nurbs.weights.clone() };
-        let curve =
-            Spline::new(k - 1, knots, nurbs.points.clone(), weights).and_then(|spline| extract(&spline));
-        let mut curve = match curve {
-            Ok(curve) => curve,
-            Err(error) => {
-                return fault(format!("the spline {} of line {line}: {error}", g_name(nurbs.code)));
-            }
-        };
-        let turns = nurbs.points.iter().all(|point| only_turns(&nurbs.points[0], point));
-        let feed = if turns { nurbs.feed.angular } else { nurbs.feed.linear };
-        // Both ends are the control points, without rounding.
-        let last = curve.control.len() - 1;
-        (curve.control[0], curve.control[last]) = (nurbs.points[0], nurbs.points[n - 1]);
+        let curve = nurbs.curve()?;
         self.state.motion = 800;
-        self.moves.spline(&curve, feed, &self.state.control, line)
+        self.moves.spline(&curve, nurbs.feed_along(), &self.state.control, nurbs.line)
     }
 
     /// Refuses a program that ends inside a spline.
@@ -330,17 +280,6 @@ impl Interpreter<'_> {
     }
 }
 
-impl Nurbs {
-    /// Sets the order to L, which may be in any block of G5.2.
-    fn set_order(&mut self, block: &Block) -> Outcome<()> {
-        if let Some(order) = count(block, b'L', 3, "order of G5.2")? {
-            self.order = order as usize;
-            check_order(block, b'L', self.order)?;
-        }
-        Ok(())
-    }
-}
-
 /// Refuses a block that is not one of the spline; `own` are the words of its blocks.
 #[cold]
 fn interrupted(block: &Block, nurbs: &Nurbs, motion: Option<u16>, own: u32) -> Outcome<()> {
@@ -357,17 +296,6 @@ fn interrupted(block: &Block, nurbs: &Nurbs, motion: Option<u16>, own: u32) -> O
     fault(format!(
         "{what} stands inside the spline {name} of line {line}, which takes {takes} until {end}: end it before"
     ))
-}
-
-fn check_order(block: &Block, letter: u8, order: usize) -> Outcome<()> {
-    if order > MAX_DEGREE + 1 {
-        return fault(format!(
-            "word {} is an order beyond {}: post the spline at a lower one",
-            block.word(letter),
-            MAX_DEGREE + 1
-        ));
-    }
-    Ok(())
 }
 
 /// A point moved in X and Y.

@@ -1,10 +1,12 @@
 //! Runs a line of program flow: conditions, loops, calls and returns.
 
-use super::expression::{bracket, expression, integer};
+use super::expression::{bracket, expression};
 use super::fault::{fault, Outcome};
-use super::flow::{behind_comments, check_rest, number_label, Flow, Kind, Step};
+use super::flow::{behind_comments, check_rest, Flow, Step};
+use super::number::integer;
 use super::parameters::LOCALS;
 use super::run::{Exit, Frame, Runner};
+use super::statement::{number_label, Kind};
 use super::words::Lexer;
 
 impl Runner<'_> {

@@ -1,11 +1,11 @@
 //! Moves that are synchronous with the spindle: G33 (one pass of a thread), G33.1 (a tap) and G76 (a whole thread).
 
 use super::block::Block;
-use super::execute::Interpreter;
+use super::coordinates::Point;
 use super::fault::{fault, Outcome};
-use super::moves::{Kind, Point, Stop};
+use super::interpreter::Interpreter;
+use super::moves::{Kind, Stop};
 use super::tolerance::{MOST_PASSES, RATES};
-use super::words::count;
 
 /// The heights of a thread along X and its ends along Z, in mm. Depths are from the drive line towards the workpiece.
 struct Thread {
@@ -78,8 +78,8 @@ impl Interpreter<'_> {
         if peak == 0.0 || first <= 0.0 || height <= first {
             return fault("G76 takes an I that is not 0, and a K above J, which is above 0: check them");
         }
-        let springs = count(block, b'H', 0, "number of spring passes")?.unwrap_or(0);
-        let tapers = count(block, b'L', 0, "choice of tapers")?.unwrap_or(0);
+        let springs = block.count(b'H', 0, "number of spring passes")?.unwrap_or(0);
+        let tapers = block.count(b'L', 0, "choice of tapers")?.unwrap_or(0);
         let degression = block.get(b'R').filter(|value| *value >= 1.0).unwrap_or(1.0);
         let start = self.position();
         let end = self.target(block, false)?;

@@ -2,45 +2,12 @@
 //! (G43.5). A change moves nothing: the machine's kinematics converts the position to the new coordinates.
 
 use super::block::{bits, g_name, Block, Group};
-use super::execute::Interpreter;
+use super::coordinates::{CoordinateMode, Direction, Place};
 use super::fault::{fault, Outcome};
 use super::intent::is_cycle;
+use super::interpreter::Interpreter;
 use super::modal::State;
-use super::moves::{Direction, Point};
 use super::tolerance::{DIRECTION_LENGTH, OPPOSITE};
-
-/// The coordinates that axis words are, with the numbers of the Python package.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum CoordinateMode {
-    /// Joint positions.
-    Joints = 0,
-    /// The tip and the angles of the rotary axes.
-    Tip = 1,
-    /// The tip and I, J, K as the tool direction.
-    Vector = 2,
-}
-
-/// A position in the coordinates of a mode, X to W, and the tool direction.
-pub type Place = (Point, Direction);
-
-/// The kinematics of a machine. A tool length is in mm, NaN for that of the machine file.
-pub trait TipControl {
-    /// Refuses a mode in which the machine cannot be programmed, by a sentence why.
-    fn check(&self, mode: CoordinateMode) -> Result<(), String>;
-
-    /// The joint positions at the end of a path in the coordinates of a mode, which begins at the joints `entry`.
-    fn joints(
-        &self,
-        mode: CoordinateMode,
-        tool_length: f64,
-        entry: &Point,
-        path: &[Place],
-    ) -> Result<Point, String>;
-
-    /// The position of joints in the coordinates of a mode.
-    fn place(&self, mode: CoordinateMode, tool_length: f64, joints: &Point) -> Result<Place, String>;
-}
 
 impl Interpreter<'_> {
     /// G43.4 and G43.5, and the codes that cancel them; `length` is the tool's in mm, NaN where it is not known.

@@ -1,21 +1,9 @@
-//! The tool table, and the tool that T, M6 and M61 take from it.
+//! The tool that T, M6 and M61 take from it.
 
 use super::block::Block;
-use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
-use super::moves::Point;
-use super::words::count;
-
-/// A tool of the table: its number, its pocket, its offset in mm and degrees, its diameter in mm, and the cutting side of
-/// a lathe tool (1 to 9; 0 for mills).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tool {
-    pub number: u32,
-    pub pocket: u32,
-    pub offset: Point,
-    pub diameter: f64,
-    pub orientation: u32,
-}
+use super::interpreter::Interpreter;
+use super::options::Tool;
 
 impl Interpreter<'_> {
     /// The tool of a number; None where the table does not have it or there is no table.
@@ -40,7 +28,7 @@ impl Interpreter<'_> {
 
     /// T, M6 and M61.
     pub(super) fn set_tool(&mut self, block: &Block, change: Option<u16>) -> Outcome<()> {
-        if let Some(number) = count(block, b'T', 0, "tool number")? {
+        if let Some(number) = block.count(b'T', 0, "tool number")? {
             self.selected = Some(number);
             self.moves.event(self.line, b'T', f64::from(number), None, None);
         }
@@ -49,7 +37,7 @@ impl Interpreter<'_> {
                 self.forget_compensation();
                 self.selected
             }
-            Some(_) => match count(block, b'Q', 0, "tool number")? {
+            Some(_) => match block.count(b'Q', 0, "tool number")? {
                 Some(number) => Some(number),
                 None => return fault("M61 names no tool: give its number as Q"),
             },

@@ -1,10 +1,10 @@
 //! Positions in polar words, and in coordinates that are rotated about Z by a work offset or by G68.
 
 use super::block::{bits, g_name, Block, Group, AXIS_WORDS};
-use super::execute::Interpreter;
+use super::coordinates::Point;
 use super::fault::{fault, Outcome};
+use super::interpreter::Interpreter;
 use super::modal::turn;
-use super::moves::Point;
 
 impl Interpreter<'_> {
     /// The end of a move to the axis words or polar words of a block.

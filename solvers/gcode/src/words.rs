@@ -4,13 +4,12 @@
 //! or CR. Blanks may stand between words, before a number and after its sign.
 
 use super::block::{g_name, g_remedy, m_group, Block, MGroup};
-use super::expression::{assignment, excerpt, expression, integer, Values};
+use super::events::{COMMENT, MESSAGE};
+use super::expression::{assignment, excerpt, expression, Values};
 use super::fault::{fault, foreign, Outcome};
-use super::flow::{after_line, end_of_line, keyword};
-use super::macros::statement;
-use super::moves::{COMMENT, MESSAGE};
 use super::number::{decimal, spaces};
 use super::parameters::Name;
+use super::statement::{after_line, end_of_line, keyword, statement};
 
 /// The content of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -442,13 +441,4 @@ fn message(comment: &[u8]) -> Option<String> {
 
 fn text_of(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).trim().to_string()
-}
-
-/// The integer that a word gives, at least `least`; None where the block has no such word.
-pub fn count(block: &Block, letter: u8, least: i64, what: &str) -> Outcome<Option<u32>> {
-    let Some(value) = block.get(letter) else { return Ok(None) };
-    match integer(value) {
-        Some(number) if number >= least && number <= i64::from(u32::MAX) => Ok(Some(number as u32)),
-        _ => fault(format!("word {} is no {what}: give an integer from {least}", block.word(letter))),
-    }
 }

@@ -36,22 +36,12 @@ mod share_lengths;
 mod tangent_jump;
 
 pub use share_lengths::share_lengths;
-pub use tangent_jump::TangentJump;
+pub use tangent_jump::{Rounding, TangentJump};
 
-use crate::program_pieces::{PathPiece, Shape};
+use crate::path_piece::{PathPiece, Shape};
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::spline::CompositeCurve;
-
-/// What a corner between two lines becomes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rounding {
-    /// See "Why a parabola".
-    Parabola,
-    /// The circle that touches both lines, as many controllers have it. With the turn θ and the radius r it takes
-    /// l = r tan(θ/2) of each line, and the corner is r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away from it.
-    Circle,
-}
 
 /// The two sides of a corner, each in the order of the path.
 #[derive(Default)]
@@ -267,19 +257,6 @@ mod tests {
         TangentJump::new(&Shape::Conic(before), &Shape::Conic(after)).unwrap()
     }
 
-    fn path_piece<const M: usize>(conic: Conic<M>) -> PathPiece<M> {
-        PathPiece {
-            shape: Shape::Conic(conic),
-            first: 0,
-            last: 0,
-            feed: 10.0,
-            deviation: 0.0,
-            tolerance: 1.0,
-            exact: false,
-            arc: false,
-        }
-    }
-
     #[test]
     fn a_right_angle_becomes_the_parabola_whose_apex_is_at_the_tolerance() {
         let before = Conic::line([0.0, 0.0], [10.0, 0.0]);
@@ -289,8 +266,8 @@ mod tests {
         let length = jump.length_within(0.1, Rounding::Parabola);
         assert!((length - 0.2 * 2f64.sqrt()).abs() < 1e-15);
         let sides = Sides {
-            before: vec![path_piece(before.part(10.0 - length, 10.0))],
-            after: vec![path_piece(after.part(0.0, length))],
+            before: vec![PathPiece::from(before.part(10.0 - length, 10.0))],
+            after: vec![PathPiece::from(after.part(0.0, length))],
             made: CompositeCurve::default(),
         };
         let corner = sides.between_lines(&jump, Rounding::Parabola).unwrap();
@@ -318,8 +295,8 @@ mod tests {
         let radius = jump.length_within(0.1, Rounding::Circle);
         assert!((radius - 0.1 / (2f64.sqrt() - 1.0)).abs() < 1e-15);
         let mut sides = Sides {
-            before: vec![path_piece(before.part(10.0 - radius, 10.0))],
-            after: vec![path_piece(after.part(0.0, radius))],
+            before: vec![PathPiece::from(before.part(10.0 - radius, 10.0))],
+            after: vec![PathPiece::from(after.part(0.0, radius))],
             made: CompositeCurve::default(),
         };
         sides.after[0].feed = 3.0;
@@ -375,8 +352,8 @@ mod tests {
     fn assert_bends_smoothly<const M: usize>(before: [Conic<M>; 2], after: [Conic<M>; 2]) {
         let jump = jump_between(before[1], after[0]);
         let mut sides = Sides {
-            before: before.map(path_piece).to_vec(),
-            after: after.map(path_piece).to_vec(),
+            before: before.map(PathPiece::from).to_vec(),
+            after: after.map(PathPiece::from).to_vec(),
             made: CompositeCurve::default(),
         };
         let excess = sides.bend(&jump).unwrap();

@@ -5,6 +5,7 @@
 //!
 //! | file | computes | source |
 //! |---|---|---|
+//! | `chain` | points, lengths, tolerance | |
 //! | `breaking` | the groups of points between breaking points | 3.1 |
 //! | `features` | the feature points of a group, which are interpolated | 3.2, Algorithm 1 |
 //! | `spline` | the spline through feature points | 3.3 |
@@ -19,18 +20,20 @@
 
 mod breaking;
 mod certificate;
+mod chain;
 mod features;
 mod piece_builder;
 mod refine;
 mod spline;
 
-use rayon::prelude::*;
-
-use breaking::{turn_cosine, Break};
-use feedplan_geometry::quadratic::{dot, norm, sub, Quadratic};
+use breaking::{group, Break};
+use chain::{lengths_along, Chain};
+use features::select;
+use feedplan_geometry::quadratic::{dot, norm, Quadratic};
 use feedplan_geometry::watch::Watch;
+pub use piece_builder::FittedPiece;
 use refine::Block;
-use spline::EndCondition;
+use spline::{interpolate, EndCondition};
 
 /// Chains of fewer points are fitted by one thread, which is faster.
 const PARALLEL: usize = 4096;
@@ -47,18 +50,6 @@ pub struct FitOptions {
     pub max_curvature: f64,
     /// A breaking point that turns by more is a corner, where the tangent may jump, in rad.
     pub corner_angle: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FittedPiece<const M: usize> {
-    pub piece: Quadratic<M>,
-    /// First and last chord that the piece follows; chord i goes from point i to point i + 1.
-    pub first: usize,
-    pub last: usize,
-    /// Certified bound of the distance between the piece and its chords, both ways, in mm.
-    pub deviation: f64,
-    /// Number of the B-spline (or line) that the piece belongs to.
-    pub spline: u32,
 }
 
 /// Lines and C1 quadratic B-splines within the tolerance of the polygon of `points`, both ways.
@@ -97,7 +88,7 @@ pub fn fit_points<const M: usize>(
         parallel: points.len() >= PARALLEL,
         watch,
     };
-    let (breaks, extremes) = breaking::group(&chain, options.max_chord, options.max_curvature);
+    let (breaks, extremes) = group(&chain, options.max_chord, options.max_curvature);
     let groups: Vec<&[Break]> = breaks.windows(2).collect();
     let features = chain.map(&groups, watch.part(0.3), |group| {
         let (a, b) = (group[0].at, group[1].at);
@@ -105,7 +96,7 @@ pub fn fit_points<const M: usize>(
             true => vec![a, b],
             false => {
                 let inside = |at: usize| extremes.partition_point(|&extreme| extreme < at);
-                features::select(&chain, a, b, &extremes[inside(a + 1)..inside(b)])
+                select(&chain, a, b, &extremes[inside(a + 1)..inside(b)])
             }
         }
     });
@@ -125,56 +116,6 @@ pub fn fit_points<const M: usize>(
         open = part.ends_smooth;
     }
     pieces
-}
-
-/// The input as every step sees it.
-struct Chain<'a, const M: usize> {
-    points: &'a [[f64; M]],
-    /// Polygon length from the first point to each.
-    along: &'a [f64],
-    tolerance: f64,
-    /// A turn whose cosine is smaller is a corner.
-    corner_cosine: f64,
-    parallel: bool,
-    watch: Watch<'a>,
-}
-
-impl<const M: usize> Chain<'_, M> {
-    /// The results in order, computed in parallel if the chain is long.
-    fn map<T: Sync, R: Send>(&self, items: &[T], watch: Watch, f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-        let each = watch.each(items.len());
-        let f = |item: &T| {
-            each.advance(1);
-            f(item)
-        };
-        match self.parallel && items.len() > 1 {
-            true => items.par_iter().with_min_len(items.len().div_ceil(256)).map(f).collect(),
-            false => items.iter().map(f).collect(),
-        }
-    }
-
-    /// Unit vector from point `a` to point `b`.
-    fn direction(&self, a: usize, b: usize) -> [f64; M] {
-        let chord = sub(&self.points[b], &self.points[a]);
-        let length = norm(&chord);
-        chord.map(|value| value / length)
-    }
-
-    fn is_corner(&self, at: usize) -> bool {
-        at > 0
-            && at + 1 < self.points.len()
-            && turn_cosine(&self.points[at - 1], &self.points[at], &self.points[at + 1]) < self.corner_cosine
-    }
-}
-
-fn lengths_along<const M: usize>(points: &[[f64; M]]) -> Vec<f64> {
-    let mut total = 0.0;
-    std::iter::once(0.0)
-        .chain(points.windows(2).map(|pair| {
-            total += norm(&sub(&pair[1], &pair[0]));
-            total
-        }))
-        .collect()
 }
 
 /// The chain cut at its breaking points, and long groups cut at feature points, each with its tangents at both ends.
@@ -223,7 +164,7 @@ fn append_blocks<const M: usize>(
         features.extend(&group[1..]);
     }
     let through: Vec<_> = features.iter().map(|&at| chain.points[at]).collect();
-    let spline = spline::interpolate(&through, start, finish);
+    let spline = interpolate(&through, start, finish);
     let plausible = |j: usize| {
         let (tangent, at) = (&spline.tangent[j], features[j]);
         let speed = norm(tangent);

@@ -4,20 +4,22 @@
 pub mod arc;
 pub mod corner;
 pub mod fit;
+pub mod moves;
 pub mod path_builder;
-pub mod program_pieces;
+pub mod path_piece;
+mod program_pieces;
 pub mod smooth_fit;
 mod tolerance;
 
 use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
+use moves::{MoveError, PathOptions};
 use path_builder::{Axes, BuiltPath, Motion};
-use program_pieces::{MoveError, PathOptions};
 
 instances! {
     /// The path of moves.
-    pub trait PathOfMoves for [3, 6, 9] program_pieces::Moves<'_, M> = {
+    pub trait PathOfMoves for [3, 6, 9] moves::Moves<'_, M> = {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
         fn path(&self, options: &PathOptions, axes: &Axes<M>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_path;

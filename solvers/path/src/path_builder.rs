@@ -2,51 +2,27 @@
 //!
 //! | file | computes |
 //! |---|---|
+//! | `built_path`, `chunk` | the path as it is built, with its deviation |
 //! | `corner_rounding` | the path with each corner rounded by itself within the tolerance |
+//! | `chords` | moves as chords for a smooth curve |
 //! | `smooth_path` | the path with one smooth curve between two stops |
 //! | `travel` | the first place that an axis cannot reach |
 
+mod built_path;
+mod chords;
+mod chunk;
 mod corner_rounding;
 mod smooth_path;
 mod travel;
 
-use crate::program_pieces::{program_pieces, FitCounts, MoveError, Moves, PathOptions, ProgramPieces};
-use crate::smooth_fit::Offsets;
+use crate::moves::{MoveError, Moves, PathOptions};
+use crate::program_pieces::{program_pieces, ProgramPieces};
+pub use built_path::{Axes, BuiltPath};
+pub use chunk::Chunk;
 use corner_rounding::round_corners;
-pub use corner_rounding::Chunk;
-pub use smooth_path::{build_smooth_path, Motion, NotSmooth};
-use travel::{outside, Outside};
+pub use smooth_path::{build_smooth_path, Motion};
 
 use feedplan_geometry::watch::Watch;
-
-/// What the axes allow.
-pub struct Axes<const M: usize> {
-    /// In mm/s and mm/s².
-    pub max_velocity: [f64; M],
-    pub max_acceleration: [f64; M],
-    /// Least and greatest position in mm.
-    pub travel: [[f64; 2]; M],
-    /// Whether corners may be passed with a velocity jump.
-    pub jump: bool,
-}
-
-/// The path of a program.
-#[derive(Default)]
-pub struct BuiltPath<const M: usize> {
-    /// The pieces in order, in the chunks that were made in parallel.
-    pub chunks: Vec<Chunk<M>>,
-    /// Index of the first piece of each run, and the number of pieces.
-    pub runs: Vec<usize>,
-    /// Upper bound of the distance between path and program, both ways, in mm.
-    pub deviation: f64,
-    /// The side of the program on which a smooth path lies, and its distance.
-    pub offsets: Option<Offsets>,
-    pub fit: FitCounts,
-    /// The first place outside the travel of an axis.
-    pub outside: Option<Outside>,
-    /// Where a smooth path stops without being told to.
-    pub not_smooth: NotSmooth,
-}
 
 /// The path of a program, its corners rounded one by one.
 pub fn build_path<const M: usize>(
@@ -58,26 +34,15 @@ pub fn build_path<const M: usize>(
     let ProgramPieces { pieces, fit } = program_pieces(moves, options, watch.part(0.6))?;
     let (chunks, runs) =
         round_corners(&pieces, moves.splines, moves.halt, options.rounding, axes, watch.part(0.4));
-    Ok(BuiltPath {
-        deviation: deviation(&chunks),
-        outside: outside(&chunks, moves, &axes.travel),
-        chunks,
-        runs,
-        fit,
-        ..BuiltPath::default()
-    })
-}
-
-/// The greatest bound of the distance between pieces and moves, in mm.
-fn deviation<const M: usize>(chunks: &[Chunk<M>]) -> f64 {
-    chunks.iter().flat_map(|chunk| &chunk.pieces).map(|piece| piece.deviation).fold(0.0, f64::max)
+    Ok(BuiltPath::new(chunks, runs, fit, moves, &axes.travel))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::corner::{Rounding, TangentJump};
-    use crate::program_pieces::{PathPiece, Shape, LINE, SPLINE};
+    use crate::moves::{LINE, SPLINE};
+    use crate::path_piece::{PathPiece, Shape};
     use feedplan_geometry::conic::Conic;
     use feedplan_geometry::quadratic::{norm, sub};
     use feedplan_geometry::spline::CompositeCurve;

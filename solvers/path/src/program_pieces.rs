@@ -3,119 +3,21 @@
 //! A chain is a maximal sequence of G1 lines with one tolerance and no halt. A change of feed does not end it: its curve
 //! stays whole, and a piece is cut where the feed changes (`feed_cuts`).
 
-mod chords;
 mod feed_cuts;
-mod shape;
 
 use std::ops::{AddAssign, Range};
 
 use rayon::prelude::*;
 
-use crate::arc::{arc_extent, arc_pieces, Arc, ArcError};
-use crate::corner::Rounding;
 use crate::fit::{fit_points, FitOptions};
-pub use chords::{Chord, Chords};
+use crate::moves::{MoveError, Moves, PathOptions, ARC, LINE, SPLINE};
+use crate::path_piece::{PathPiece, Shape};
 use feed_cuts::cut_at_feeds;
 use feedplan_geometry::conic::Conic;
-use feedplan_geometry::quadratic::{norm, sub};
-use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
-pub use shape::{Shape, Spline};
-
-/// What a move is, in the numbers of the Python `MoveKind`.
-pub const RAPID: u8 = 0;
-pub const LINE: u8 = 1;
-pub const ARC: u8 = 2;
-pub const SPLINE: u8 = 3;
 
 /// Moves outside of chains that one task takes at most.
 const TASK: usize = 4096;
-
-/// A program in columns, one row per move, at most 2³² of them; lengths in mm, speeds in mm/s.
-pub struct Moves<'a, const M: usize> {
-    pub start: [f64; M],
-    pub kind: &'a [u8],
-    pub target: &'a [[f64; M]],
-    pub feed: &'a [f64],
-    /// Allowed distance between path and program in mm; 0 asks for the exact path.
-    pub tolerance: &'a [f64],
-    /// The part of it that the fit of chains may use, in mm; 0: lines are not fitted.
-    pub fit_tolerance: &'a [f64],
-    /// Whether the tool stops at the end of the move.
-    pub halt: &'a [bool],
-    /// Arcs with the index of their move, ascending; start and end are taken from the moves.
-    pub arcs: &'a [(usize, ArcShape)],
-    /// Spline moves, ascending, with the pieces of `splines` that they take, from the start to the target.
-    pub spline_moves: &'a [(usize, Range<usize>)],
-    /// Moves that begin elsewhere than the one before ends, ascending, with their starts: there words change their
-    /// meaning.
-    pub changes: &'a [(usize, [f64; M])],
-    pub splines: &'a CompositeCurve<M>,
-    /// Whether the coordinates are positions of joints, which have a travel.
-    pub joints: &'a [bool],
-}
-
-/// The arc of an arc move: plane, centre and sweep as in `arc::Arc`.
-#[derive(Clone, Copy, Debug)]
-pub struct ArcShape {
-    pub plane: [usize; 2],
-    pub centre: [f64; 2],
-    pub sweep: f64,
-}
-
-/// How moves become pieces.
-#[derive(Clone, Copy, Debug)]
-pub struct PathOptions {
-    /// Distance from arcs that no circle meets and from helices, in mm.
-    pub exact_tolerance: f64,
-    /// Chords longer than this stay lines, in mm.
-    pub max_chord: f64,
-    /// α a_max in mm/s²: a chain is broken where its curvature exceeds this over the square of the feed.
-    pub corner_acceleration: f64,
-    /// The speed that no chain exceeds, whatever its feed, in mm/s.
-    pub max_speed: f64,
-    /// Chains stay smooth where they turn by less than this, in rad.
-    pub corner_angle: f64,
-    /// What corners between two lines become.
-    pub rounding: Rounding,
-}
-
-/// A piece of a path, and the moves that it goes along.
-#[derive(Clone, Copy, Debug)]
-pub struct PathPiece<const M: usize> {
-    pub shape: Shape<M>,
-    /// First and last move.
-    pub first: u32,
-    pub last: u32,
-    pub feed: f64,
-    /// Upper bound of the distance from the moves, both ways, in mm.
-    pub deviation: f64,
-    /// Allowed distance in mm.
-    pub tolerance: f64,
-    /// Whether the moves ask for the exact path.
-    pub exact: bool,
-    /// Whether the piece is one of an arc, whose extent is checked as programmed.
-    pub arc: bool,
-}
-
-/// A move that has no path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MoveError {
-    pub index: usize,
-    pub fault: MoveFault,
-}
-
-/// What is wrong with a move.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MoveFault {
-    /// The move has no length, or a coordinate is not finite.
-    Length,
-    /// The feed is not positive.
-    Feed,
-    Arc(ArcError),
-    /// There is no spline for the move.
-    Spline,
-}
 
 /// The pieces of a program, and what was fitted.
 #[derive(Default)]
@@ -147,17 +49,6 @@ enum Task {
 }
 
 impl<const M: usize> Moves<'_, M> {
-    /// Where move `i` begins.
-    fn origin(&self, i: usize) -> [f64; M] {
-        if let Ok(row) = self.changes.binary_search_by_key(&i, |change| change.0) {
-            self.changes[row].1
-        } else if i == 0 {
-            self.start
-        } else {
-            self.target[i - 1]
-        }
-    }
-
     /// Whether move `i` is in one chain with the move before.
     fn chained(&self, i: usize) -> bool {
         let fitted =
@@ -193,60 +84,6 @@ impl<const M: usize> Moves<'_, M> {
             tasks.push(Task::OneByOne(single..count));
         }
         tasks
-    }
-
-    /// Whether move `i` has a feed, and if it is a line a length.
-    fn check(&self, i: usize) -> Result<(), MoveError> {
-        let length = norm(&sub(&self.target[i], &self.origin(i)));
-        let straight = self.kind[i] != ARC && self.kind[i] != SPLINE;
-        if straight && !(length > 0.0 && length.is_finite()) {
-            return Err(MoveError { index: i, fault: MoveFault::Length });
-        }
-        // NaN is no feed either.
-        let has_feed = self.kind[i] == RAPID || self.feed[i] > 0.0;
-        has_feed.then_some(()).ok_or(MoveError { index: i, fault: MoveFault::Feed })
-    }
-
-    /// The arc of move `i`.
-    fn arc(&self, i: usize) -> Result<Arc<M>, MoveError> {
-        let row = self.arcs.partition_point(|(index, _)| *index < i);
-        match self.arcs.get(row) {
-            Some((index, ArcShape { plane, centre, sweep })) if *index == i => Ok(Arc {
-                start: self.origin(i),
-                end: self.target[i],
-                centre: *centre,
-                plane: *plane,
-                sweep: *sweep,
-            }),
-            _ => Err(MoveError { index: i, fault: MoveFault::Arc(ArcError::Sweep) }),
-        }
-    }
-
-    /// The pieces of spline move `i` that have a length, with widths whose sum is about the length of the spline.
-    fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, MoveError> {
-        let row = self.spline_moves.partition_point(|(index, _)| *index < i);
-        let range = match self.spline_moves.get(row) {
-            Some((index, range)) if *index == i => range.clone(),
-            _ => return Err(MoveError { index: i, fault: MoveFault::Spline }),
-        };
-        let sum = |length: f64, width: f64, piece: usize| {
-            let piece = self.splines.piece(piece);
-            let polygon = piece.control.windows(2).map(|pair| norm(&sub(&pair[1], &pair[0]))).sum::<f64>();
-            (length + polygon, width + piece.width)
-        };
-        let (length, width) = range.clone().fold((0.0, 0.0), |(a, b), piece| sum(a, b, piece));
-        if !(length > 0.0 && length.is_finite()) {
-            return Err(MoveError { index: i, fault: MoveFault::Length });
-        }
-        // One factor for all pieces keeps the derivatives continuous.
-        let scale = length / width;
-        Ok(range.filter_map(move |piece| Spline::new(self.splines, piece, scale)))
-    }
-
-    /// Least and greatest value of axis `k` on the arc of move `i`.
-    pub fn arc_extent(&self, i: usize, k: usize) -> Option<(f64, f64)> {
-        let arc = self.arc(i).ok()?;
-        arc_extent(&arc, arc.plane.iter().position(|&axis| axis == k)?).ok()
     }
 }
 
@@ -289,16 +126,14 @@ fn one_by_one<const M: usize>(
     let mut pieces = Vec::with_capacity(range.len());
     for i in range {
         moves.check(i)?;
-        let exact = moves.tolerance[i] <= 0.0;
-        let tolerance = if exact { options.exact_tolerance } else { moves.tolerance[i] };
-        let feed = if moves.kind[i] == RAPID { f64::INFINITY } else { moves.feed[i] };
+        let (exact, tolerance) = moves.allowed(i, options);
         let shape = Shape::Conic(Conic::line(moves.origin(i), moves.target[i]));
         let index = i as u32;
         let line = PathPiece {
             shape,
             first: index,
             last: index,
-            feed,
+            feed: moves.feed_of(i),
             deviation: 0.0,
             tolerance,
             exact,
@@ -314,8 +149,7 @@ fn one_by_one<const M: usize>(
         }
         // The other half is left for blends with the neighbours.
         let budget = 0.5 * tolerance.min(options.exact_tolerance);
-        let (arc, deviation) = arc_pieces(&moves.arc(i)?, budget)
-            .map_err(|error| MoveError { index: i, fault: MoveFault::Arc(error) })?;
+        let (arc, deviation) = moves.arc_pieces(i, budget)?;
         pieces.extend(arc.into_iter().map(|piece| PathPiece {
             shape: Shape::Conic(piece),
             deviation,
@@ -375,6 +209,11 @@ fn chain<const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arc::ArcError;
+    use crate::corner::Rounding;
+    use crate::moves::MoveFault;
+    use feedplan_geometry::quadratic::{norm, sub};
+    use feedplan_geometry::spline::CompositeCurve;
 
     const OPTIONS: PathOptions = PathOptions {
         exact_tolerance: 1e-3,

@@ -3,13 +3,14 @@
 //!
 //! | file | what it computes |
 //! |---|---|
+//! | `curve` | the curve as pieces, and what each of them follows |
 //! | `polyline` | what the curve follows: vertices, stations, directions, tolerances |
 //! | `bends` | the weights that pull the curve to vertices, so that bends keep their size |
 //! | `pace` | the energy of the curve at the speed of a motion |
 //! | `size` | the greatest length of intervals along the polyline, and the knots |
 //! | `spline`, `bezier` | the curve and forms of its energy; its pieces and bounds on them |
 //! | `rows` | the tolerance tube as linear rows |
-//! | `band`, `interior_point` | the solution of the convex problem in a window |
+//! | `problem`, `band`, `interior_point` | the solution of the convex problem in a window |
 //! | `quads` | the rows of four intervals side by side in the vectors of the processor |
 //! | `windows` | all windows of a run in parallel, then the seams between them |
 //! | `certificate` | a proof of the distances both ways, and that the curve never stops |
@@ -25,10 +26,12 @@ mod bends;
 mod bezier;
 mod certificate;
 mod corner;
+mod curve;
 mod interior_point;
 mod offsets;
 pub mod pace;
 pub mod polyline;
+mod problem;
 mod quads;
 mod refine;
 mod rows;
@@ -39,8 +42,8 @@ mod windows;
 use bezier::split;
 use certificate::Certificate;
 use corner::append_corners;
+pub use curve::{Covered, Smooth};
 use feedplan_geometry::quadratic::{dot, norm, sub};
-use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 pub use offsets::Offsets;
 use polyline::Polyline;
@@ -66,56 +69,6 @@ pub struct SmoothOptions<const D: usize> {
     pub long: f64,
     /// Least and greatest position of each axis. Where no curve stays inside, corners are rounded one by one.
     pub bounds: [[f64; 2]; D],
-}
-
-/// What a piece of the curve follows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Covered {
-    /// First and last chord.
-    pub first: usize,
-    pub last: usize,
-    /// Upper bound of the distances from piece to chords and from chords to piece, in mm.
-    pub deviation: f64,
-    /// The curve has a corner before this piece, where the tool stops: no smooth curve was found.
-    pub stop: bool,
-}
-
-impl Covered {
-    fn new(first: usize, last: usize, deviation: f64) -> Self {
-        Self { first, last, deviation, stop: false }
-    }
-}
-
-/// The curve of a run. Pieces of degree 1 are lines, those of degree 5 parts of splines, those of degree 7 corners.
-#[derive(Clone, Debug, Default)]
-pub struct Smooth<const D: usize> {
-    pub curve: CompositeCurve<D>,
-    pub covered: Vec<Covered>,
-    /// The numbers of B-splines and lines, and of their polynomials before they are cut.
-    pub splines: usize,
-    pub polynomials: usize,
-    /// Chords whose corners are rounded one by one, with a stop before and after.
-    pub corners: Vec<Range<usize>>,
-    /// On which side of the polyline the curve lies, and how far away.
-    pub offsets: Offsets,
-    /// The work of the fit: the sum of Newton steps times intervals.
-    pub work: usize,
-}
-
-impl<const D: usize> Smooth<D> {
-    fn push(&mut self, control: &[[f64; D]], width: f64, covered: Covered) {
-        self.curve.push(control, &[], width);
-        self.covered.push(covered);
-    }
-
-    /// Calls `append`; the curve stops before the pieces that it appends, unless they are the first.
-    fn after_stop(&mut self, append: impl FnOnce(&mut Self)) {
-        let at = self.covered.len();
-        append(self);
-        if at > 0 && at < self.covered.len() {
-            self.covered[at].stop = true;
-        }
-    }
 }
 
 /// The curve along a polyline of one chord or more. It is cut into pieces near the vertices for which `cut` is true.

@@ -16,8 +16,9 @@ use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_path::arc::ArcError;
 use feedplan_path::corner::Rounding;
+use feedplan_path::moves::{self, ArcShape, MoveFault, PathOptions};
 use feedplan_path::path_builder::{Axes, BuiltPath, Chunk, Motion};
-use feedplan_path::program_pieces::{self, ArcShape, MoveFault, PathOptions, PathPiece, Shape};
+use feedplan_path::path_piece::{PathPiece, Shape};
 use feedplan_path::PathOfMoves as _;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -161,7 +162,7 @@ fn build_path<'py>(
         let spline_moves: Vec<_> = spline_moves.zip(ranges).collect();
         let starts = padded_rows::<M>(&moves.change_start, axes);
         let changes: Vec<_> = moves.change_move.iter().map(|&index| index as usize).zip(starts).collect();
-        let followed = program_pieces::Moves {
+        let followed = moves::Moves {
             start: padded(&moves.start, 0.0),
             kind: &moves.kind,
             target: &target,

@@ -1,7 +1,9 @@
 //! The columns of the moves of a whole program.
 
-use super::{CoordinateMode, Direction, Events, Moves, Point, Stop, UPRIGHT};
+use super::{Moves, Stop};
 use crate::block::AXES;
+use crate::coordinates::{CoordinateMode, Direction, Point, UPRIGHT};
+use crate::events::Events;
 
 /// The letters of the columns of a tool direction, after those of the axes.
 const DIRECTION: [u8; 3] = *b"IJK";

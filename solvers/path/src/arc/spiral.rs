@@ -11,7 +11,7 @@
 //!
 //! Errors on both sides of the circle would save a sixth of the pieces, but the end points would not be exact.
 
-use super::{Arc, ArcError, Polar, MAX_PIECES};
+use super::polar::{Arc, ArcError, Polar, MAX_PIECES};
 use feedplan_geometry::conic::Conic;
 use std::f64::consts::PI;
 

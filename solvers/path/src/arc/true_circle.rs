@@ -16,7 +16,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{sweep_to, Arc, Polar, MAX_PIECES};
+use super::polar::{sweep_to, Arc, Polar, MAX_PIECES};
 use crate::tolerance;
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{dot, lerp, norm, sub};

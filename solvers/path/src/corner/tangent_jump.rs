@@ -1,7 +1,6 @@
 //! The jump of the unit tangent at a corner, and the length of the blend that it allows, from the pieces on both sides.
 
-use super::Rounding;
-use crate::program_pieces::Shape;
+use crate::path_piece::Shape;
 use crate::tolerance;
 use feedplan_geometry::quadratic::norm;
 
@@ -10,6 +9,16 @@ use feedplan_geometry::quadratic::norm;
 const EASE: f64 = 8.0;
 /// The shortest blend in errors of a coordinate.
 const SHORTEST: f64 = 16.0;
+
+/// What a corner between two lines becomes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounding {
+    /// See "Why a parabola" in `corner`.
+    Parabola,
+    /// The circle that touches both lines, as many controllers have it. With the turn θ and the radius r it takes
+    /// l = r tan(θ/2) of each line, and the corner is r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away from it.
+    Circle,
+}
 
 /// The jump of the unit tangent where two pieces meet.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +74,7 @@ impl<const M: usize> TangentJump<M> {
     }
 
     /// cos(turn/2).
-    pub(super) fn half_cosine(&self) -> f64 {
+    pub fn half_cosine(&self) -> f64 {
         (1.0 - 0.25 * self.size * self.size).max(0.0).sqrt()
     }
 

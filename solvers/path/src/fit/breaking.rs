@@ -17,7 +17,7 @@
 
 use rayon::prelude::*;
 
-use super::Chain;
+use super::chain::{turn_cosine, Chain};
 use crate::tolerance;
 use feedplan_geometry::quadratic::{dot, norm, sub, Segment};
 
@@ -109,12 +109,6 @@ fn is_corner<const M: usize>(chain: &Chain<M>, at: usize, [left, right]: [usize;
         && left < at
         && at < right
         && turn_cosine(&chain.points[left], &chain.points[at], &chain.points[right]) < chain.corner_cosine
-}
-
-/// Cosine of the turn at `p` on the way from `a` to `b`.
-pub fn turn_cosine<const M: usize>(a: &[f64; M], p: &[f64; M], b: &[f64; M]) -> f64 {
-    let (before, after) = (sub(p, a), sub(b, p));
-    dot(&before, &after) / (norm(&before) * norm(&after))
 }
 
 /// Long chords, and sequences of colinear points whose line the path around them leaves, as ranges of points.
@@ -272,7 +266,7 @@ fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::lengths_along;
+    use crate::fit::chain::lengths_along;
     use feedplan_geometry::watch::Watch;
 
     /// Breaks as (point, corner, line) and extremes.

@@ -8,7 +8,7 @@
 //!   attempt costs no more than what was accepted before.
 //! * A long triple that fails again and again is halved at each fourth attempt.
 
-use super::Chain;
+use super::chain::Chain;
 use feedplan_geometry::quadratic::{dot, Segment};
 
 /// The third feature is this many steps of the triple ahead at most; the first step of a group is FIRST points at most.
@@ -118,7 +118,7 @@ fn worst_point<const M: usize>(chain: &Chain<M>, q1: usize, q2: usize, q3: usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::lengths_along;
+    use crate::fit::chain::lengths_along;
     use feedplan_geometry::quadratic::Quadratic;
     use feedplan_geometry::watch::Watch;
 

@@ -1,7 +1,19 @@
 //! The quadratic pieces of a spline from knot to knot, made half a step at a time.
 
-use super::{Chain, FittedPiece};
+use super::chain::Chain;
 use feedplan_geometry::quadratic::{Quadratic, Segment};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedPiece<const M: usize> {
+    pub piece: Quadratic<M>,
+    /// First and last chord that the piece follows; chord i goes from point i to point i + 1.
+    pub first: usize,
+    pub last: usize,
+    /// Certified bound of the distance between the piece and its chords, both ways, in mm.
+    pub deviation: f64,
+    /// Number of the B-spline (or line) that the piece belongs to.
+    pub spline: u32,
+}
 
 /// The line from point `a` to point `b`, with its distance from the points between.
 pub fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize, spline: u32) -> FittedPiece<M> {

@@ -11,11 +11,10 @@
 //!
 //! No change is taken back, so their number is bounded. The number of rounds is bounded as well.
 
-use super::breaking::turn_cosine;
 use super::certificate::{Defect, Step, StepBound};
-use super::piece_builder::{line, PieceBuilder};
+use super::chain::{turn_cosine, Chain};
+use super::piece_builder::{line, FittedPiece, PieceBuilder};
 use super::spline::{interpolate, EndCondition};
-use super::{Chain, FittedPiece};
 use crate::tolerance;
 use feedplan_geometry::quadratic::{norm, sub};
 

@@ -12,12 +12,12 @@
 
 use rayon::prelude::*;
 
-use super::Axes;
+use super::built_path::Axes;
+use super::chunk::Chunk;
 use crate::corner::{share_lengths, Rounding, Sides, TangentJump};
-use crate::program_pieces::{PathPiece, Shape, Spline};
+use crate::path_piece::{PathPiece, Shape};
 use crate::tolerance;
-use feedplan_geometry::conic::Conic;
-use feedplan_geometry::spline::{CompositeCurve, Piece};
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
 /// Corners and spans of a task at most.
@@ -311,54 +311,6 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
     }
 }
 
-/// Consecutive pieces of a path that one task makes, with the pieces of splines that are not the program's: cut or bent
-/// at corners, or fitted.
-#[derive(Clone, Debug)]
-pub struct Chunk<const M: usize> {
-    pub pieces: Vec<PathPiece<M>>,
-    made: CompositeCurve<M>,
-}
-
-impl<const M: usize> Default for Chunk<M> {
-    fn default() -> Self {
-        Self { pieces: vec![], made: CompositeCurve::default() }
-    }
-}
-
-impl<const M: usize> Chunk<M> {
-    /// The control points of a spline of this chunk; `splines` are the program's. Its width is that of `spline`.
-    pub fn spline<'a>(&'a self, spline: &Spline<M>, splines: &'a CompositeCurve<M>) -> Piece<'a, M> {
-        let source = if spline.made { &self.made } else { splines };
-        source.piece(spline.index as usize)
-    }
-
-    /// Appends a polynomial piece that is `like` another one in all but its shape.
-    pub fn push(&mut self, control: &[[f64; M]], width: f64, like: PathPiece<M>) {
-        if let [start, end] = *control {
-            self.pieces.push(PathPiece { shape: Shape::Conic(Conic::line(start, end)), ..like });
-            return;
-        }
-        self.made.push(control, &[], width);
-        let shape = Spline::last_made(&self.made).map(Shape::Spline);
-        self.pieces.extend(shape.map(|shape| PathPiece { shape, ..like }));
-    }
-
-    /// Appends both sides of a blend.
-    fn append(&mut self, sides: &Sides<M>) {
-        let before = self.made.len() as u32;
-        for piece in sides.made.pieces() {
-            self.made.push(piece.control, piece.weights, piece.width);
-        }
-        for &piece in sides.before.iter().chain(&sides.after) {
-            let mut own = piece;
-            if let Shape::Spline(spline) = &mut own.shape {
-                spline.index += before;
-            }
-            self.pieces.push(own);
-        }
-    }
-}
-
 /// The length of a blend, at most `wanted`, that one side of a corner allows by its own length and by what its pieces
 /// have left of their tolerance.
 fn allowed_length<'a, const M: usize>(
@@ -386,25 +338,15 @@ fn allowed_length<'a, const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use feedplan_geometry::conic::Conic;
 
     #[test]
     fn cuts_next_to_the_end_of_a_piece_leave_no_sliver() {
         // A line of 10 mm in two pieces.
         let points = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];
-        let line = |a, b| PathPiece {
-            shape: Shape::Conic(Conic::line(a, b)),
-            first: 0,
-            last: 0,
-            feed: 10.0,
-            deviation: 0.0,
-            tolerance: 1.0,
-            exact: false,
-            arc: false,
-        };
-        let lines = [line(points[0], points[1]), line(points[1], points[2])];
         let whole = Conic::line(points[0], points[1]);
         let side = [whole.part(0.0, 4.0), whole.part(4.0, 10.0), Conic::line(points[1], points[2])]
-            .map(|piece| PathPiece { shape: Shape::Conic(piece), ..lines[0] });
+            .map(PathPiece::from);
         let splines = CompositeCurve::default();
         let spans = CornerRounding::new(&side, &splines, &[false; 2], Rounding::Parabola);
         assert_eq!(spans.length, [10.0, 10.0]);

@@ -15,11 +15,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::travel::outside;
-use super::{deviation, Axes, BuiltPath, Chunk};
-use crate::program_pieces::{
-    Chord, Chords, FitCounts, MoveError, Moves, PathOptions, PathPiece, Shape, RAPID,
-};
+use super::built_path::{Axes, BuiltPath, NotSmooth};
+use super::chords::{Chord, Chords};
+use super::chunk::Chunk;
+use crate::moves::{MoveError, Moves, PathOptions, RAPID};
+use crate::path_piece::{PathPiece, Shape};
+use crate::program_pieces::FitCounts;
 use crate::smooth_fit::pace::{Moment, Pace};
 use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
@@ -27,16 +28,6 @@ use crate::tolerance;
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::watch::Watch;
-
-/// Where a smooth path stops without being told to.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct NotSmooth {
-    /// Moves at whose end the path turns back and stops.
-    pub reversals: Vec<u32>,
-    /// First and last move of each place where no smooth curve is within the tolerance. Corners are rounded one by one
-    /// there, between two stops.
-    pub corners: Vec<[u32; 2]>,
-}
 
 /// The path of the moves between two stops of the program.
 #[derive(Default)]
@@ -100,28 +91,27 @@ pub fn build_smooth_path<const M: usize>(
         .into_par_iter()
         .map(|range| Section::new(moves, options, axes, range.clone(), motion, each.part(range.len() as f64)))
         .collect::<Result<_, _>>()?;
-    let mut path = BuiltPath { runs: vec![], ..BuiltPath::default() };
-    let (mut total, mut offsets) = (0, Offsets::default());
+    let (mut chunks, mut runs, mut total) = (vec![], vec![], 0);
+    let (mut fit, mut offsets, mut not_smooth) =
+        (FitCounts::default(), Offsets::default(), NotSmooth::default());
     for section in sections {
-        path.runs.extend(section.runs.iter().map(|start| start + total));
+        runs.extend(section.runs.iter().map(|start| start + total));
         total += section.chunk.pieces.len();
-        path.chunks.push(section.chunk);
-        path.fit += section.fit;
+        chunks.push(section.chunk);
+        fit += section.fit;
         offsets.merge(&section.offsets);
-        path.not_smooth.reversals.extend(section.not_smooth.reversals);
-        path.not_smooth.corners.extend(section.not_smooth.corners);
+        not_smooth.reversals.extend(section.not_smooth.reversals);
+        not_smooth.corners.extend(section.not_smooth.corners);
     }
-    let pieces: Vec<&PathPiece<M>> = path.chunks.iter().flat_map(|chunk| &chunk.pieces).collect();
+    let pieces: Vec<&PathPiece<M>> = chunks.iter().flat_map(|chunk| &chunk.pieces).collect();
     let rests = |first: usize| first > 0 && goes_back(moves, pieces[first - 1], pieces[first]);
     let back: Vec<u32> =
-        path.runs.iter().filter(|&&first| rests(first)).map(|&first| pieces[first - 1].last).collect();
-    path.runs.retain(|&first| !rests(first));
-    path.not_smooth.reversals.retain(|last| back.binary_search(last).is_err());
-    path.runs.push(total);
-    path.deviation = deviation(&path.chunks);
-    path.offsets = Some(offsets);
-    path.outside = outside(&path.chunks, moves, &axes.travel);
-    Ok(path)
+        runs.iter().filter(|&&first| rests(first)).map(|&first| pieces[first - 1].last).collect();
+    runs.retain(|&first| !rests(first));
+    not_smooth.reversals.retain(|last| back.binary_search(last).is_err());
+    runs.push(total);
+    let path = BuiltPath::new(chunks, runs, fit, moves, &axes.travel);
+    Ok(BuiltPath { offsets: Some(offsets), not_smooth, ..path })
 }
 
 /// The moves between places where the path stops whatever its shape. Rapids and feeds below `crawl` (mm/s) meet in a stop.

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::Chunk;
-use crate::program_pieces::{Moves, Shape};
+use super::chunk::Chunk;
+use crate::moves::Moves;
+use crate::path_piece::Shape;
 use crate::tolerance::TRAVEL;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 

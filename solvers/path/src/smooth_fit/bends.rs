@@ -24,7 +24,7 @@
 //! At corners and near them nothing is added, so that the curve may use the tolerance on one side.
 
 use super::bezier::{point_and_slope, Control};
-use super::polyline::{angle, Polyline};
+use super::polyline::{angle, Hold, Polyline};
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
@@ -50,17 +50,6 @@ const MOST: f64 = 0.6;
 /// An interval shorter than a chord at a vertex is halved if the curve in it is farther from the vertex than this, in
 /// tolerances.
 const MISS: f64 = 0.1;
-
-/// How a vertex acts on the curve.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Hold {
-    /// The curve may be anywhere within the tolerance.
-    Free,
-    /// A point of a program, which may have noise.
-    Point,
-    /// A point of an arc or a spline.
-    Exact,
-}
 
 impl Hold {
     /// l/λ⁶ in mm⁻⁵ of a vertex between two chords, in an interval of length h. At the end of an arc next to a long line the

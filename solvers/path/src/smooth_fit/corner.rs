@@ -4,8 +4,8 @@
 //! legs. The distance of curve and corner, both ways, is at most that of the middle of the curve from the vertex: a point
 //! V − a t₋ + b t₊ of the curve is at most min(a, b) |t₊ − t₋| from the legs.
 
+use super::curve::{Covered, Smooth};
 use super::polyline::Polyline;
-use super::{Covered, Smooth};
 use feedplan_geometry::quadratic::norm;
 
 const DEGREE: usize = 7;

@@ -15,9 +15,9 @@ use fearless_simd::{dispatch, Level, Simd};
 use feedplan_geometry::lanes::{Lanes, Register};
 
 use super::band::Band;
+use super::problem::Problem;
 use super::quads::{Columns, LocalMatrix, Quads};
-use super::rows::Row;
-use super::spline::{Form, Pull, ORDER};
+use super::spline::ORDER;
 
 /// It ends when the sum of all s λ is below this part of the energy,
 const GAP: f64 = 1e-3;
@@ -38,23 +38,6 @@ const MOST_ITERATIONS: usize = 40;
 const STEP: f64 = 0.99;
 /// An energy that is treated as zero, in units; lines have none.
 const NO_ENERGY: f64 = 1e-8;
-
-/// A convex problem in the coefficients of a window of intervals.
-#[derive(Default)]
-pub struct Problem<const D: usize> {
-    /// The forms of the energy of every interval, by axis.
-    pub energy: Vec<[Form; D]>,
-    /// The pull of its aims in every interval, by axis.
-    pub pull: Vec<[Pull; D]>,
-    pub rows: Vec<Row<D>>,
-    /// The number of rows before each interval, and all of them.
-    pub start: Vec<usize>,
-    /// The coefficients: as given where fixed, any start elsewhere.
-    pub x: Vec<[f64; D]>,
-    pub fixed: Vec<bool>,
-    /// The unit of complementarity of every interval.
-    pub unit: Vec<f64>,
-}
 
 impl<const D: usize> Problem<D> {
     /// Solves the problem in place; returns the number of iterations.
@@ -119,6 +102,25 @@ struct Pairs<const D: usize> {
 }
 
 const SIGN: [f64; 2] = [1.0, -1.0];
+
+impl<const D: usize> Pairs<D> {
+    /// Slack, multiplier, 1/s, the error of the slack and Newton's step of it, on a side of direction r in which the place
+    /// moves by `moved`.
+    #[inline(always)]
+    fn newton<S: Simd>(
+        &self,
+        r: usize,
+        side: usize,
+        half: Register<S>,
+        moved: Register<S>,
+    ) -> [Register<S>; 5] {
+        let simd = half.simd();
+        let [off, s, l, inverse] =
+            [self.off[r], self.s[side][r], self.l[side][r], self.inverse[side][r]].map(|x| x.load(simd));
+        let lack = off * SIGN[side] + s - half;
+        [s, l, inverse, lack, -lack - moved * SIGN[side]]
+    }
+}
 
 /// The residuals of an iterate.
 struct Residuals {
@@ -340,12 +342,9 @@ impl<'a, const D: usize> Newton<'a, D> {
                 let mut forces = [[zero; D]; 2];
                 let (mut linear, mut square) = (zero, zero);
                 for r in 0..D {
-                    let (half, off) = (row.half[r].load(simd), pairs.off[r].load(simd));
+                    let half = row.half[r].load(simd);
                     for side in 0..2 {
-                        let (s, l) = (pairs.s[side][r].load(simd), pairs.l[side][r].load(simd));
-                        let inverse = pairs.inverse[side][r].load(simd);
-                        let lack = off * SIGN[side] + s - half;
-                        let ds = -lack - moved[r] * SIGN[side];
+                        let [s, l, inverse, lack, ds] = pairs.newton(r, side, half, moved[r]);
                         // dλ/λ is −1 − ds/s.
                         let ratio = ds * inverse;
                         let dl = -l - l * ratio;
@@ -388,12 +387,9 @@ impl<'a, const D: usize> Newton<'a, D> {
                 let moved = row.place(simd, &step);
                 let aim = row.unit.load(simd) * mu;
                 for r in 0..D {
-                    let (half, off) = (row.half[r].load(simd), pairs.off[r].load(simd));
+                    let half = row.half[r].load(simd);
                     for side in 0..2 {
-                        let (s, l) = (pairs.s[side][r].load(simd), pairs.l[side][r].load(simd));
-                        let inverse = pairs.inverse[side][r].load(simd);
-                        let lack = off * SIGN[side] + s - half;
-                        let ds = -lack - moved[r] * SIGN[side];
+                        let [s, l, inverse, _, ds] = pairs.newton(r, side, half, moved[r]);
                         let dl = (aim - s * l - l * ds - pairs.dl[side][r].load(simd)) * inverse;
                         // A row of no weight has no multiplier.
                         let per_l = l.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();

@@ -12,9 +12,8 @@
 //! there over the mean length of the chords, and at most the angle of the polyline, because an arc next to a long line ends
 //! at their vertex. The greatest offsets are those at vertices and between them, also at corners.
 
-use super::bends::Hold;
 use super::bezier::{derivatives, Control};
-use super::polyline::Polyline;
+use super::polyline::{Hold, Polyline};
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 

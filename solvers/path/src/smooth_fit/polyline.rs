@@ -1,8 +1,18 @@
 //! The programmed polyline of a run: vertices, stations, directions and tolerances.
 
-use super::bends::Hold;
 use super::pace::Pace;
 use feedplan_geometry::quadratic::{dot, norm, sub};
+
+/// How a vertex acts on the curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hold {
+    /// The curve may be anywhere within the tolerance.
+    Free,
+    /// A point of a program, which may have noise.
+    Point,
+    /// A point of an arc or a spline.
+    Exact,
+}
 
 /// Chords between vertices, none of them without a length.
 #[derive(Clone, Debug, Default)]

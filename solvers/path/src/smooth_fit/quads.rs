@@ -8,7 +8,7 @@ use fearless_simd::Simd;
 use feedplan_geometry::lanes::{Lanes, Register};
 
 use super::band::Band;
-use super::interior_point::Problem;
+use super::problem::Problem;
 use super::rows::Row;
 use super::spline::ORDER;
 

@@ -13,8 +13,7 @@
 //! corners by FITTED_ALONG ε: at 0.01 mm its derivatives then are as small as the tube allows, and a corner of 90° is passed
 //! 9 % sooner. On bends that would only change the speed of the parameter.
 
-use super::bends::Hold;
-use super::polyline::Polyline;
+use super::polyline::{Hold, Polyline};
 use super::spline::{around, basis, ORDER};
 use feedplan_geometry::quadratic::{dot, norm};
 

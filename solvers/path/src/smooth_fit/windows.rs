@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 
 use super::band::Band;
-use super::interior_point::Problem;
 use super::polyline::Polyline;
+use super::problem::Problem;
 use super::rows::rows;
 use super::spline::{around, greville, Spline, DEGREE};
 use feedplan_geometry::watch::Watch;

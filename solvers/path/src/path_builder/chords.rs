@@ -4,8 +4,7 @@
 
 use std::ops::Range;
 
-use super::{MoveError, MoveFault, Moves, PathOptions, ARC, RAPID, SPLINE};
-use crate::arc::arc_pieces;
+use crate::moves::{MoveError, Moves, PathOptions, ARC, SPLINE};
 use crate::smooth_fit::polyline::angle;
 use crate::tolerance::{CHORD, LEFT_TO_FIT, SAME_POINT};
 use feedplan_geometry::conic::Conic;
@@ -57,21 +56,18 @@ impl<const M: usize> Moves<'_, M> {
         let mut out = Chords { points: start, chords: vec![], skipped: None };
         for i in range.clone() {
             self.check(i)?;
-            let exact = self.tolerance[i] <= 0.0;
-            let tolerance = if exact { options.exact_tolerance } else { self.tolerance[i] };
-            let feed = if self.kind[i] == RAPID { f64::INFINITY } else { self.feed[i] };
+            let (_, tolerance) = self.allowed(i, options);
             let index = i as u32;
             let mut chord = Chord {
                 first: index,
                 last: index,
-                feed,
+                feed: self.feed_of(i),
                 tolerance,
                 used: SAME_POINT * tolerance,
                 end_angle: None,
             };
             if self.kind[i] == ARC {
-                let (pieces, deviation) = arc_pieces(&self.arc(i)?, 0.5 * CHORD * tolerance)
-                    .map_err(|error| MoveError { index: i, fault: MoveFault::Arc(error) })?;
+                let (pieces, deviation) = self.arc_pieces(i, 0.5 * CHORD * tolerance)?;
                 chord.used += deviation;
                 for piece in &pieces {
                     out.append_conic(piece, 0.5 * CHORD * tolerance, DEPTH, &chord);

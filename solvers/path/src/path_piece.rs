@@ -1,9 +1,28 @@
-//! The shape of a path's piece: a conic, or a piece of a spline, as programmed, fitted, or cut and bent at a corner.
+//! A piece of a path: the moves that it goes along and its shape, which is a conic or a piece of a spline, as programmed,
+//! fitted, or cut and bent at a corner.
 
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::sub;
 use feedplan_geometry::spline::cusps::rests_at_ends;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
+
+/// A piece of a path, and the moves that it goes along.
+#[derive(Clone, Copy, Debug)]
+pub struct PathPiece<const M: usize> {
+    pub shape: Shape<M>,
+    /// First and last move.
+    pub first: u32,
+    pub last: u32,
+    pub feed: f64,
+    /// Upper bound of the distance from the moves, both ways, in mm.
+    pub deviation: f64,
+    /// Allowed distance in mm.
+    pub tolerance: f64,
+    /// Whether the moves ask for the exact path.
+    pub exact: bool,
+    /// Whether the piece is one of an arc, whose extent is checked as programmed.
+    pub arc: bool,
+}
 
 #[derive(Clone, Copy, Debug)]
 pub enum Shape<const M: usize> {
@@ -130,5 +149,15 @@ impl<const M: usize> Shape<M> {
             Self::Conic(conic) => Some(conic),
             Self::Spline(_) => None,
         }
+    }
+}
+
+#[cfg(test)]
+impl<const M: usize> From<Conic<M>> for PathPiece<M> {
+    /// A piece of one move at a feed of 10 mm/s with a tolerance of 1 mm.
+    fn from(conic: Conic<M>) -> Self {
+        let shape = Shape::Conic(conic);
+        let [exact, arc] = [false; 2];
+        Self { shape, first: 0, last: 0, feed: 10.0, deviation: 0.0, tolerance: 1.0, exact, arc }
     }
 }

@@ -2,8 +2,6 @@
 
 use std::collections::HashMap;
 
-use super::Moves;
-
 /// The letters of a message and of a comment.
 pub const MESSAGE: u8 = b'(';
 pub const COMMENT: u8 = b';';
@@ -26,31 +24,29 @@ pub struct Events {
     furthest: i32,
 }
 
-impl Moves {
-    /// Adds an event after the moves so far.
-    pub fn event(&mut self, line: u32, letter: u8, number: f64, p: Option<f64>, q: Option<f64>) {
-        let events = &mut self.events;
-        events.moves.push(self.kind.len() as i64);
-        events.line.push(line as i32);
-        events.letter.push(letter);
-        events.number.push(number);
-        events.p.push(p.unwrap_or(f64::NAN));
-        events.q.push(q.unwrap_or(f64::NAN));
+impl Events {
+    /// Adds an event after `moves` moves.
+    pub fn push(&mut self, moves: usize, line: u32, letter: u8, number: f64, [p, q]: [Option<f64>; 2]) {
+        self.moves.push(moves as i64);
+        self.line.push(line as i32);
+        self.letter.push(letter);
+        self.number.push(number);
+        self.p.push(p.unwrap_or(f64::NAN));
+        self.q.push(q.unwrap_or(f64::NAN));
     }
 
-    /// Adds a message to the operator, or a comment.
-    pub fn remark(&mut self, line: u32, letter: u8, text: String) {
-        let Events { texts, repeated, furthest, .. } = &mut self.events;
-        let next = texts.len();
-        let index = if line as i32 > *furthest {
-            *furthest = line as i32;
+    /// The index of a text in a line, which is kept once if it comes again.
+    pub fn index_of(&mut self, text: String, line: u32) -> usize {
+        let next = self.texts.len();
+        let index = if line as i32 > self.furthest {
+            self.furthest = line as i32;
             next
         } else {
-            *repeated.entry(text.clone()).or_insert(next)
+            *self.repeated.entry(text.clone()).or_insert(next)
         };
         if index == next {
-            texts.push(text);
+            self.texts.push(text);
         }
-        self.event(line, letter, index as f64, None, None);
+        index
     }
 }

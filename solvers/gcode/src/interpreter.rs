@@ -1,0 +1,204 @@
+//! The state of a program between two blocks, and what all kinds of blocks need of it: positions, axes and warnings.
+
+use super::block::{bit, rotary, Block, AXES, AXIS_OF_LETTER, AXIS_WORDS};
+use super::compensation::Compensation;
+use super::coordinates::Point;
+use super::fault::{fault, Outcome};
+use super::modal::{Feed, FeedMode, State};
+use super::moves::Moves;
+use super::nurbs::Nurbs;
+use super::options::{Options, Tool};
+use super::parameters::{first_of_system, Parameters, HOME, SECOND_HOME, SYSTEM};
+use super::tolerance::{FARTHEST, FARTHEST_TURN};
+
+/// A corner that waits for the next move: its word, and the row, line, start and feed of the move before.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    pub letter: u8,
+    pub size: f64,
+    pub row: usize,
+    pub line: u32,
+    pub start: Point,
+    pub feed: f64,
+}
+
+/// The state of the program between two blocks.
+pub struct Interpreter<'a> {
+    pub(super) state: State,
+    pub(super) moves: Moves,
+    pub(super) line: u32,
+    pub(super) options: &'a Options,
+    /// Letters of the axes that the program has named.
+    pub(super) known: u32,
+    warnings: Vec<String>,
+    warned: Vec<Topic>,
+    /// The NURBS that is being read.
+    pub(super) open: Option<Box<Nurbs>>,
+    /// The row in which a G5 may follow without I and J, and the I and J that it has then, in mm.
+    pub(super) mirror: Option<(usize, [f64; 2])>,
+    pub parameters: Parameters,
+    pub(super) tools: Option<Vec<Tool>>,
+    /// The table's row of the tool in the spindle, the number of that tool, and the number that T has called.
+    pub(super) tool: Option<Tool>,
+    pub(super) loaded: Option<u32>,
+    pub(super) selected: Option<u32>,
+    /// The corner that waits for the next straight move.
+    pub(super) corner: Option<Corner>,
+    /// The compensation, while G41 or G42 is on.
+    pub(super) compensation: Option<Box<Compensation>>,
+    /// Modes that M70 and M73 have saved, with the depth of calls, and true where the end of the call restores them.
+    pub(super) saved: Vec<(usize, bool, State)>,
+}
+
+/// What a program is warned of once.
+#[derive(PartialEq)]
+pub(super) enum Topic {
+    UnknownCode(u16),
+    NoToolTable,
+    NoToolLength,
+    LongDwell,
+    Extruder,
+    CycleDwell,
+    Retract,
+    LookAhead,
+}
+
+impl<'a> Interpreter<'a> {
+    pub fn new(options: &'a Options, expected: usize) -> Self {
+        let mut parameters = Parameters::default();
+        for (system, offset) in options.offsets.iter().enumerate() {
+            parameters.set_row(first_of_system(system), offset);
+        }
+        parameters.set_number(SYSTEM, 1.0);
+        parameters.set_row(HOME, &options.home);
+        parameters.set_row(SECOND_HOME, &options.home);
+        let mut state = State::new(options.offsets.first().copied().unwrap_or_default());
+        state.feed = options.feed.map(|feed| Feed { linear: feed, angular: feed });
+        Self {
+            state,
+            moves: Moves::new(expected, options.max_moves, options.start),
+            line: 0,
+            options,
+            known: 0,
+            warnings: Vec::new(),
+            warned: Vec::new(),
+            open: None,
+            mirror: None,
+            parameters,
+            tools: options.tools.clone(),
+            tool: None,
+            loaded: None,
+            selected: None,
+            corner: None,
+            compensation: None,
+            saved: Vec::new(),
+        }
+    }
+
+    pub fn into_parts(mut self) -> (Moves, Vec<String>) {
+        if !self.state.units_given {
+            self.warnings.push("the program gives no units (G20 or G21): millimetres are assumed".into());
+        }
+        self.warnings.extend(self.parameters.warning());
+        (self.moves, self.warnings)
+    }
+
+    /// The point of the programmed path; the tool is beside it while G41 or G42 is on.
+    #[inline(always)]
+    pub(super) fn position(&self) -> Point {
+        match &self.compensation {
+            None => self.moves.position,
+            Some(compensation) => compensation.programmed,
+        }
+    }
+
+    /// The feed in force, as a value of F.
+    pub(super) fn feed_word(&self) -> f64 {
+        let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
+        self.state.feed.map_or(0.0, |feed| feed.angular * per)
+    }
+
+    /// A message to the operator, or a comment.
+    pub fn remark(&mut self, line: u32, letter: u8, text: String) {
+        self.moves.remark(line, letter, text);
+    }
+
+    /// Calls `each` for each axis that the block names, with its value in mm or degrees. An axis that is named for the
+    /// first time gets a column.
+    #[inline(always)]
+    pub(super) fn axis_values(&mut self, block: &Block, mut each: impl FnMut(usize, f64)) -> Outcome<()> {
+        let mut words = block.words & AXIS_WORDS;
+        if words & !self.known != 0 {
+            self.add_axes(words)?;
+        }
+        let unit = self.state.unit();
+        let diameters = self.state.diameters;
+        while words != 0 {
+            let letter = words.trailing_zeros() as usize;
+            words &= words - 1;
+            let axis = AXIS_OF_LETTER[letter] as usize;
+            let mut value = block.value(b'A' + letter as u8);
+            if !rotary(axis) {
+                value *= unit;
+            }
+            if diameters && axis == 0 {
+                value *= 0.5;
+            }
+            each(axis, value);
+        }
+        Ok(())
+    }
+
+    /// Gives columns to axes that are named for the first time; the machine must have them.
+    #[cold]
+    pub(super) fn add_axes(&mut self, words: u32) -> Outcome<()> {
+        for (axis, &letter) in AXES.iter().enumerate().filter(|(_, &letter)| words & bit(letter) != 0) {
+            if !self.options.machine_axes.is_empty() && !self.options.machine_axes.contains(&letter) {
+                let letter = letter as char;
+                let others =
+                    self.options.machines_with.as_ref().map(|names| names(letter)).unwrap_or_default();
+                return fault(format!(
+                    "word {letter} moves an axis that the machine does not have: use a machine with {letter}{others}, \
+                     or post without it"
+                ));
+            }
+            self.moves.add_axis(axis);
+        }
+        self.known |= words;
+        Ok(())
+    }
+
+    /// Refuses positions that no machine reaches, or that are not numbers.
+    #[inline(always)]
+    pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
+        let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
+        // All nine are tested without a branch, and the faulty one is looked up afterwards.
+        if (0..9).fold(true, |all, axis| all & reached(axis)) {
+            return Ok(());
+        }
+        let axis = (0..9).find(|&axis| !reached(axis)).unwrap_or(0);
+        too_far(axis, target[axis])
+    }
+
+    pub(super) fn warn(&mut self, text: String) {
+        self.warnings.push(format!("line {}: {text}", self.line));
+    }
+
+    /// Warns of a topic for the first time.
+    pub(super) fn warn_once(&mut self, topic: Topic, text: impl FnOnce() -> String) {
+        if !self.warned.contains(&topic) {
+            self.warned.push(topic);
+            self.warn(text());
+        }
+    }
+}
+
+#[cold]
+fn too_far<T>(axis: usize, value: f64) -> Outcome<T> {
+    let (unit, farthest) = if rotary(axis) { ("degrees", FARTHEST_TURN) } else { ("mm", FARTHEST) };
+    fault(format!(
+        "{} would go to {value} {unit}, more than {farthest} {unit} from the machine's zero: check the number, the units \
+         and the offsets",
+        AXES[axis] as char,
+    ))
+}

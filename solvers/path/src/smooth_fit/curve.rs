@@ -1,0 +1,55 @@
+//! The curve of a run, and what each of its pieces follows.
+
+use super::offsets::Offsets;
+use feedplan_geometry::spline::CompositeCurve;
+use std::ops::Range;
+
+/// What a piece of the curve follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Covered {
+    /// First and last chord.
+    pub first: usize,
+    pub last: usize,
+    /// Upper bound of the distances from piece to chords and from chords to piece, in mm.
+    pub deviation: f64,
+    /// The curve has a corner before this piece, where the tool stops: no smooth curve was found.
+    pub stop: bool,
+}
+
+impl Covered {
+    pub fn new(first: usize, last: usize, deviation: f64) -> Self {
+        Self { first, last, deviation, stop: false }
+    }
+}
+
+/// The curve of a run. Pieces of degree 1 are lines, those of degree 5 parts of splines, those of degree 7 corners.
+#[derive(Clone, Debug, Default)]
+pub struct Smooth<const D: usize> {
+    pub curve: CompositeCurve<D>,
+    pub covered: Vec<Covered>,
+    /// The numbers of B-splines and lines, and of their polynomials before they are cut.
+    pub splines: usize,
+    pub polynomials: usize,
+    /// Chords whose corners are rounded one by one, with a stop before and after.
+    pub corners: Vec<Range<usize>>,
+    /// On which side of the polyline the curve lies, and how far away.
+    pub offsets: Offsets,
+    /// The work of the fit: the sum of Newton steps times intervals.
+    pub work: usize,
+}
+
+impl<const D: usize> Smooth<D> {
+    pub fn push(&mut self, control: &[[f64; D]], width: f64, covered: Covered) {
+        self.curve.push(control, &[], width);
+        self.covered.push(covered);
+    }
+
+    /// Calls `append`; the curve stops before the pieces that it appends, unless they are the first.
+    pub fn after_stop(&mut self, append: impl FnOnce(&mut Self)) {
+        let at = self.covered.len();
+        append(self);
+        if at > 0 && at < self.covered.len() {
+            self.covered[at].stop = true;
+        }
+    }
+}
