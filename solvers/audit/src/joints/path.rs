@@ -111,9 +111,14 @@ impl JointPath<'_> {
         }
     }
 
+    /// A piece ready to be measured.
     pub fn piece<const M: usize>(&self, number: usize) -> Piece<'_, M> {
+        self.piece_on(number, Arc::new(self.path.curve::<M>(number)))
+    }
+
+    /// The same where its curve is at hand.
+    pub fn piece_on<const M: usize>(&self, number: usize, curve: Arc<Curve<M>>) -> Piece<'_, M> {
         let run = self.run_of(number);
-        let curve = Arc::new(self.path.curve::<M>(number));
         let words = &self.words[self.words_of[run]];
         let flag = |flags: &[bool], k: usize| flags.get(k).copied().unwrap_or(false);
         let rows = self.path.rows(number);

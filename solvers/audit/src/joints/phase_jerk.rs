@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::path::{Bends, Piece, Work};
 use super::phase_motion::ROUNDING;
 use super::plan::JointAudit;
+use crate::curve::Curves;
 use crate::peak::peaks;
 use crate::phase_by_length::PhaseByLength;
 use crate::phases::{is_by_length, PATH_JERK};
@@ -67,10 +68,11 @@ pub fn audit_jerk<const M: usize>(audit: &JointAudit<M>, good: &[bool], seen: Se
         .into_par_iter()
         .filter(|&phase| good[phase])
         .map_init(
-            || audit.path.work(),
-            |work, phase| {
+            || (audit.path.work(), Curves::new(audit.path.path.pieces)),
+            |(work, curves), phase| {
                 let mut tally = Tally::default();
-                let piece = audit.path.piece(audit.phases.piece[phase] as usize);
+                let number = audit.phases.piece[phase] as usize;
+                let piece = audit.path.piece_on(number, curves.get(number));
                 audit.jerks(phase, &piece, work, &mut tally);
                 audit.alone(phase, piece.line, &mut tally);
                 if phase > 0 && good[phase - 1] && !audit.is_first(phase) {

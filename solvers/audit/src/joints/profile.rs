@@ -9,6 +9,7 @@ use super::path::{Piece, Place, TURN};
 use super::phase_jerk::audit_jerk;
 use super::phase_motion::{motion, State, ROUNDING};
 use super::plan::JointAudit;
+use crate::curve::Curves;
 use crate::phases::{is_by_length, Phases};
 use crate::vectors::length;
 use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
@@ -71,9 +72,10 @@ pub(crate) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: S
         let measured: Vec<(Measured<M>, Tally<M>)> = chunk
             .par_iter()
             .map_init(
-                || audit.path.work(),
-                |work, &phase| {
-                    let piece: Piece<M> = audit.path.piece(audit.phases.piece[phase] as usize);
+                || (audit.path.work(), Curves::new(audit.path.path.pieces)),
+                |(work, curves), &phase| {
+                    let number = audit.phases.piece[phase] as usize;
+                    let piece: Piece<M> = audit.path.piece_on(number, curves.get(number));
                     let places = places(&audit.phases, phase, &piece);
                     let places: Vec<_> = places.into_iter().map(|u| piece.place(u, work)).collect();
                     let states = motion(&piece, &audit.phases, phase, &places, places.len() - 1);
