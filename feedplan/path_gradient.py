@@ -7,8 +7,8 @@ Along C(u) with p = u̇² the acceleration and the jerk of an axis are
 The least time ∫ p^(−1/2) du changes with them by the multipliers of their limits. These are the multipliers
 of a quadratic program in the change of p: the time to second order, the limits to first order about the plan,
 p a quadratic spline, or a linear one without limits of jerk. Where no axis is near its greatest acceleration
-or jerk p stays, since the shape of the path does not matter there. Terms with C' are left out: they mostly
-move places along the path, and steps by them gained less on all polylines tried.
+or jerk p stays, since the shape of the path does not matter there. Terms with C' are left out: with them, as
+pulls on C'', steps gained less on five of seven polylines and the same on two.
 """
 
 from __future__ import annotations
