@@ -167,7 +167,9 @@ def test_what_is_reported_is_what_is_measured(make_program: Any) -> None:
     angle = np.radians(4.0) * np.arange(91)
     moves = make_program(5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1), blend_tolerance=0.05)
     # At an even speed the second path cuts the bend up to the tolerance.
-    motion = Motion(np.array([[0, 89]]), np.array([0, 1]), np.zeros(1), np.ones(1), np.full(2, 1e3))
+    straight, max_jerk = np.zeros((1, 2)), np.full(2, 1e3)
+    run, start, place, speed_sq = np.array([[0, 89]]), np.array([0, 1]), np.zeros(1), np.ones(1)
+    motion = Motion(run, start, place, speed_sq, straight, straight, max_jerk)
     for own in (None, motion):
         path = build_path(moves, MILL, corners=Corners.SMOOTH, motion=own)
         measured = offsets(moves, path)

@@ -6,10 +6,11 @@
 //! and time follow from the length of the way along the path.
 
 use super::path::{Piece, Place};
-use crate::phase_time::kronrod;
+use crate::phase_time::MOST_HALVINGS;
 use crate::phases::{
     is_by_length, Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE,
 };
+use crate::speed_by_length::integral;
 use crate::{EPS, ROUNDINGS};
 
 /// Rounding of a speed or time that a few operations make.
@@ -134,8 +135,8 @@ pub fn motion<const M: usize>(
         let rounding = ROUNDING * (1.0 + piece.width / step);
         let (mut time, mut error) = match kind {
             PARAMETER_ACCELERATION => (2.0 * step / (a.root_p + b.root_p), rounding),
-            FEED => integrated(from, to, rounding, feed_rate),
-            SPEED_LINE => integrated(from, to, rounding, feed_line),
+            FEED => (integral(&feed_rate, from, to, &mut { MOST_HALVINGS }), rounding),
+            SPEED_LINE => (integral(&feed_line, from, to, &mut { MOST_HALVINGS }), rounding),
             _ => {
                 let way = (b.way[own] - a.way[own]).abs();
                 by_joint([a, b], step, way, unknown, accelerates.then_some(value.abs()), rounding)
@@ -174,14 +175,6 @@ fn sign(x: f64) -> f64 {
     } else {
         x.signum()
     }
-}
-
-/// ∫ du/√p over a step, and the share of it that may be wrong.
-fn integrated(a: f64, b: f64, rounding: f64, rate: impl Fn(f64) -> f64) -> (f64, f64) {
-    let [whole, early, late] =
-        [[a, b], [a, 0.5 * (a + b)], [0.5 * (a + b), b]].map(|[a, b]| kronrod(&rate, a, b)[0]);
-    let fine = early + late;
-    (fine, (fine - whole).abs() / fine + rounding)
 }
 
 /// The time of a step by the way of the phase's own joint, which may have a constant acceleration, and the share of it that may
