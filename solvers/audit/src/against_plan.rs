@@ -3,7 +3,7 @@
 use super::curve::Curves;
 use super::deviation::{settled, window};
 use super::neighbours::Neighbours;
-use super::profile_clock::Reader;
+use super::profile_clock::ACCELERATION_SHARE;
 use super::rows::Row;
 use super::tracking::{is_step, Plan};
 use super::vectors::{distance, from_to, inner, length, Segment};
@@ -12,9 +12,6 @@ use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
 const VELOCITY_SHARE: f64 = 1e-3;
 
-/// A recorded acceleration may differ from the profile's by this share of its limit.
-const ACCELERATION_SHARE: f64 = 1e-2;
-
 /// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
 const SMOOTH: f64 = 1e-9;
 
@@ -22,7 +19,6 @@ const SMOOTH: f64 = 1e-9;
 pub struct Comparison<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
-    profile: Option<Reader<'a, M>>,
     curves: Curves<'a, M>,
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
@@ -31,9 +27,8 @@ pub struct Comparison<'a, const M: usize> {
 
 impl<'a, const M: usize> Comparison<'a, M> {
     pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
-        let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
         let curves = Curves::new(plan.path.pieces);
-        Self { plan, limits, profile, curves, near: Neighbours::default(), piece: None }
+        Self { plan, limits, curves, near: Neighbours::default(), piece: None }
     }
 
     /// What one setpoint shows: its distance from path and program, and what it records.
@@ -58,7 +53,10 @@ impl<'a, const M: usize> Comparison<'a, M> {
 
     /// Recorded velocity and acceleration against the profile's.
     fn recorded(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
-        let (Some(profile), limits, nearest) = (&mut self.profile, self.limits, &row.nearest) else { return };
+        let (limits, nearest) = (self.limits, &row.nearest);
+        if self.plan.profile.is_none() {
+            return;
+        }
         if let Some(recorded) = row.velocity {
             let velocity = nearest.velocity;
             let away = rounding + nearest.off.max(0.0) + nearest.late;
@@ -73,19 +71,17 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
             }
         }
-        if let Some(recorded) = row.acceleration {
-            let here = profile.go_to(nearest.place);
-            let range = profile.accelerations(&here, row.t, limits.period);
-            let mut off: [f64; M] =
-                std::array::from_fn(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));
-            if (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration.least(k)) {
-                if let Some(then) = profile.acceleration_at(row.t) {
-                    off = std::array::from_fn(|k| off[k].min((recorded[k] - then[k]).abs()));
-                }
-            }
+        if row.acceleration.is_some() {
             for k in 0..M {
                 let limit = ACCELERATION_SHARE * limits.acceleration.least(k);
-                tally.offer(Check::RecordedAcceleration, k, off[k], limit, row.t, row.line);
+                tally.offer(
+                    Check::RecordedAcceleration,
+                    k,
+                    nearest.acceleration_off[k],
+                    limit,
+                    row.t,
+                    row.line,
+                );
             }
         }
     }
@@ -170,7 +166,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
         let mut corners = 0.0;
         for piece in self.begun([rows[0], rows[2]]) {
-            let before = self.curves.get(piece - 1);
+            let before = self.curves.get(piece - 1).clone();
             let after = self.curves.get(piece);
             let (into, out) = (before.derivative(before.width()), after.derivative(0.0));
             let (a, b) = (length(&into), length(&out));

@@ -148,14 +148,15 @@ impl<'a, const M: usize> Curves<'a, M> {
         Self { pieces, kept: [None, None] }
     }
 
-    pub fn get(&mut self, i: usize) -> Arc<Curve<M>> {
-        for (number, curve) in self.kept.iter().flatten() {
-            if *number == i {
-                return curve.clone();
-            }
-        }
-        let curve = Arc::new(self.pieces.curve(i));
-        self.kept = [Some((i, curve.clone())), self.kept[0].take()];
+    pub fn get(&mut self, i: usize) -> &Arc<Curve<M>> {
+        let is_kept =
+            |kept: &Option<(usize, Arc<Curve<M>>)>| matches!(kept, Some((number, _)) if *number == i);
+        let place = self.kept.iter().position(is_kept).unwrap_or_else(|| {
+            self.kept.swap(0, 1);
+            self.kept[0] = None;
+            0
+        });
+        let (_, curve) = self.kept[place].get_or_insert_with(|| (i, Arc::new(self.pieces.curve(i))));
         curve
     }
 }
@@ -173,19 +174,20 @@ pub struct General<const M: usize> {
     pub polygon: Polygon<M>,
     hodographs: Hodographs<M>,
     width: f64,
+    per_width: f64,
 }
 
 impl<const M: usize> General<M> {
     /// u as parts of the width from both ends.
     fn parts(&self, u: f64) -> (f64, f64) {
-        (u / self.width, (self.width - u) / self.width)
+        (u * self.per_width, (self.width - u) * self.per_width)
     }
 }
 
 impl<const M: usize> Curve<M> {
     pub fn general(polygon: Polygon<M>, width: f64) -> Self {
         let hodographs = Hodographs::new(&polygon);
-        Curve::General(Box::new(General { polygon, hodographs, width }))
+        Curve::General(Box::new(General { polygon, hodographs, width, per_width: 1.0 / width }))
     }
 
     /// Length of the parameter interval, in mm.
@@ -229,7 +231,7 @@ impl<const M: usize> Curve<M> {
             Curve::General(general) => {
                 let (t, rest) = general.parts(u);
                 let slope = general.hodographs.slope(t, rest);
-                vector_of(|k| slope[k] / general.width)
+                vector_of(|k| slope[k] * general.per_width)
             }
         }
     }
@@ -242,7 +244,7 @@ impl<const M: usize> Curve<M> {
             Curve::General(general) => {
                 let (t, rest) = general.parts(u);
                 let [point, slope] = general.hodographs.derivatives(t, rest);
-                [point, vector_of(|k| slope[k] / general.width)]
+                [point, vector_of(|k| slope[k] * general.per_width)]
             }
         }
     }
@@ -255,7 +257,7 @@ impl<const M: usize> Curve<M> {
             Curve::General(general) => {
                 let (t, rest) = general.parts(u);
                 let [_, first, second, third] = general.hodographs.derivatives(t, rest);
-                by_width([first, second, third], general.width)
+                by_width([first, second, third], general.per_width)
             }
         }
     }
@@ -268,18 +270,20 @@ impl<const M: usize> Curve<M> {
                 let size = self.derivative_size();
                 [size, size.map(|size| size / curve.width), [0.0; M]]
             }
-            Curve::General(general) => by_width(*general.hodographs.sizes(), general.width),
+            Curve::General(general) => by_width(*general.hodographs.sizes(), general.per_width),
         }
     }
 
-    /// The greatest lengths of the second to the fourth derivative; infinite on pieces with weights.
-    pub fn bounds(&self) -> [f64; 3] {
+    /// The greatest lengths of the second to the fifth derivative; infinite on pieces with weights.
+    pub fn bounds(&self) -> [f64; 4] {
         match self {
-            Curve::Quadratic(curve) => [length(&curve.second_derivative()), 0.0, 0.0],
+            Curve::Quadratic(curve) => [length(&curve.second_derivative()), 0.0, 0.0, 0.0],
             Curve::General(general) => {
-                let square = general.width * general.width;
-                let [second, third, fourth] = general.hodographs.bounds();
-                [second / square, third / (square * general.width), fourth / (square * square)]
+                let mut scale = 1.0 / general.width;
+                general.hodographs.bounds().map(|bound| {
+                    scale /= general.width;
+                    bound * scale
+                })
             }
         }
     }
@@ -338,10 +342,10 @@ impl<const M: usize> Curve<M> {
 
 /// Derivatives by t to those by u.
 #[inline(always)]
-fn by_width<const M: usize>(mut derivatives: [[f64; M]; 3], width: f64) -> [[f64; M]; 3] {
+fn by_width<const M: usize>(mut derivatives: [[f64; M]; 3], per_width: f64) -> [[f64; M]; 3] {
     let mut scale = 1.0;
     for derivative in &mut derivatives {
-        scale /= width;
+        scale *= per_width;
         for x in derivative {
             *x *= scale;
         }

@@ -19,8 +19,8 @@ pub struct Hodographs<const M: usize> {
     weights: [Rows<1>; 4],
     /// What the rounding of the first three derivatives is relative to.
     sizes: [[f64; M]; 3],
-    /// The greatest lengths of the second to the fourth derivative; infinite on rational pieces.
-    bounds: [f64; 3],
+    /// The greatest lengths of the second to the fifth derivative; infinite on rational pieces.
+    bounds: [f64; 4],
 }
 
 impl<const M: usize> Hodographs<M> {
@@ -70,7 +70,7 @@ impl<const M: usize> Hodographs<M> {
             rows,
             weights: derivatives(of_weights, degree).0,
             sizes,
-            bounds: if rational { [f64::INFINITY; 3] } else { [bounds[1], bounds[2], bounds[3]] },
+            bounds: if rational { [f64::INFINITY; 4] } else { [bounds[1], bounds[2], bounds[3], bounds[4]] },
         }
     }
 
@@ -134,8 +134,8 @@ impl<const M: usize> Hodographs<M> {
         &self.sizes
     }
 
-    /// The greatest lengths of the second to the fourth derivative; infinite on rational pieces.
-    pub fn bounds(&self) -> [f64; 3] {
+    /// The greatest lengths of the second to the fifth derivative; infinite on rational pieces.
+    pub fn bounds(&self) -> [f64; 4] {
         self.bounds
     }
 }
@@ -154,14 +154,16 @@ fn sum<const M: usize>(rows: &[[f64; M]], t: f64, rest: f64) -> [f64; M] {
 }
 
 /// The coefficients, times binomials, of a function of this degree and of its derivatives up to order 3, and the greatest lengths
-/// of its coefficients of each order.
-fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize) -> ([Rows<M>; 4], [f64; 4]) {
-    let (mut found, mut lengths) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 4]);
-    for order in 0..4.min(degree + 1) {
+/// of its coefficients of each order up to 4.
+fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize) -> ([Rows<M>; 4], [f64; 5]) {
+    let (mut found, mut lengths) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 5]);
+    for order in 0..5.min(degree + 1) {
         let count = degree - order;
         let mut binomial = 1.0;
         for i in 0..=count {
-            found[order][i] = vector_of(|k| binomial * rows[i][k]);
+            if let Some(found) = found.get_mut(order) {
+                found[i] = vector_of(|k| binomial * rows[i][k]);
+            }
             lengths[order] = f64::max(lengths[order], length(&rows[i]));
             binomial *= (count - i) as f64 / (i + 1) as f64;
         }

@@ -4,7 +4,7 @@
 //! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `deviation`. The
+//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `station`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `deviation`. The
 //! profile: `phases`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
 //! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
 
@@ -32,6 +32,7 @@ pub mod profile_clock;
 mod rows;
 pub mod setpoints;
 mod speed_by_length;
+mod station;
 pub mod tracking;
 mod vectors;
 
@@ -224,6 +225,19 @@ impl<const M: usize> Tally<M> {
         time: impl FnOnce() -> f64,
     ) {
         let ratio = if value <= 0.0 { 0.0 } else { value / limit };
+        self.offer_share(check, axis, (value, limit, ratio), line, time);
+    }
+
+    /// The same of value, limit and their ratio.
+    #[inline(always)]
+    pub fn offer_share(
+        &mut self,
+        check: Check,
+        axis: usize,
+        (value, limit, ratio): (f64, f64, f64),
+        line: i32,
+        time: impl FnOnce() -> f64,
+    ) {
         // The negated comparison also holds for a NaN, which must not get lost.
         #[allow(clippy::neg_cmp_op_on_partial_ord)]
         if !(ratio <= self.worst[check as usize][axis].ratio) {
@@ -279,6 +293,12 @@ impl<const M: usize> Sided<M> {
         } else {
             self.positive[axis]
         }
+    }
+
+    /// The limits that hold for a value of each axis.
+    #[inline(always)]
+    pub fn of_each(&self, values: &[f64; M]) -> [f64; M] {
+        vectors::vector_of(|k| self.of(k, values[k]))
     }
 
     /// The smaller limit.

@@ -4,9 +4,9 @@
 //! over such a step shows 3/4 of it over the period as a jerk: with more than the limit of that alone, setpoints break it.
 
 use super::curve::Curves;
-use super::phase_by_length::rates;
 use super::phases::Phases;
 use super::speed_by_length::Pace;
+use super::station::Station;
 use super::vectors::{distance, length};
 use super::{Check, Limits, Tally, EPS, PASS_EXCESS, ROUNDINGS};
 
@@ -101,7 +101,7 @@ impl<const M: usize> Jerks<'_, M> {
         if pieces[0] == pieces[1] {
             return None;
         }
-        let curves = pieces.map(|piece| curves.get(piece));
+        let curves = pieces.map(|piece| curves.get(piece).clone());
         let u = [phases.u1[i], phases.u0[j]];
         let directions = [0, 1].map(|side| {
             let tangent = curves[side].derivative(u[side]);
@@ -118,7 +118,7 @@ impl<const M: usize> Jerks<'_, M> {
                 if side == 0 { (i, true, phases.p1[i]) } else { (j, false, phases.p0[j]) };
             let v = length(&curves[side].derivative(u[side])) * p.sqrt();
             let pace = Pace { v, a: phases.end_acceleration(phase, at_end)?, j: 0.0 };
-            rates(&curves[side], u[side], pace).map(|rates| rates.acceleration)
+            Station::new(&curves[side], u[side]).map(|station| station.acceleration(pace))
         };
         let (before, after) = (side(0)?, side(1)?);
         Some(std::array::from_fn(|k| {

@@ -6,7 +6,7 @@ use super::curve::{Curve, Followed};
 use super::phase_by_length::PhaseByLength;
 use super::phase_motion::{Law, PhaseMotion, Shape};
 use super::speed_by_length::{Pace, SpeedByLength};
-use super::vectors::{inner, length, vector_of};
+use super::vectors::inner;
 use super::{EPS, ROUNDINGS};
 
 /// The profile's arrays, one entry a phase; see `feedplan.profile.SpeedProfile`.
@@ -90,13 +90,14 @@ impl Phases<'_> {
             && (is_by_length(self.kind[i]) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
     }
 
-    /// Phase `i` on its piece, where its speed is known by the length of the path, in which each axis counts by its `scale`;
-    /// its numbers must be good.
+    /// Phase `i` on its piece, where its speed is known by the length of the path, in which each axis counts by its `scale` and
+    /// which has this `slope` at a parameter; its numbers must be good.
     pub fn by_length<const M: usize>(
         &self,
         i: usize,
         curve: &Arc<Curve<M>>,
         scale: &[f64; M],
+        mut slope: impl FnMut(f64) -> f64,
     ) -> Option<PhaseByLength<M>> {
         let kind = self.kind[i];
         let at_feed = kind == FEED && self.counted::<M>(i) == [1.0; M];
@@ -104,10 +105,7 @@ impl Phases<'_> {
             return None;
         }
         let u = [self.u0[i], self.u1[i]];
-        let mut speeds = [(u[0], self.p0[i]), (u[1], self.p1[i])].map(|(u, p)| {
-            let tangent = curve.derivative(u);
-            length(&vector_of::<M>(|k| scale[k] * tangent[k])) * p.sqrt()
-        });
+        let mut speeds = [slope(u[0]) * self.p0[i].sqrt(), slope(u[1]) * self.p1[i].sqrt()];
         // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
         let anchored_at_end = kind != FEED && speeds[1] < speeds[0];
         let mut a = [self.a0[i], self.a1[i]];

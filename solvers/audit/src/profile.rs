@@ -15,6 +15,7 @@ use super::curve::{Curves, Followed};
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
 use super::phases::Phases;
+use super::station::Stations;
 use super::vectors::length;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 use by_length::{Look, Looker};
@@ -50,12 +51,12 @@ pub(crate) fn audit_profile<const M: usize>(
     let inside = (0..blocks)
         .into_par_iter()
         .map(|block| {
-            let (mut tally, mut curves) = (Tally::default(), Curves::new(path.pieces));
+            let (mut tally, mut stations) = (Tally::default(), Stations::new(path.pieces));
             for i in block * BLOCK..((block + 1) * BLOCK).min(phases.len()) {
                 tell(seen, i);
-                auditor.phase(i, &mut curves, &mut tally);
+                auditor.phase(i, &mut stations, &mut tally);
                 if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
-                    auditor.joint(i - 1, i, &mut curves, &mut tally);
+                    auditor.joint(i - 1, i, &mut stations.curves, &mut tally);
                 }
             }
             tally
@@ -75,7 +76,7 @@ struct Auditor<'a, const M: usize> {
 }
 
 impl<const M: usize> Auditor<'_, M> {
-    fn phase(&self, i: usize, curves: &mut Curves<M>, tally: &mut Tally<M>) {
+    fn phase(&self, i: usize, stations: &mut Stations<M>, tally: &mut Tally<M>) {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
         let line = self.path.line.get(piece).copied().unwrap_or(0);
@@ -90,9 +91,11 @@ impl<const M: usize> Auditor<'_, M> {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
             return;
         }
-        let (curve, share) = (curves.get(piece), (u1 - u0) / width);
+        let (curve, share) = (stations.curves.get(piece).clone(), (u1 - u0) / width);
         let width_rounding = EPS * width / (u1 - u0);
-        let by_length = phases.by_length(i, &curve, &[1.0; M]);
+        let slope =
+            |u: f64| stations.get(piece, u).map_or_else(|| length(&curve.derivative(u)), |at| at.slope);
+        let by_length = phases.by_length(i, &curve, &[1.0; M], slope);
         if self.limits.judges_jerk {
             self.jerks().alone(i, width_rounding, by_length.is_some(), line, tally);
         }
@@ -105,8 +108,11 @@ impl<const M: usize> Auditor<'_, M> {
                 start: time,
                 line,
             };
-            let ends = looker.phase([u0, u1], tally);
-            self.ends_by_length(i, &ends, line, tally);
+            let from = stations.get(piece, u0).map(|station| looker.look_at(station, tally));
+            let to = stations.get(piece, u1).map(|station| looker.look_at(station, tally));
+            let ends = [from.as_ref(), to.as_ref()];
+            looker.phase([u0, u1], ends, tally);
+            self.ends_by_length(i, ends, line, tally);
             self.duration(i, motion.time(), width_rounding, line, tally);
             return;
         }
@@ -136,20 +142,20 @@ impl<const M: usize> Auditor<'_, M> {
 
     /// The recorded p at both ends against the speed by the length, as a jump of axis velocity. A place is known to its
     /// rounding: over that way the axis may accelerate.
-    fn ends_by_length(&self, i: usize, ends: &[Option<Look<M>>; 2], line: i32, tally: &mut Tally<M>) {
+    fn ends_by_length(&self, i: usize, ends: [Option<&Look<M>>; 2], line: i32, tally: &mut Tally<M>) {
         let phases = self.phases;
         let known = [(phases.p0[i], 0.0), (phases.p1[i], phases.duration[i])];
-        for (look, (p, since)) in ends.iter().zip(known) {
-            let Some(Look { place, rates, .. }) = look else { continue };
-            let recorded = rates.slope * p.sqrt();
-            let way = ROUNDINGS * EPS * self.path.width[phases.piece[i] as usize] * rates.slope;
+        for (look, (p, since)) in ends.into_iter().zip(known) {
+            let Some(Look { place, station, velocity, .. }) = look else { continue };
+            let recorded = station.slope * p.sqrt();
+            let way = ROUNDINGS * EPS * self.path.width[phases.piece[i] as usize] * station.slope;
             for k in 0..self.limits.axes {
-                let cosine = rates.direction[k].abs();
+                let cosine = station.first.value[k].abs();
                 let [slow, fast] =
                     [place.pace.v.min(recorded), place.pace.v.max(recorded)].map(|speed| cosine * speed);
                 let gained = 2.0 * self.limits.acceleration.greatest(k) * way * cosine;
                 let reached = (slow * slow + gained).sqrt().max(slow);
-                let jump = fast - reached - rates.velocity.rounding[k];
+                let jump = fast - reached - velocity.rounding[k];
                 tally.offer(
                     Check::Jump,
                     k,

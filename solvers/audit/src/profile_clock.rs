@@ -9,8 +9,11 @@ use super::nearest::Place;
 use super::phase_by_length::{self, PhaseByLength};
 use super::phase_motion::PhaseMotion;
 use super::phases::Phases;
-use super::vectors::length;
+use super::vectors::{length, vector_of};
 use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
+
+/// A recorded acceleration may differ from the profile's by this share of its limit.
+pub const ACCELERATION_SHARE: f64 = 1e-2;
 
 /// A switch of the acceleration this share of a period away counts as at the setpoint.
 const SWITCH_SHARE: f64 = 1e-4;
@@ -63,7 +66,7 @@ enum How {
 
 impl<const M: usize> Motion<M> {
     fn new(phases: &Phases, phase: usize, curve: &Arc<Curve<M>>) -> Self {
-        match phases.by_length(phase, curve, &[1.0; M]) {
+        match phases.by_length(phase, curve, &[1.0; M], |u| length(&curve.derivative(u))) {
             Some(motion) => Self::ByLength(motion),
             None => Self::ByParameter(phases.by_parameter(phase, curve)),
         }
@@ -95,8 +98,8 @@ impl<const M: usize> Motion<M> {
     /// Accelerations, and what of them may be rounding.
     fn acceleration(&self, here: &Passage) -> ([f64; M], [f64; M]) {
         match (self, here.how) {
-            (Self::ByLength(motion), How::Place(place)) => match motion.rates(&place) {
-                Some(rates) => (rates.acceleration.value, rates.acceleration.rounding),
+            (Self::ByLength(motion), How::Place(place)) => match motion.acceleration(&place) {
+                Some(acceleration) => (acceleration.value, acceleration.rounding),
                 None => ([0.0; M], [f64::INFINITY; M]),
             },
             (Self::ByParameter(motion), How::Y(y)) => motion.acceleration_near(y),
@@ -160,7 +163,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     /// On the first phase; there must be one, and a run of the path for it.
     pub fn new(clock: &ProfileClock<'a>, path: &Followed<'a>) -> Self {
         let mut curves = Curves::new(path.pieces);
-        let motion = Motion::new(&clock.phases, 0, &curves.get(clock.phases.piece[0] as usize));
+        let motion = Motion::new(&clock.phases, 0, curves.get(clock.phases.piece[0] as usize));
         let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, curves, motion, last: None };
         reader.enter(0);
         reader
@@ -175,7 +178,7 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     fn motion_of(&mut self, phase: usize) -> Motion<M> {
         let phases = &self.clock.phases;
-        Motion::new(phases, phase, &self.curves.get(phases.piece[phase] as usize))
+        Motion::new(phases, phase, self.curves.get(phases.piece[phase] as usize))
     }
 
     fn ends(&self, phase: usize) -> [f64; 2] {
@@ -271,7 +274,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         let there = Place { piece: self.clock.phases.piece[phase] as usize, u: here.u };
         let (first, last) =
             if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
-        let curve = self.curves.get(first.piece);
+        let curve = self.curves.get(first.piece).clone();
         match last.piece - first.piece {
             0 => Some(curve.way_at_most(first.u, last.u)),
             1 => {
@@ -301,12 +304,30 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     /// The acceleration of each axis at `time`, in the reader's run: where the tool creeps back from a turn, the place of
     /// a setpoint does not tell the ways to and from it apart.
-    pub fn acceleration_at(&mut self, time: f64) -> Option<[f64; M]> {
+    fn acceleration_at(&mut self, time: f64) -> Option<[f64; M]> {
         self.motion_at(time).map(|(motion, here, _)| motion.acceleration(&here).0)
     }
 
+    /// How far recorded accelerations are from those of the profile, at a place of the reader's phase or, where they are not
+    /// those, at the time.
+    pub fn acceleration_off(
+        &mut self,
+        here: &Passage,
+        time: f64,
+        recorded: &[f64; M],
+        limits: &Limits<M>,
+    ) -> [f64; M] {
+        let range = self.accelerations(here, time, limits.period);
+        let off: [f64; M] = vector_of(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));
+        let is_off = (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration.least(k));
+        match if is_off { self.acceleration_at(time) } else { None } {
+            Some(then) => vector_of(|k| off[k].min((recorded[k] - then[k]).abs())),
+            None => off,
+        }
+    }
+
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's phase.
-    pub fn accelerations(&mut self, here: &Passage, time: f64, period: f64) -> [[f64; 2]; M] {
+    fn accelerations(&mut self, here: &Passage, time: f64, period: f64) -> [[f64; 2]; M] {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
         let mut include = |(value, rounding): ([f64; M], [f64; M])| {
             for k in 0..M {
@@ -321,7 +342,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         let mut neighbour = |phase: usize, at_end: bool| {
             let ends = [phases.u0[phase], phases.u1[phase]];
             let motion: Motion<M> =
-                Motion::new(&phases, phase, &self.curves.get(phases.piece[phase] as usize));
+                Motion::new(&phases, phase, self.curves.get(phases.piece[phase] as usize));
             let there = motion.passage(ends[usize::from(at_end)], ends, phases.duration[phase]);
             include(motion.acceleration(&there));
         };

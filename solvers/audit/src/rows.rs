@@ -37,6 +37,8 @@ pub struct Nearest<const M: usize> {
     pub allowed: f64,
     /// Of the profile there; not a number where that is not known.
     pub velocity: [f64; M],
+    /// How far a recorded acceleration is from the profile's.
+    pub acceleration_off: [f64; M],
 }
 
 impl<const M: usize> Default for Nearest<M> {
@@ -49,6 +51,7 @@ impl<const M: usize> Default for Nearest<M> {
             late: 0.0,
             allowed: PLACE_TOLERANCE,
             velocity: [f64::NAN; M],
+            acceleration_off: [0.0; M],
         }
     }
 }

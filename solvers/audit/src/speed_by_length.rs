@@ -71,39 +71,59 @@ impl SpeedByLength {
         }
     }
 
-    /// The ranges of v, a and j between two places that are so long a way apart, in the order of travel.
-    pub fn ranges(&self, [from, to]: [&Pace; 2], way: f64) -> [[f64; 2]; 3] {
+    /// Bounds of v, a and j and of their derivatives by the length between two places that are so long a way apart, in the order
+    /// of travel: v' = a/v, a' = j/v.
+    pub fn bounds(&self, [from, to]: [&Pace; 2], way: f64) -> [Bounds; 3] {
+        let (slowest, v, a, j, j1, j2);
         match self {
-            Self::Constant { speed } => [[*speed; 2], [0.0; 2], [0.0; 2]],
+            Self::Constant { speed } => return [[*speed, 0.0, 0.0], [0.0; 3], [0.0; 3]].map(Bounds),
             // v between its coefficients in Bernstein form by time, a linear.
-            Self::Jerk { start: Pace { j, .. }, .. } => {
-                let gained = 0.5 * from.a * (to.a - from.a) / j;
+            Self::Jerk { start: Pace { j: constant, .. }, .. } => {
+                let gained = 0.5 * from.a * (to.a - from.a) / constant;
                 let inner = from.v + if gained.is_finite() { gained } else { 0.0 };
-                [range(&[from.v, inner, to.v]), range(&[from.a, to.a]), range(&[from.j, to.j])]
+                slowest = from.v.min(inner).min(to.v);
+                v = from.v.max(inner).max(to.v);
+                a = from.a.abs().max(to.a.abs());
+                (j, j1, j2) = (constant.abs(), 0.0, 0.0);
             }
-            // The same of v² and a by the length; v″ of that is linear.
+            // The same of v² and a by the length; j/v is linear in it.
             Self::Cubic { .. } => {
                 let third = 2.0 / 3.0 * way;
                 let ends = [from.v * from.v, to.v * to.v];
-                let square = [ends[0], ends[0] + third * from.a, ends[1] - third * to.a, ends[1]];
-                let v = range(&square).map(|square| square.max(0.0).sqrt());
-                let a = range(&[from.a, (square[2] - square[1]) / third, to.a]);
-                let per_speed = range(&[from.j / from.v, to.j / to.v]);
-                let j = range(&[
-                    per_speed[0] * v[0],
-                    per_speed[0] * v[1],
-                    per_speed[1] * v[0],
-                    per_speed[1] * v[1],
-                ]);
-                [v, a, j]
+                let inner = [ends[0] + third * from.a, ends[1] - third * to.a];
+                slowest = ends[0].min(inner[0]).min(inner[1]).min(ends[1]).max(0.0).sqrt();
+                v = ends[0].max(inner[0]).max(inner[1]).max(ends[1]).sqrt();
+                a = from.a.abs().max(((inner[1] - inner[0]) / third).abs()).max(to.a.abs());
+                let rates = [from.j / from.v, to.j / to.v];
+                let (rate, slope) = (rates[0].abs().max(rates[1].abs()), (rates[1] - rates[0]).abs() / way);
+                j = rate * v;
+                j1 = rate * a / slowest + slope * v;
+                j2 = rate * (rate + a * a / (slowest * slowest)) / slowest + 2.0 * slope * a / slowest;
             }
         }
+        let per = 1.0 / slowest;
+        let v = Bounds([v, a * per, (j + a * a * per) * per * per]);
+        let a = Bounds([a, j * per, (j1 + j * a * per * per) * per]);
+        [v, a, Bounds([j, j1, j2])]
     }
 }
 
-/// The least and the greatest of some numbers.
-fn range(numbers: &[f64]) -> [f64; 2] {
-    numbers.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| [least.min(*x), most.max(*x)])
+/// Bounds of the size of a function and of its first two derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds(pub [f64; 3]);
+
+impl Bounds {
+    /// Of a product.
+    pub fn times(self, Self(b): Self) -> Self {
+        let Self(a) = self;
+        Self([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + 2.0 * a[1] * b[1] + a[2] * b[0]])
+    }
+
+    /// By a variable in which that of the function has these first two derivatives.
+    pub fn at(self, first: f64, second: f64) -> Self {
+        let Self([f, f1, f2]) = self;
+        Self([f, f1 * first, f2 * first * first + f1 * second])
+    }
 }
 
 /// Time at constant jerk from the anchor to a length; beyond the phase's own at its mean speed.

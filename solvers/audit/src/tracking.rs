@@ -172,11 +172,16 @@ impl<'a, const M: usize> Finder<'a, M> {
         let place = found.place;
         let step = if place.piece == from.piece { place.u - from.u } else { 0.0 };
         let late = if found.error.is_finite() { found.error } else { 0.0 };
-        let velocity = self.profile.as_mut().map_or([f64::NAN; M], |profile| {
+        let off = found.distance - rounding;
+        let mut nearest = Nearest { place, step, magnitude, off, late, allowed, ..Nearest::default() };
+        if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
-            profile.velocity(&here)
-        });
-        Nearest { place, step, magnitude, off: found.distance - rounding, late, allowed, velocity }
+            nearest.velocity = profile.velocity(&here);
+            if let Some(recorded) = row.acceleration.filter(|_| nearest.is_good()) {
+                nearest.acceleration_off = profile.acceleration_off(&here, row.t, &recorded, limits);
+            }
+        }
+        nearest
     }
 
     /// The place of a setpoint by Newton's method from where the last step leads, on the same piece or the next one, with its

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use super::formula::{Formula, Jet};
 use crate::curve::{Curve, Followed};
+use crate::phase_by_length::PhaseByLength;
+use crate::phases::Phases;
 use crate::vectors::length;
 use crate::{EPS, ROUNDINGS};
 
@@ -302,6 +304,12 @@ impl<const M: usize> Piece<'_, M> {
                 way
             }
         })
+    }
+
+    /// A phase on the piece, where its speed is known by the length of the path; its numbers must be good.
+    pub fn by_length(&self, phases: &Phases, phase: usize) -> Option<PhaseByLength<M>> {
+        let slope = |u: f64| length(&times(&self.way_scale, &self.curve.derivative(u)));
+        phases.by_length(phase, &self.curve, &self.way_scale, slope)
     }
 
     /// The greatest coordinate of the first control point.

@@ -9,7 +9,7 @@ use super::path::{Bends, Piece, Work};
 use super::phase_motion::ROUNDING;
 use super::plan::JointAudit;
 use crate::curve::Curves;
-use crate::peak::peaks;
+use crate::peak::peak;
 use crate::phase_by_length::PhaseByLength;
 use crate::phases::{is_by_length, PATH_JERK};
 use crate::speed_by_length::Pace;
@@ -72,7 +72,7 @@ pub fn audit_jerk<const M: usize>(audit: &JointAudit<M>, good: &[bool], seen: Se
             |(work, curves), phase| {
                 let mut tally = Tally::default();
                 let number = audit.phases.piece[phase] as usize;
-                let piece = audit.path.piece_on(number, curves.get(number));
+                let piece = audit.path.piece_on(number, curves.get(number).clone());
                 audit.jerks(phase, &piece, work, &mut tally);
                 audit.alone(phase, piece.line, &mut tally);
                 if phase > 0 && good[phase - 1] && !audit.is_first(phase) {
@@ -105,17 +105,17 @@ impl<const M: usize> JointAudit<'_, M> {
         let steps = (covered.ceil() as usize).max(LEAST);
         let share = |i: usize| i as f64 / steps as f64;
         let u: Vec<f64> = (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
-        let Some(motion) = phases.by_length(phase, &piece.curve, &piece.way_scale) else { return };
+        let Some(motion) = piece.by_length(phases, phase) else { return };
         let mut look = |u: f64, tally: &mut Tally<M>| self.look(piece, &motion, u, start, work, tally);
         let used: Vec<Use<M>> = u.iter().map(|&u| look(u, tally)).collect();
         for i in 1..steps {
-            let of = |i: usize| used[i].iter().flatten().copied();
-            let checks = [Check::Acceleration, Check::Jerk].into_iter();
-            let worst = checks.flat_map(|check| (0..M).map(move |k| (check, k)));
-            let worst = worst.map(|(check, k)| tally.get(check, k).ratio);
-            for x in peaks([of(i - 1), of(i), of(i + 1)], worst) {
-                let at = u[i] + 0.5 * x * (u[i + 1] - u[i - 1]);
-                look(at, tally);
+            for (row, check) in [Check::Acceleration, Check::Jerk].into_iter().enumerate() {
+                for k in 0..joints {
+                    let uses = [i - 1, i, i + 1].map(|i| used[i][row][k]);
+                    if let Some(x) = peak(uses, tally.get(check, k).ratio) {
+                        look(u[i] + 0.5 * x * (u[i + 1] - u[i - 1]), tally);
+                    }
+                }
             }
         }
     }

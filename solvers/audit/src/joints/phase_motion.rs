@@ -69,8 +69,7 @@ pub fn motion<const M: usize>(
     } else {
         0.0
     };
-    let by_length =
-        if is_by_length(kind) { phases.by_length(phase, &piece.curve, &piece.way_scale) } else { None };
+    let by_length = if is_by_length(kind) { piece.by_length(phases, phase) } else { None };
     let along: Vec<_> =
         by_length.iter().flat_map(|motion| places.iter().map(|place| motion.place(place.u))).collect();
     let since: Vec<f64> =

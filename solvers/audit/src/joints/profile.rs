@@ -75,7 +75,7 @@ pub(crate) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: S
                 || (audit.path.work(), Curves::new(audit.path.path.pieces)),
                 |(work, curves), &phase| {
                     let number = audit.phases.piece[phase] as usize;
-                    let piece: Piece<M> = audit.path.piece_on(number, curves.get(number));
+                    let piece: Piece<M> = audit.path.piece_on(number, curves.get(number).clone());
                     let places = places(&audit.phases, phase, &piece);
                     let places: Vec<_> = places.into_iter().map(|u| piece.place(u, work)).collect();
                     let states = motion(&piece, &audit.phases, phase, &places, places.len() - 1);

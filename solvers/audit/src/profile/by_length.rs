@@ -1,29 +1,31 @@
 //! Audits one phase whose speed is known by the length of the path, at as many places as its motion needs.
 //!
-//! Velocity, acceleration and jerk of every axis are taken at both ends. `PhaseByLength::change_at_most` bounds how much each of
-//! them can differ between two places:
-//! * where all that it leaves possible is below what was found elsewhere, nothing else is measured;
-//! * where the bound is wide the interval is halved;
+//! Velocity, acceleration and jerk of every axis are taken at both ends. `PhaseByLength::bulge` bounds what they can be between
+//! two places:
+//! * where all of that is below what was found elsewhere, nothing else is measured;
+//! * where it is much above what the two places have the interval is halved;
 //! * elsewhere a parabola through three places tells where a rate is greatest, and it is measured there.
 
 use crate::chord::chord_error;
-use crate::peak::peaks;
-use crate::phase_by_length::{PhaseByLength, Place, Rates};
-use crate::vectors::length;
+use crate::peak::peak;
+use crate::phase_by_length::{PhaseByLength, Place};
+use crate::station::{Rounded, Station};
+use crate::vectors::{length, vector_of};
 use crate::{Check, Limits, Tally, FEEDS, PASS_EXCESS};
 
 /// The next places are this part of the distance beside a vertex, and are taken so often at most.
 const CLOSER: f64 = 0.5;
 const MOST_REFINED: u32 = 3;
 
-/// A parabola follows the rates on so many intervals of a phase that covers its whole piece, for each degree, and of one from
-/// rest; and at least where the bound is wide.
+/// Where the bound is wide a parabola follows the rates on so many intervals of a phase that covers its whole piece, for each
+/// degree, and of one from rest; and at least.
 const PLACES: f64 = 5.0;
 const SPEEDS: f64 = 10.0;
 const LEAST: f64 = 4.0;
 
-/// Bounds wider than this share of a limit are not trusted to a parabola; an interval is halved so often at most.
-const WIDE: f64 = 0.1;
+/// Where more than this share of a limit may be used beyond what both ends use, a parabola is not trusted; an interval is halved
+/// so often at most.
+const WIDE: f64 = 0.03;
 const MOST_HALVINGS: u32 = 6;
 
 /// Shares of the limits that a place uses: velocity, acceleration and jerk of each axis with their signs, then feeds and chord
@@ -34,27 +36,23 @@ struct Use<const M: usize> {
     tip: [f64; FEEDS + 1],
 }
 
-impl<const M: usize> Use<M> {
-    fn all(&self) -> impl Iterator<Item = f64> + '_ {
-        self.rates.iter().flatten().chain(&self.tip).copied()
-    }
-}
-
 /// What a place shows.
 #[derive(Clone, Copy)]
 pub struct Look<const M: usize> {
     pub place: Place,
-    pub rates: Rates<M>,
+    pub station: Station<M>,
+    pub velocity: Rounded<M>,
     used: Use<M>,
 }
 
-/// What a bound says of all places between two.
-struct Between {
-    /// Whether none of them can use more of a limit than is known.
-    is_certain: bool,
-    /// Whether all of them use about as much as the two.
-    is_narrow: bool,
-    is_unbounded: bool,
+/// What is known of all places between two.
+enum Between {
+    /// None of them can use more of a limit than some place that was found.
+    Certain,
+    /// None of them can use much more of a limit than the two.
+    Narrow,
+    Wide,
+    Unbounded,
 }
 
 /// Where and when a phase is, and the limits that hold there.
@@ -69,20 +67,17 @@ pub struct Looker<'a, const M: usize> {
 }
 
 impl<const M: usize> Looker<'_, M> {
-    /// Looks at a phase between two parameters; what both ends show, where the piece has a direction.
-    pub fn phase(&self, [u0, u1]: [f64; 2], tally: &mut Tally<M>) -> [Option<Look<M>>; 2] {
-        let ends = [u0, u1].map(|u| self.look(u, tally));
+    /// Looks at a phase between two parameters, at which it has been looked.
+    pub fn phase(&self, u: [f64; 2], ends: [Option<&Look<M>>; 2], tally: &mut Tally<M>) {
         // At most 1, as speeds are positive; a profile of rubbish has any numbers.
-        let change = match &ends {
+        let change = match ends {
             [Some(from), Some(to)] => {
                 let [from, to] = [from.place.pace.v, to.place.pace.v];
                 ((to - from).abs() / from.max(to)).min(1.0)
             }
             _ => 1.0,
         };
-        let intervals = PLACES * self.covered + SPEEDS * change;
-        self.between(ends.each_ref().map(Option::as_ref), [u0, u1], (0, intervals), tally);
-        ends
+        self.between(ends, u, (0, PLACES * self.covered + SPEEDS * change), tally);
     }
 
     /// Looks between two places where a bound leaves open what lies there.
@@ -95,129 +90,143 @@ impl<const M: usize> Looker<'_, M> {
     ) {
         let bound = match ends {
             [Some(from), Some(to)] => self.bound(from, to, tally),
-            _ => Between { is_certain: false, is_narrow: false, is_unbounded: true },
+            _ => Between::Unbounded,
         };
-        if bound.is_certain {
-            return;
-        }
+        let enough = f64::from(2 << halvings) >= intervals.max(LEAST);
+        let is_followed = match bound {
+            Between::Certain => return,
+            Between::Narrow => true,
+            Between::Wide => enough && !self.motion.is_steady(),
+            Between::Unbounded => enough,
+        };
         let middle = 0.5 * (u[0] + u[1]);
         let here = self.look(middle, tally);
-        let least = if bound.is_narrow { 0.0 } else { LEAST };
-        let enough = f64::from(2 << halvings) >= intervals.max(least);
-        let is_followed = bound.is_narrow || bound.is_unbounded || !self.motion.is_steady();
-        if halvings == MOST_HALVINGS || enough && is_followed {
-            if let ([Some(from), Some(to)], Some(here)) = (ends, &here) {
-                self.refine([from, here, to], 0, tally);
-            }
-            return;
+        if halvings < MOST_HALVINGS && !is_followed {
+            self.between([ends[0], here.as_ref()], [u[0], middle], (halvings + 1, intervals), tally);
+            self.between([here.as_ref(), ends[1]], [middle, u[1]], (halvings + 1, intervals), tally);
         }
-        self.between([ends[0], here.as_ref()], [u[0], middle], (halvings + 1, intervals), tally);
-        self.between([here.as_ref(), ends[1]], [middle, u[1]], (halvings + 1, intervals), tally);
+        // Also over both halves: a peak next to the middle may be beyond it by the parabola of either.
+        if let ([Some(from), Some(to)], Some(here)) = (ends, &here) {
+            self.refine([from, here, to], 0, tally);
+        }
     }
 
     /// Looks where parabolas through three even places say that a rate is greater than any so far, and beside it: one rate
     /// after the other.
     fn refine(&self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
+        let mut peaks = Vec::new();
+        for (row, check) in RATES.into_iter().enumerate() {
+            for k in 0..M {
+                let uses = places.map(|look| look.used.rates[row][k]);
+                peaks.extend(peak(uses, tally.get(check, k).ratio));
+            }
+        }
+        for i in 0..=FEEDS {
+            let check = if i == FEEDS { Check::Chord } else { Check::Feed };
+            peaks.extend(peak(places.map(|look| look.used.tip[i]), tally.get(check, 0).ratio));
+        }
         let [first, middle, last] = places.map(|look| look.place.u);
-        for x in peaks(places.map(|look| look.used.all()), worst(tally)) {
+        for x in peaks {
             let half = 0.5 * (last - first);
             let centre = middle + x * half;
             let side = CLOSER * half.min(centre - first).min(last - centre);
             let around = [centre - side, centre, centre + side].map(|u| self.look(u, tally));
-            if let ([Some(a), Some(b), Some(c)], true) = (around, depth < MOST_REFINED) {
-                self.refine([&a, &b, &c], depth + 1, tally);
+            if let ([Some(a), Some(b), Some(c)], true) = (&around, depth < MOST_REFINED) {
+                self.refine([a, b, c], depth + 1, tally);
             }
         }
     }
 
-    /// Offers what a place shows.
     fn look(&self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
+        Some(self.look_at(&self.motion.station(u)?, tally))
+    }
+
+    /// Offers what a place shows.
+    pub fn look_at(&self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
         let (limits, line) = (self.limits, self.line);
-        let place = self.motion.place(u);
-        let rates = self.motion.rates(&place)?;
+        let place = self.motion.place(station.u);
+        let pace = place.pace;
+        let mut velocity = station.velocity(pace.v);
+        let speed_rounding = self.motion.speed_rounding(pace, station.slope);
+        for k in 0..M {
+            velocity.rounding[k] += speed_rounding * station.first.value[k].abs();
+        }
         // Asked for where a limit is used more than before, which is seldom.
         let time = || self.start + self.motion.since(&place);
         tally.samples += 1;
         let mut used = Use { rates: [[0.0; M]; 3], tip: [0.0; FEEDS + 1] };
-        let judged = if limits.judges_jerk { 3 } else { 2 };
-        for k in 0..M {
-            let of = [
-                (Check::Velocity, &rates.velocity, limits.velocity.of(k, rates.velocity.value[k])),
-                (
-                    Check::Acceleration,
-                    &rates.acceleration,
-                    limits.acceleration.of(k, rates.acceleration.value[k]),
-                ),
-                (Check::Jerk, &rates.jerk, limits.jerk[k]),
-            ];
-            for (row, (check, rate, limit)) in of.into_iter().enumerate().take(judged) {
-                let value = rate.value[k].abs() - rate.rounding[k];
-                used.rates[row][k] = value.max(0.0).copysign(rate.value[k]) / limit;
-                tally.offer_at(check, k, value, limit, line, time);
+        let mut offer = |check: Check, rate: &Rounded<M>, limit: [f64; M]| {
+            let row = &mut used.rates[check as usize - Check::Velocity as usize];
+            let value: [f64; M] = vector_of(|k| rate.value[k].abs() - rate.rounding[k]);
+            let share = |k: usize| if value[k] <= 0.0 { 0.0 } else { value[k] / limit[k] };
+            *row = vector_of(|k| share(k).copysign(rate.value[k]));
+            for k in 0..M {
+                tally.offer_share(check, k, (value[k], limit[k], row[k].abs()), line, time);
             }
+        };
+        offer(Check::Velocity, &velocity, limits.velocity.of_each(&velocity.value));
+        let acceleration = station.acceleration(pace);
+        offer(Check::Acceleration, &acceleration, limits.acceleration.of_each(&acceleration.value));
+        if limits.judges_jerk {
+            offer(Check::Jerk, &station.jerk(pace), limits.jerk);
         }
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let speed = length(&limits.counted(feed, &rates.velocity.value))
-                - length(&limits.counted(feed, &rates.velocity.rounding));
+            let speed = length(&limits.counted(feed, &velocity.value))
+                - length(&limits.counted(feed, &velocity.rounding));
             used.tip[feed] = speed / limit;
             tally.offer_at(Check::Feed, 0, speed, limit, line, time);
         }
         if limits.chord_tolerance.is_finite() {
-            let speed = length(&rates.velocity.value) - length(&rates.velocity.rounding);
-            let error = chord_error(speed * limits.period, rates.curvature);
+            let speed = length(&velocity.value) - length(&velocity.rounding);
+            let error = chord_error(speed * limits.period, length(&station.second.value));
             used.tip[FEEDS] = error / limits.chord_tolerance;
             tally.offer_at(Check::Chord, 0, error, limits.chord_tolerance, line, time);
         }
-        Some(Look { place, rates, used })
+        Look { place, station: *station, velocity, used }
     }
 
-    /// What the bound between two places says beside what has been found so far.
+    /// What a bound says of the places between two beside what has been found so far.
     fn bound(&self, from: &Look<M>, to: &Look<M>, tally: &Tally<M>) -> Between {
-        let limits = self.limits;
-        let change = self.motion.change_at_most([&from.place, &to.place], [&from.rates, &to.rates]);
-        let (mut is_certain, mut widest) = (true, 0.0_f64);
-        let mut weigh = |check: Check, axis: usize, most: f64, change: f64| {
-            is_certain &= most <= tally.get(check, axis).ratio + PASS_EXCESS;
-            widest = widest.max(change);
+        let (limits, ends) = (self.limits, [&from.used, &to.used]);
+        let Some(bulge) = self.motion.bulge([&from.place, &to.place], [&from.station, &to.station]) else {
+            return Between::Unbounded;
         };
-        let checks = [
-            (Check::Velocity, change.velocity),
-            (Check::Acceleration, change.acceleration),
-            (Check::Jerk, change.jerk),
-        ];
+        let (mut is_certain, mut is_narrow) = (true, true);
+        let mut weigh = |check: Check, axis: usize, known: f64, more: f64| {
+            is_certain &= known + more <= tally.get(check, axis).ratio + PASS_EXCESS;
+            is_narrow &= more <= WIDE;
+        };
         let judged = if limits.judges_jerk { 3 } else { 2 };
         for k in (0..limits.axes).filter(|&k| self.motion.moves(k)) {
             let least = [limits.velocity.least(k), limits.acceleration.least(k), limits.jerk[k]];
-            for (row, (check, change)) in checks.into_iter().enumerate().take(judged) {
-                let change = change / least[row];
-                let most = from.used.rates[row][k].abs().max(to.used.rates[row][k].abs());
-                weigh(check, k, most + change, change);
+            for (row, check) in RATES.into_iter().enumerate().take(judged) {
+                let [near, far] = ends.map(|used| used.rates[row][k].abs());
+                weigh(check, k, near.max(far), bulge.rates[row] / least[row]);
             }
         }
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let known = from.used.tip[feed].max(to.used.tip[feed]);
+            let [near, far] = ends.map(|used| used.tip[feed]);
+            let known = near.max(far);
             // No share of the speed along the path is greater than that speed.
-            let most = (known + change.velocity / limit).min(change.most_speed / limit);
-            weigh(Check::Feed, 0, most, most - known);
+            weigh(Check::Feed, 0, known, (bulge.rates[0] / limit).min(bulge.most_speed / limit - known));
         }
         if limits.chord_tolerance.is_finite() {
-            let curved = from.rates.curvature.max(to.rates.curvature) + change.curvature;
-            let most = chord_error(change.most_speed * limits.period, curved) / limits.chord_tolerance;
-            weigh(Check::Chord, 0, most, most - from.used.tip[FEEDS].max(to.used.tip[FEEDS]));
+            let [near, far] = [from, to].map(|look| length(&look.station.second.value));
+            let curvature = near.max(far) + bulge.curvature;
+            let most = chord_error(bulge.most_speed * limits.period, curvature) / limits.chord_tolerance;
+            let [near, far] = ends.map(|used| used.tip[FEEDS]);
+            weigh(Check::Chord, 0, near.max(far), most - near.max(far));
         }
-        let is_unbounded = change.velocity == f64::INFINITY;
-        Between { is_certain: is_certain && !is_unbounded, is_narrow: widest <= WIDE, is_unbounded }
+        match () {
+            () if is_certain => Between::Certain,
+            () if is_narrow => Between::Narrow,
+            () => Between::Wide,
+        }
     }
 }
-/// The worst shares so far, in the order of `Use::all`; all feeds are one check.
-fn worst<const M: usize>(tally: &Tally<M>) -> impl Iterator<Item = f64> + '_ {
-    let of_axes = [Check::Velocity, Check::Acceleration, Check::Jerk].into_iter();
-    let of_tip = std::iter::repeat_n(Check::Feed, FEEDS).chain([Check::Chord]);
-    of_axes
-        .flat_map(|check| (0..M).map(move |k| (check, k)))
-        .chain(of_tip.map(|check| (check, 0)))
-        .map(|(check, k)| tally.get(check, k).ratio)
-}
+
+/// The rates of an axis in the order of `Use`.
+const RATES: [Check; 3] = [Check::Velocity, Check::Acceleration, Check::Jerk];
 
 #[cfg(test)]
 mod tests {
@@ -255,7 +264,7 @@ mod tests {
             pieces: 1,
             runs: &[0, 1],
         }
-        .by_length(0, curve, &[1.0; 2])
+        .by_length(0, curve, &[1.0; 2], |u| length(&curve.derivative(u)))
         .unwrap()
     }
 
@@ -282,8 +291,9 @@ mod tests {
             let mut most = [[0.0_f64; 2]; 3];
             for i in 0..=2000 {
                 let at = u[0] + (u[1] - u[0]) * f64::from(i) / 2000.0;
-                let rates = motion.rates(&motion.place(at)).unwrap();
-                for (row, rate) in [rates.velocity, rates.acceleration, rates.jerk].iter().enumerate() {
+                let (Place { pace, .. }, station) = (motion.place(at), motion.station(at).unwrap());
+                let rates = [station.velocity(pace.v), station.acceleration(pace), station.jerk(pace)];
+                for (row, rate) in rates.iter().enumerate() {
                     for k in 0..2 {
                         most[row][k] = most[row][k].max(rate.value[k].abs());
                     }
@@ -309,7 +319,8 @@ mod tests {
             let mut tally = Tally::default();
             let (feeds, covered) = ([f64::INFINITY; FEEDS], curve.turns() as f64 * (u[1] - u[0]) / width);
             let looker = Looker { motion: &motion, limits: &limits, feeds, covered, start: 0.0, line: 1 };
-            looker.phase(u, &mut tally);
+            let ends = u.map(|u| looker.look(u, &mut tally));
+            looker.phase(u, ends.each_ref().map(Option::as_ref), &mut tally);
             for (row, check) in [Check::Velocity, Check::Acceleration, Check::Jerk].into_iter().enumerate() {
                 for k in (0..2).filter(|&k| most[row][k] > 1e-6) {
                     prop_assert!(tally.get(check, k).ratio > 1.0, "{check:?} {k}: {}", tally.get(check, k).ratio);

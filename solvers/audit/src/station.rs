@@ -1,0 +1,164 @@
+//! A place of a path by the length s along it: dq/ds, d²q/ds² and d³q/ds³ of all axes, and from them their velocities,
+//! accelerations and jerks at a speed v, an acceleration a and a jerk j along the path.
+//!
+//! q̇ = q_s v, q̈ = q_s a + q_ss v², q⃛ = q_s j + 3 q_ss v a + q_sss v³. On a curve C(u) with g = |C'|, the unit tangent
+//! T = C'/g and ₜ for the part along T: q_s = T, q_ss = (C'' − C''ₜ T)/g², and
+//! q_sss = (C''' − 3 C''ₜ/g (C'' − C''ₜ T) − (C'''ₜ + |C'' − C''ₜ T|²/g) T)/g³.
+
+use super::curve::{Curve, Curves, Pieces};
+use super::speed_by_length::Pace;
+use super::vectors::{inner, length, vector_of};
+use super::{EPS, ROUNDINGS};
+
+/// Where |C'| is below this share of its size the piece has no direction to speak of.
+const STILL: f64 = 1e-6;
+
+/// A vector, and what of it may be rounding.
+#[derive(Clone, Copy, Debug)]
+pub struct Rounded<const M: usize> {
+    pub value: [f64; M],
+    pub rounding: [f64; M],
+}
+
+/// A place, and what is known there whatever the speed.
+#[derive(Clone, Copy, Debug)]
+pub struct Station<const M: usize> {
+    pub u: f64,
+    /// ds/du.
+    pub slope: f64,
+    pub first: Rounded<M>,
+    pub second: Rounded<M>,
+    pub third: Rounded<M>,
+}
+
+impl<const M: usize> Station<M> {
+    /// The place u of a piece; none where that has no direction.
+    pub fn new(curve: &Curve<M>, u: f64) -> Option<Self> {
+        let [c1, c2, c3] = curve.derivatives(u);
+        let [size1, size2, size3] = curve.derivative_sizes();
+        let (g, most1) = (length(&c1), length(&size1));
+        if g.is_nan() || g <= STILL * most1 {
+            return None;
+        }
+        let per = 1.0 / g;
+        let (per2, per3) = (per * per, per * per * per);
+        let direction = vector_of::<M>(|k| c1[k] * per);
+        let (along2, along3) = (inner(&direction, &c2), inner(&direction, &c3));
+        let across: [f64; M] = vector_of(|k| c2[k] - along2 * direction[k]);
+        let turned = inner(&across, &across) * per;
+        let bent = 3.0 * along2 * per;
+        // What is rounded in C', C'' and C''' is felt in g and its derivatives as well.
+        let (most2, most3) = (length(&size2), length(&size3));
+        let felt = most1 * per;
+        let felt2 = felt * felt;
+        let along = along2.abs() * per;
+        let of_change = (turned + (bent * along2).abs() + along3.abs()) * per;
+        let most_change = felt * (4.0 * felt * most2 * most2 * per + most3);
+        let unit = ROUNDINGS * EPS;
+        let (unit1, unit2, unit3) = (unit * per, unit * per2, unit * per3);
+        Some(Self {
+            u,
+            slope: g,
+            first: Rounded {
+                value: direction,
+                rounding: vector_of(|k| unit1 * (size1[k] + c1[k].abs() * felt)),
+            },
+            second: Rounded {
+                value: vector_of(|k| across[k] * per2),
+                rounding: vector_of(|k| {
+                    let taken = size1[k] * along + felt2 * direction[k].abs() * most2;
+                    unit2 * (taken + felt * (size2[k] + c2[k].abs()))
+                }),
+            },
+            third: Rounded {
+                value: vector_of(|k| (c3[k] - bent * across[k] - (along3 + turned) * direction[k]) * per3),
+                rounding: vector_of(|k| {
+                    let taken = size1[k] * of_change + direction[k].abs() * most_change;
+                    let inside = size2[k] * along + c2[k].abs() * felt * most2 * per;
+                    unit3 * (taken + 3.0 * inside + size3[k] * felt)
+                }),
+            },
+        })
+    }
+
+    pub fn velocity(&self, v: f64) -> Rounded<M> {
+        Rounded {
+            value: vector_of(|k| self.first.value[k] * v),
+            rounding: vector_of(|k| self.first.rounding[k] * v),
+        }
+    }
+
+    pub fn acceleration(&self, Pace { v, a, .. }: Pace) -> Rounded<M> {
+        let (size, square) = (a.abs(), v * v);
+        let Self { first, second, .. } = self;
+        Rounded {
+            value: vector_of(|k| first.value[k] * a + second.value[k] * square),
+            rounding: vector_of(|k| first.rounding[k] * size + second.rounding[k] * square),
+        }
+    }
+
+    pub fn jerk(&self, Pace { v, a, j }: Pace) -> Rounded<M> {
+        let (mixed, cube) = (3.0 * v * a, v * v * v);
+        let Self { first, second, third, .. } = self;
+        Rounded {
+            value: vector_of(|k| first.value[k] * j + second.value[k] * mixed + third.value[k] * cube),
+            rounding: vector_of(|k| {
+                first.rounding[k] * j.abs() + second.rounding[k] * mixed.abs() + third.rounding[k] * cube
+            }),
+        }
+    }
+}
+
+/// Stations of pieces one after the other: the last two are kept, as a phase begins where the one before ends.
+pub struct Stations<'a, const M: usize> {
+    pub curves: Curves<'a, M>,
+    kept: [Option<(usize, Station<M>)>; 2],
+    older: usize,
+}
+
+impl<'a, const M: usize> Stations<'a, M> {
+    pub fn new(pieces: Pieces<'a>) -> Self {
+        Self { curves: Curves::new(pieces), kept: [None, None], older: 0 }
+    }
+
+    /// The place u of piece `i`; none where that has no direction.
+    pub fn get(&mut self, i: usize, u: f64) -> Option<&Station<M>> {
+        let is_here = |kept: &Option<(usize, Station<M>)>| matches!(kept, Some((piece, at)) if *piece == i && at.u == u);
+        let number = match self.kept.iter().position(is_here) {
+            Some(number) => number,
+            None => {
+                let (station, number) = (Station::new(self.curves.get(i), u)?, self.older);
+                self.kept[number] = Some((i, station));
+                self.older = 1 - number;
+                number
+            }
+        };
+        self.kept[number].as_ref().map(|(_, station)| station)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Quadratic;
+    use crate::vectors::distance;
+
+    #[test]
+    fn on_a_parabola_acceleration_and_jerk_are_those_of_its_parameter() {
+        // C = (x, x²/2) with x = 1 + 2 t + 3 t² + 4 t³ at t = 0, where ẋ = 2, ẍ = 6, x⃛ = 24: v = √2 ẋ at x = 1.
+        let curve = Curve::Quadratic(Quadratic::new(&[[0.0, 0.0], [1.0, 0.0], [2.0, 2.0]], 2.0));
+        let [dx, ddx, dddx] = [2.0, 6.0, 24.0];
+        let velocity: [f64; 2] = [dx, dx];
+        let acceleration: [f64; 2] = [ddx, ddx + dx * dx];
+        let jerk: [f64; 2] = [dddx, dddx + 3.0 * dx * ddx];
+        // v² = q̇·q̇, v a = q̇·q̈, a² + v j = q̈·q̈ + q̇·q⃛.
+        let v = length(&velocity);
+        let a = inner(&velocity, &acceleration) / v;
+        let j = (inner(&acceleration, &acceleration) + inner(&velocity, &jerk) - a * a) / v;
+        let (pace, station) = (Pace { v, a, j }, Station::new(&curve, 1.0).unwrap());
+        assert!(distance(&station.velocity(v).value, &velocity) < 1e-14);
+        assert!(distance(&station.acceleration(pace).value, &acceleration) < 1e-13);
+        assert!(distance(&station.jerk(pace).value, &jerk) < 1e-13, "{:?}", station.jerk(pace));
+        assert!(length(&station.jerk(pace).rounding) < 1e-11, "{:?}", station.jerk(pace));
+    }
+}
