@@ -30,7 +30,7 @@ mod tests {
         assert!(peak(top, 1.0 + 1e-4).is_some(), "the third order may raise it as much");
         assert_eq!(peak(top, 1.001), None);
         assert_eq!(peak(of(|_| 1.0), 0.0), None);
-        assert_eq!(peak(of(|x| 0.001 - 0.01 * x * x), 0.0), None, "it is less than an end");
+        assert_eq!(peak(of(|x| -1.0 - 0.01 * x * x), 0.0), None, "it is less than an end");
         assert_eq!(peak(of(|x| 1.0 - 0.01 * (x - 3.0).powi(2)), 0.0), None, "it is beyond the places");
     }
 }
