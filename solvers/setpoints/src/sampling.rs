@@ -254,6 +254,8 @@ impl<const M: usize> Sampler<M> {
         let mut chunk = Chunk::with_size(pieces.len());
         let cuts: Vec<usize> = (0..pieces.len()).step_by(BLOCK).skip(1).collect();
         chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
+            // Places come mostly in the order of the path, many on one phase.
+            let mut kept = None;
             for i in 0..part.t.len() {
                 watch.check_at(i);
                 let (piece, u) = (pieces[part.start + i], u[part.start + i]);
@@ -265,9 +267,12 @@ impl<const M: usize> Sampler<M> {
                     continue;
                 };
                 let run = &self.runs[self.runs.partition_point(|run| run.phases.end <= after)];
-                let motion = self.path.motion(found);
+                if kept.as_ref().is_none_or(|(phase, _)| *phase != after) {
+                    kept = Some((after, self.path.motion(found)));
+                }
+                let Some((_, motion)) = &kept else { unreachable!("a motion is kept") };
                 let state = motion.at(u.clamp(found.u0, found.u1));
-                self.set(&mut part, i, after, &motion, &state);
+                self.set(&mut part, i, after, motion, &state);
                 part.t[i] = run.begin + self.starts[after] + state.pace.t;
             }
         });
