@@ -11,7 +11,7 @@ mod by_length;
 use rayon::prelude::*;
 
 use super::chord::chord_error;
-use super::curve::{Curves, Followed};
+use super::curve::Followed;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
 use super::phases::Phases;
@@ -33,6 +33,9 @@ const NEAR: f64 = 0.9;
 /// of the phase: their time would have no digits.
 const HIDDEN: f64 = 1e-7;
 const SHORTEST: f64 = 1e-8;
+
+/// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
+const SMOOTH: f64 = 1e-9;
 
 /// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
@@ -56,7 +59,7 @@ pub(crate) fn audit_profile<const M: usize>(
                 tell(seen, i);
                 auditor.phase(i, &mut stations, &mut tally);
                 if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
-                    auditor.joint(i - 1, i, &mut stations.curves, &mut tally);
+                    auditor.joint(i - 1, i, &mut stations, &mut tally);
                 }
             }
             tally
@@ -170,7 +173,7 @@ impl<const M: usize> Auditor<'_, M> {
 
     fn jerks(&self) -> Jerks<'_, M> {
         let Self { phases, limits, starts, .. } = *self;
-        Jerks { phases, limits, starts }
+        Jerks { phases, limits, starts, smooth: SMOOTH }
     }
 
     /// The recorded p at both ends against what the phase's definition gives there, as a jump of axis velocity. A place is
@@ -250,7 +253,7 @@ impl<const M: usize> Auditor<'_, M> {
     }
 
     /// The change from one phase to the next: no jump of the speed, and of the axis velocities only at corners.
-    fn joint(&self, i: usize, j: usize, curves: &mut Curves<M>, tally: &mut Tally<M>) {
+    fn joint(&self, i: usize, j: usize, stations: &mut Stations<M>, tally: &mut Tally<M>) {
         let phases = self.phases;
         if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, self.path.axes)) {
             return; // reported with the phase itself
@@ -260,7 +263,7 @@ impl<const M: usize> Auditor<'_, M> {
         let mut velocity = [[0.0; M]; 2];
         let mut rounding = [0.0; M];
         for (side, (piece, u, p)) in ends.into_iter().enumerate() {
-            let curve = curves.get(piece);
+            let curve = stations.curves.get(piece);
             let (tangent, root_p) = (curve.derivative(u), p.sqrt());
             let scale = ROUNDINGS * EPS * root_p;
             let size = curve.derivative_size();
@@ -274,7 +277,8 @@ impl<const M: usize> Auditor<'_, M> {
         }
         let (time, line) = (self.starts[j], self.line(after));
         if self.limits.judges_jerk {
-            self.jerks().joint(i, j, curves, line, tally);
+            let station = |piece: usize, u: f64| stations.get(piece, u).copied();
+            self.jerks().joint([i, j], station, line, tally);
         }
         let at_corner = if before == after { 0.0 } else { 1.0 };
         for k in 0..M {
@@ -290,7 +294,7 @@ impl<const M: usize> Auditor<'_, M> {
             for junction in before + 1..=after {
                 let allowed = self.junction_speed[junction] + self.negligible_speed();
                 tally.offer(Check::Junction, 0, speeds[0].max(speeds[1]), allowed, time, line);
-                if !curves.get(junction).is_motionless() {
+                if !stations.curves.get(junction).is_motionless() {
                     break;
                 }
             }

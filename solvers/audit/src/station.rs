@@ -81,6 +81,40 @@ impl<const M: usize> Station<M> {
         })
     }
 
+    /// Of joints by their first three derivatives by u and g with its first two, each with how wrong it may be:
+    /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³. Where nothing is
+    /// known of a derivative its rounding is as great as any number.
+    pub fn of_joints(u: f64, joints: &[([f64; M], [f64; M]); 3], way: [(f64, f64); 3]) -> Self {
+        let [(q1, e1), (q2, e2), (q3, e3)] = joints;
+        let [(g, _), (dg, dg_error), (ddg, ddg_error)] = way;
+        let per = 1.0 / g;
+        let (turn, turn_error) = (dg * per, dg_error * per);
+        let (bend, size) = (3.0 * turn * turn - ddg * per, 3.0 * turn * turn + ddg.abs() * per);
+        let bend_error = 6.0 * turn.abs() * turn_error + ddg_error * per;
+        let unit = 2.0 * ROUNDINGS * EPS;
+        let rounded = |scale: f64, value: &dyn Fn(usize) -> f64, error: &dyn Fn(usize) -> f64| Rounded {
+            value: vector_of(|k| scale * value(k)),
+            rounding: vector_of(|k| {
+                Some(scale * error(k)).filter(|error| error.is_finite()).unwrap_or(f64::MAX)
+            }),
+        };
+        let turn_size = turn.abs();
+        Self {
+            u,
+            slope: g,
+            first: rounded(per, &|k| q1[k], &|k| e1[k] + unit * q1[k].abs()),
+            second: rounded(per * per, &|k| q2[k] - q1[k] * turn, &|k| {
+                let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
+                wrong + unit * (q2[k].abs() + q1[k].abs() * turn_size)
+            }),
+            third: rounded(per * per * per, &|k| q3[k] - 3.0 * q2[k] * turn + q1[k] * bend, &|k| {
+                let wrong = e3[k] + 3.0 * (e2[k] * turn_size + q2[k].abs() * turn_error);
+                let terms = q3[k].abs() + 3.0 * q2[k].abs() * turn_size + q1[k].abs() * size;
+                wrong + e1[k] * size + q1[k].abs() * bend_error + unit * terms
+            }),
+        }
+    }
+
     pub fn velocity(&self, v: f64) -> Rounded<M> {
         Rounded {
             value: vector_of(|k| self.first.value[k] * v),

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::formula::{Formula, Jet};
 use crate::curve::{Curve, Followed};
 use crate::phase_by_length::PhaseByLength;
-use crate::phases::Phases;
+use crate::phases::{is_by_length, Phases};
+use crate::station::Station;
 use crate::vectors::length;
 use crate::{EPS, ROUNDINGS};
 
@@ -83,13 +84,7 @@ pub struct Place<const M: usize> {
 }
 
 /// A number of each joint, and how wrong it may be.
-type Rows<const M: usize> = ([f64; M], [f64; M]);
-
-/// First to third derivatives by u of the joints and of the way, each with how wrong it may be.
-pub struct Bends<const M: usize> {
-    pub joints: [Rows<M>; 3],
-    pub way: [(f64, f64); 3],
-}
+pub type Rows<const M: usize> = ([f64; M], [f64; M]);
 
 /// Results of a formula, kept from place to place.
 pub struct Work {
@@ -246,8 +241,12 @@ impl<const M: usize> Piece<'_, M> {
             value: [tip[k], slope[k]],
             error: [TIP_ROUNDINGS * self.size, TIP_ROUNDINGS * self.slope_size[k]],
         });
-        let (position, unknown) = self.joint_rows(&work.slopes, 0);
-        let (joint_slope, slope_error) = self.joint_rows(&work.slopes, 1);
+        self.place_of(u, tip, slope, &work.slopes)
+    }
+
+    fn place_of<const N: usize>(&self, u: f64, tip: [f64; M], slope: [f64; M], table: &[Jet<N>]) -> Place<M> {
+        let (position, unknown) = self.joint_rows(table, 0);
+        let (joint_slope, slope_error) = self.joint_rows(table, 1);
         Place {
             u,
             tip,
@@ -260,8 +259,8 @@ impl<const M: usize> Piece<'_, M> {
         }
     }
 
-    /// First to third derivatives of the joints by u, and of the way, each with how wrong it may be.
-    pub fn bends(&self, u: f64, work: &mut Work) -> Bends<M> {
+    /// The same, and the first three derivatives of the joints by the length of the way.
+    pub fn station(&self, u: f64, work: &mut Work) -> (Place<M>, Station<M>) {
         let tip = self.curve.at(u);
         let (slopes, sizes) = (self.curve.derivatives(u), self.curve.derivative_sizes());
         self.fill(&mut work.bends, |k| {
@@ -274,7 +273,6 @@ impl<const M: usize> Piece<'_, M> {
                 error: std::array::from_fn(|order| TIP_ROUNDINGS * term(order).1),
             }
         });
-        let joints = [1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
         // |C'|² by its axes.
         let mut square = Jet::<3>::constant(0.0);
         for k in 0..M {
@@ -290,7 +288,9 @@ impl<const M: usize> Piece<'_, M> {
             }
         }
         let way = square.root();
-        Bends { joints, way: std::array::from_fn(|order| (way.value[order], EPS * way.error[order])) }
+        let way = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
+        let joints = [1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
+        (self.place_of(u, tip, slopes[0], &work.bends), Station::of_joints(u, &joints, way))
     }
 
     /// From one position to another, both of this piece, or the first of an `other` one: joints that turn on one of them
@@ -308,6 +308,9 @@ impl<const M: usize> Piece<'_, M> {
 
     /// A phase on the piece, where its speed is known by the length of the path; its numbers must be good.
     pub fn by_length(&self, phases: &Phases, phase: usize) -> Option<PhaseByLength<M>> {
+        if !is_by_length(phases.kind[phase]) {
+            return None;
+        }
         let slope = |u: f64| length(&times(&self.way_scale, &self.curve.derivative(u)));
         phases.by_length(phase, &self.curve, &self.way_scale, slope)
     }

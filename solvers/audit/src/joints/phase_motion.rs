@@ -6,10 +6,9 @@
 //! and time follow from the length of the way along the path.
 
 use super::path::{Piece, Place};
+use crate::phase_by_length::PhaseByLength;
 use crate::phase_time::MOST_HALVINGS;
-use crate::phases::{
-    is_by_length, Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE,
-};
+use crate::phases::{Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION};
 use crate::speed_by_length::integral;
 use crate::{EPS, ROUNDINGS};
 
@@ -37,7 +36,50 @@ pub struct State<const M: usize> {
     pub time_error: f64,
 }
 
-/// The joints on a phase, whose numbers must be good, at places from end to end; the first `timed` steps have times.
+/// The joints at places, as if they did not move.
+fn at_rest<const M: usize>(piece: &Piece<M>, places: &[Place<M>]) -> Vec<State<M>> {
+    let mut states = vec![State::STILL; places.len()];
+    for i in 1..states.len() {
+        let step = piece.between(&places[i - 1].position, &places[i].position, None);
+        states[i].way = std::array::from_fn(|k| states[i - 1].way[k] + step[k]);
+    }
+    states
+}
+
+/// The joints at places of a phase whose speed is known by the length of the way.
+pub fn motion_by_length<const M: usize>(
+    piece: &Piece<M>,
+    motion: &PhaseByLength<M>,
+    places: &[Place<M>],
+) -> Vec<State<M>> {
+    let mut states = at_rest(piece, places);
+    let mut before = 0.0;
+    for (i, (state, place)) in states.iter_mut().zip(places).enumerate() {
+        let here = motion.place(place.u);
+        state.root_p = here.pace.v / place.way_slope;
+        for k in 0..M {
+            state.velocity[k] = place.slope[k] * state.root_p;
+            let rounding =
+                if state.velocity[k] == 0.0 { 0.0 } else { 2.0 * ROUNDING * state.velocity[k].abs() };
+            state.velocity_error[k] = place.slope_error[k] * state.root_p + rounding;
+        }
+        let since = motion.since(&here);
+        if i > 0 && place.u != places[i - 1].u {
+            state.time = since - before;
+            // The rounding of a time, not only of a step.
+            state.time_error = if state.time > 0.0 {
+                ROUNDING * (1.0 + since.abs().max(before.abs()) / state.time)
+            } else {
+                ROUNDING * (1.0 + piece.width / (place.u - places[i - 1].u))
+            };
+        }
+        before = since;
+    }
+    states
+}
+
+/// The joints on a phase, whose numbers must be good and whose speed is not known by the length, at places from end to end; the
+/// first `timed` steps have times.
 pub fn motion<const M: usize>(
     piece: &Piece<M>,
     phases: &Phases,
@@ -48,11 +90,7 @@ pub fn motion<const M: usize>(
     let (kind, value, last) = (phases.kind[phase], phases.value[phase], places.len() - 1);
     let p = [phases.p0[phase], phases.p1[phase]];
     let own = Some(phases.axis[phase] as usize).filter(|&axis| axis < piece.joints()).unwrap_or(0);
-    let mut states: Vec<State<M>> = places.iter().map(|_| State::STILL).collect();
-    for i in 1..states.len() {
-        let step = piece.between(&places[i - 1].position, &places[i].position, None);
-        states[i].way = std::array::from_fn(|k| states[i - 1].way[k] + step[k]);
-    }
+    let mut states = at_rest(piece, places);
     let own_slope = |i: usize| places[i].slope[own].abs();
     let unknown = places.iter().map(|place| place.unknown[own]).fold(0.0, f64::max);
     // The speed of the phase's own joint, from the slower end where it accelerates.
@@ -69,11 +107,6 @@ pub fn motion<const M: usize>(
     } else {
         0.0
     };
-    let by_length = if is_by_length(kind) { piece.by_length(phases, phase) } else { None };
-    let along: Vec<_> =
-        by_length.iter().flat_map(|motion| places.iter().map(|place| motion.place(place.u))).collect();
-    let since: Vec<f64> =
-        by_length.iter().flat_map(|motion| along.iter().map(|place| motion.since(place))).collect();
     let (u0, u1) = (places[0].u, places[last].u);
     let feed_sq = [places[0].feed_slope.powi(2) * p[0], places[last].feed_slope.powi(2) * p[1]];
     let line = |u: f64| (feed_sq[0] + (feed_sq[1] - feed_sq[0]) * ((u - u0) / (u1 - u0))).sqrt();
@@ -98,8 +131,7 @@ pub fn motion<const M: usize>(
             }
             PARAMETER_ACCELERATION => ((p_slow + 2.0 * value * (place.u - u_slow)).sqrt(), ROUNDING),
             FEED => (value.sqrt() / place.feed_slope, ROUNDING),
-            SPEED_LINE => (line(place.u) / place.feed_slope, ROUNDING),
-            _ => (along[i].pace.v / place.way_slope, ROUNDING),
+            _ => (line(place.u) / place.feed_slope, ROUNDING),
         };
         // Where rounding hides how the phase's own joint moves, its recorded ends tell: p changes little there.
         let known = 0.5 * (p[1] - p[0]).abs() / p[0].max(p[1]) + ROUNDING;
@@ -132,23 +164,15 @@ pub fn motion<const M: usize>(
             continue;
         }
         let rounding = ROUNDING * (1.0 + piece.width / step);
-        let (mut time, mut error) = match kind {
+        let (time, error) = match kind {
             PARAMETER_ACCELERATION => (2.0 * step / (a.root_p + b.root_p), rounding),
             FEED => (integral(&feed_rate, from, to, &mut { MOST_HALVINGS }), rounding),
-            SPEED_LINE => (integral(&feed_line, from, to, &mut { MOST_HALVINGS }), rounding),
+            _ if !governs => (integral(&feed_line, from, to, &mut { MOST_HALVINGS }), rounding),
             _ => {
                 let way = (b.way[own] - a.way[own]).abs();
                 by_joint([a, b], step, way, unknown, accelerates.then_some(value.abs()), rounding)
             }
         };
-        if by_length.is_some() {
-            time = since[i] - since[i - 1];
-            // The rounding of a time, not only of a step.
-            if time > 0.0 {
-                let longest = since[1..].iter().map(|since| since.abs()).fold(0.0, f64::max);
-                error = ROUNDING * (1.0 + longest / time);
-            }
-        }
         (states[i].time, states[i].time_error) = (time, error);
     }
     states

@@ -1,16 +1,18 @@
 //! Audits a profile whose limits belong to joints that are not the path's axes.
 //!
-//! Every phase is sampled at some ten places. Between two of them the acceleration of a joint is the difference of its
-//! velocities over the time; what velocities and times may be wrong by is allowed for.
+//! Every phase is sampled at some ten places, or where its speed is known by the length at as many as its piece needs. Between
+//! two of them the acceleration of a joint is the difference of its velocities over the time; what velocities and times may be
+//! wrong by is allowed for.
 
 use rayon::prelude::*;
 
-use super::path::{Piece, Place, TURN};
-use super::phase_jerk::audit_jerk;
-use super::phase_motion::{motion, State, ROUNDING};
+use super::path::{Piece, Place, Work, TURN};
+use super::phase_motion::{motion, motion_by_length, State, ROUNDING};
 use super::plan::JointAudit;
 use crate::curve::Curves;
-use crate::phases::{is_by_length, Phases};
+use crate::phase_jerk::Jerks;
+use crate::phases::{self, Phases};
+use crate::station::Station;
 use crate::vectors::length;
 use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
 
@@ -18,8 +20,16 @@ use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
 /// their extremes.
 const PLACES: [f64; 11] = [0.0, 1.0 / 64.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 63.0 / 64.0, 1.0];
 
-/// Phases measured at once: the memory for their places stays below some 30 MB.
+/// Where the speed is known by the length: steps of a phase that covers its whole piece, for each degree, and at least.
+const STEPS: f64 = 4.0;
+const LEAST: usize = 2;
+
+/// Phases measured at once: the memory for their places stays below some 30 MB. Phases a thread takes at a time.
 const CHUNK: usize = 2048;
+const BLOCK: usize = 256;
+
+/// Joints that leave a joint at a smaller angle than this, in rad, pass without a corner.
+const SMOOTH: f64 = 1e-6;
 
 /// The chord error is measured with tangents this share of the piece apart.
 const TANGENTS: f64 = 1e-4;
@@ -69,59 +79,97 @@ pub(crate) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: S
     let mut reach = Reach { ends: [nowhere; M], last: None, turns: [f64::NAN; M] };
     let mut before: Option<End<M>> = None;
     for chunk in phases.chunks(CHUNK) {
-        let measured: Vec<(Measured<M>, Tally<M>)> = chunk
-            .par_iter()
-            .map_init(
-                || (audit.path.work(), Curves::new(audit.path.path.pieces)),
-                |(work, curves), &phase| {
-                    let number = audit.phases.piece[phase] as usize;
-                    let piece: Piece<M> = audit.path.piece_on(number, curves.get(number).clone());
-                    let places = places(&audit.phases, phase, &piece);
-                    let places: Vec<_> = places.into_iter().map(|u| piece.place(u, work)).collect();
-                    let states = motion(&piece, &audit.phases, phase, &places, places.len() - 1);
-                    let (own, mut tally) = (Measured { phase, piece, places, states }, Tally::default());
+        let measured: Vec<(Vec<Measured<M>>, Tally<M>)> = chunk
+            .par_chunks(BLOCK)
+            .map(|phases| {
+                let mut tally = Tally::default();
+                let mut measurer = Measurer::new(audit);
+                let measured = phases.iter().map(|&phase| {
+                    let own = measurer.measure(phase, phase > 0 && good[phase - 1], &mut tally);
                     audit.phase(&own, &mut tally);
-                    (own, tally)
-                },
-            )
+                    own
+                });
+                (measured.collect(), tally)
+            })
             .collect();
-        for (own, found) in measured {
+        for (block, found) in measured {
             tally = tally.merge(found);
-            audit.follow(&mut reach, &own);
-            before = Some(audit.joint(before, own, &mut tally));
+            for own in block {
+                audit.follow(&mut reach, &own);
+                before = Some(audit.joint(before, own, &mut tally));
+            }
         }
         seen(chunk.len());
-    }
-    if audit.limits.judges_jerk {
-        tally = tally.merge(audit_jerk(audit, &good, seen));
     }
     audit.travel(&reach, &mut tally);
     tally
 }
 
-/// u at the places of a phase. Where the speed is known by the length, `phase_jerk` measures the accelerations as well.
-fn places<const M: usize>(phases: &Phases, phase: usize, piece: &Piece<M>) -> Vec<f64> {
-    let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
-    if is_by_length(phases.kind[phase]) {
-        let covered = piece.curve.turns() as f64 * (u1 - u0) / piece.width;
-        let steps = (covered.ceil() as usize).max(2);
-        let share = |i: usize| i as f64 / steps as f64;
-        return (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
+/// Measures phases one after the other.
+struct Measurer<'a, const M: usize> {
+    audit: &'a JointAudit<'a, M>,
+    work: Work,
+    curves: Curves<'a, M>,
+    /// The place at the end of the last phase, on its piece.
+    last: Option<(usize, Place<M>, Station<M>)>,
+}
+
+impl<'a, const M: usize> Measurer<'a, M> {
+    fn new(audit: &'a JointAudit<'a, M>) -> Self {
+        Self { audit, work: audit.path.work(), curves: Curves::new(audit.path.path.pieces), last: None }
     }
+
+    /// Offers the jerk, where that is judged; `follows` if the phase before can be measured too.
+    fn measure(&mut self, phase: usize, follows: bool, tally: &mut Tally<M>) -> Measured<'a, M> {
+        let Self { audit, work, .. } = self;
+        let (audit, phases) = (*audit, &audit.phases);
+        let number = phases.piece[phase] as usize;
+        let piece: Piece<M> = audit.path.piece_on(number, self.curves.get(number).clone());
+        let by_length = piece.by_length(phases, phase);
+        let judges_jerk = audit.limits.judges_jerk;
+        if judges_jerk {
+            audit.accelerations(phase, &piece, follows, by_length.is_some(), work, tally);
+        }
+        let Some(motion) = by_length else {
+            let places = PLACES.map(|x| piece.place(u_at(phases, phase, x), work)).to_vec();
+            let states = motion(&piece, phases, phase, &places, places.len() - 1);
+            return Measured { phase, piece, places, states };
+        };
+        let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
+        let covered = STEPS * piece.curve.turns() as f64 * (u1 - u0) / piece.width;
+        let steps = (covered.ceil() as usize).max(LEAST);
+        let (mut places, mut stations) = (Vec::with_capacity(steps + 1), Vec::with_capacity(steps + 1));
+        for i in 0..=steps {
+            let share = i as f64 / steps as f64;
+            let u = u0 * (1.0 - share) + u1 * share;
+            let known = self.last.filter(|(last, place, _)| *last == number && place.u == u);
+            let (place, station) =
+                known.map_or_else(|| piece.station(u, work), |(_, place, station)| (place, station));
+            places.push(place);
+            stations.push(station);
+        }
+        self.last = Some((number, places[steps], stations[steps]));
+        if judges_jerk {
+            audit.jerks(&piece, &motion, &stations, audit.starts[phase], work, tally);
+        }
+        let states = motion_by_length(&piece, &motion, &places);
+        Measured { phase, piece, places, states }
+    }
+}
+
+/// u at a place of a phase, by the variable in which √p is linear where p is.
+fn u_at(phases: &Phases, phase: usize, x: f64) -> f64 {
+    let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
     let (near, both) = match (phases.p0[phase].sqrt(), phases.p0[phase].sqrt() + phases.p1[phase].sqrt()) {
         (near, both) if both > 0.0 => (near, both),
         _ => (1.0, 2.0),
     };
-    PLACES
-        .map(|x| {
-            let share = x * (2.0 * near + (both - 2.0 * near) * x) / both;
-            if x == 1.0 {
-                u1
-            } else {
-                u0 + (u1 - u0) * share.min(1.0)
-            }
-        })
-        .into()
+    let share = x * (2.0 * near + (both - 2.0 * near) * x) / both;
+    if x == 1.0 {
+        u1
+    } else {
+        u0 + (u1 - u0) * share.min(1.0)
+    }
 }
 
 /// Numbers, and phases that cover every piece in order; which phases can be measured.
@@ -195,6 +243,40 @@ fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<boo
 }
 
 impl<const M: usize> JointAudit<'_, M> {
+    /// What a method that limits jerk says of the acceleration along the way, and its jump from the phase before, if that `follows`.
+    fn accelerations(
+        &self,
+        phase: usize,
+        piece: &Piece<M>,
+        follows: bool,
+        is_by_length: bool,
+        work: &mut Work,
+        tally: &mut Tally<M>,
+    ) {
+        let (phases, line) = (&self.phases, piece.line);
+        let jerks = Jerks { phases, limits: &self.limits, starts: self.starts, smooth: SMOOTH };
+        let width_rounding = EPS * piece.width / (phases.u1[phase] - phases.u0[phase]);
+        jerks.alone(phase, width_rounding, is_by_length, line, tally);
+        let [start_speed, end_speed] = self.limits.end_speeds;
+        let begins = self.is_first(phase);
+        if begins && !(phase == 0 && start_speed > 0.0) {
+            jerks.rest(phase, false, line, tally);
+        }
+        if self.is_first(phase + 1) && !(phase + 1 == phases.len() && end_speed > 0.0) {
+            jerks.rest(phase, true, line, tally);
+        }
+        if follows && !begins && is_by_length && phases::is_by_length(phases.kind[phase - 1]) {
+            let station = |number: usize, u: f64| {
+                let (_, station) = match number == piece.number {
+                    true => piece.station(u, work),
+                    false => self.path.piece::<M>(number).station(u, work),
+                };
+                Some(station)
+            };
+            jerks.joint([phase - 1, phase], station, line, tally);
+        }
+    }
+
     /// A jump of a joint's velocity that means nothing: what the pass mark adds in that time.
     fn negligible(&self, joint: usize, time: f64) -> f64 {
         PASS_EXCESS * self.limits.acceleration.least(joint) * time.max(self.limits.period)

@@ -7,8 +7,9 @@
 use rayon::prelude::*;
 
 use super::path::{Piece, Place, Work};
-use super::phase_motion::{motion, ROUNDING};
+use super::phase_motion::{motion, motion_by_length, ROUNDING};
 use super::plan::JointAudit;
+use crate::phase_by_length::PhaseByLength;
 use crate::setpoints::Chunk;
 use crate::vectors::{length, Segment};
 use crate::{Check, Tally, EPS, PLACE_TOLERANCE, ROUNDINGS};
@@ -210,6 +211,14 @@ impl<const M: usize> JointSetpoints<M> {
     }
 }
 
+/// The phase of the last setpoint, its piece, the places at its ends, and its motion where that is known by the length.
+struct Known<'a, const M: usize> {
+    phase: usize,
+    piece: Piece<'a, M>,
+    ends: [Place<M>; 2],
+    by_length: Option<PhaseByLength<M>>,
+}
+
 /// Judges setpoints that follow each other.
 struct Judge<'a, const M: usize> {
     audit: &'a JointAudit<'a, M>,
@@ -217,8 +226,7 @@ struct Judge<'a, const M: usize> {
     work: Work,
     /// The piece before the one of the last setpoint.
     earlier: Option<Piece<'a, M>>,
-    /// The phase of the last setpoint, its piece, and the places at its ends.
-    known: Option<(usize, Piece<'a, M>, [Place<M>; 2])>,
+    known: Option<Known<'a, M>>,
     tally: Tally<M>,
     chords: Vec<Chord>,
 }
@@ -246,13 +254,13 @@ impl<'a, const M: usize> Judge<'a, M> {
 
     /// The piece of the last setpoint.
     fn piece(&self) -> &Piece<'a, M> {
-        let Some((_, piece, _)) = &self.known else { unreachable!("a setpoint has been found") };
+        let Some(Known { piece, .. }) = &self.known else { unreachable!("a setpoint has been found") };
         piece
     }
 
     /// Offers what a setpoint shows.
     fn place(&mut self, last: Option<&Nearest<M>>, nearest: &Nearest<M>) {
-        let Some((_, piece, _)) = &self.known else { unreachable!("a setpoint has been found") };
+        let Some(Known { piece, .. }) = &self.known else { unreachable!("a setpoint has been found") };
         let (t, line, tally) = (nearest.row.t, piece.line, &mut self.tally);
         let wrong = if nearest.is_finite { 0.0 } else { f64::INFINITY };
         tally.offer(Check::Numbers, 0, wrong, 0.0, t, line);
@@ -349,23 +357,29 @@ impl<'a, const M: usize> Judge<'a, M> {
         let (audit, phases) = (self.audit, &self.audit.phases);
         let t = if row.t.is_finite() { row.t } else { 0.0 };
         let (phase, since) = self.phase_at(t);
-        if self.known.as_ref().is_none_or(|(known, ..)| *known != phase) {
+        if self.known.as_ref().is_none_or(|known| known.phase != phase) {
             let number = phases.piece[phase] as usize;
             let piece = match self.known.take() {
-                Some((_, piece, _)) if piece.number == number => piece,
+                Some(Known { piece, .. }) if piece.number == number => piece,
                 other => {
-                    self.earlier = other.map(|(_, piece, _)| piece);
+                    self.earlier = other.map(|known| known.piece);
                     audit.path.piece(number)
                 }
             };
             let ends = [phases.u0[phase], phases.u1[phase]].map(|u| piece.place(u, &mut self.work));
-            self.known = Some((phase, piece, ends));
+            let by_length = piece.by_length(phases, phase);
+            self.known = Some(Known { phase, piece, ends, by_length });
         }
-        let Some((_, piece, ends)) = &self.known else { unreachable!("the phase is known") };
+        let Some(Known { piece, ends, by_length, .. }) = &self.known else {
+            unreachable!("the phase is known")
+        };
         let is_finite = row.t.is_finite() && row.position.iter().all(|x| x.is_finite());
         let target = if is_finite { row.position } else { [0.0; M] };
         let place = nearest(piece, phases, phase, since, &target, &mut self.work);
-        let states = motion(piece, phases, phase, &[ends[0], place, ends[1]], 1);
+        let states = match by_length {
+            Some(by_length) => motion_by_length(piece, by_length, &[ends[0], place]),
+            None => motion(piece, phases, phase, &[ends[0], place, ends[1]], 1),
+        };
         let here = &states[1];
         let doubt = here.time * here.time_error;
         let doubt = if doubt.is_nan() { 0.0 } else { doubt };
