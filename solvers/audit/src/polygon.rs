@@ -81,15 +81,28 @@ impl<const M: usize> Polygon<M> {
 
     /// De Casteljau's algorithm at t; calls `level` with steps, weights, τ of the first and 1 − τ of the last step.
     #[inline]
-    fn levels(&self, t: f64, mut level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
+    fn levels(&self, t: f64, level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
+        // Most pieces with weights are of degree 2: room for more takes longer than the work.
+        match self.degree {
+            0..=2 => self.levels_in::<2>(t, level),
+            _ => self.levels_in::<MOST>(t, level),
+        }
+    }
+
+    /// The same in the room of N steps.
+    #[inline]
+    fn levels_in<const N: usize>(&self, t: f64, mut level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
         let s = 1.0 - t;
-        let (mut steps, mut weights) = (self.steps, self.weights);
-        let mut tau = [[s, t]; MOST];
-        for count in (1..=self.degree).rev() {
+        let mut steps: [[f64; M]; N] = std::array::from_fn(|i| self.steps[i]);
+        let (mut weights, mut next) = (self.weights, [1.0; N]);
+        let mut tau = [[s, t]; N];
+        for count in (1..=self.degree.min(N)).rev() {
             if self.rational {
                 for i in 0..count {
                     let (a, b) = (s * weights[i], t * weights[i + 1]);
-                    tau[i] = [a / (a + b), b / (a + b)];
+                    next[i] = a + b;
+                    let per = 1.0 / next[i];
+                    tau[i] = [a * per, b * per];
                 }
             }
             level(&steps[..count], &weights[..=count], [tau[0][1], tau[count - 1][0]]);
@@ -99,9 +112,7 @@ impl<const M: usize> Polygon<M> {
                 }
             }
             if self.rational {
-                for i in 0..count {
-                    weights[i] = s * weights[i] + t * weights[i + 1];
-                }
+                weights[..count].copy_from_slice(&next[..count]);
             }
         }
     }
