@@ -7,10 +7,10 @@ use super::rows::Row;
 use super::vectors::{from_to, inner, length};
 use super::{Limits, EPS, PASS_EXCESS, PASS_MARK, ROUNDINGS};
 
-/// Setpoints on end.
+/// Consecutive setpoints.
 pub struct Differences<'a, const M: usize> {
     pub limits: &'a Limits<M>,
-    /// What writing a position to a file may have changed, in mm.
+    /// Last digit of positions that were written as text, in mm.
     pub resolution: f64,
     pub rows: &'a [Row<M>],
 }
@@ -29,7 +29,7 @@ impl<const M: usize> Default for Quotient<M> {
 }
 
 impl<const M: usize> Differences<'_, M> {
-    /// What a time step may differ from the period, in s.
+    /// How much a time step may differ from the period, in s.
     pub fn uneven(&self) -> f64 {
         PASS_EXCESS * self.limits.period
     }
@@ -52,7 +52,7 @@ impl<const M: usize> Differences<'_, M> {
         (step - self.limits.period).abs() <= self.uneven() + ROUNDINGS * EPS * t.abs()
     }
 
-    /// What is not known of the position of each axis at row `n`, in mm.
+    /// Bound of the error of the position of each axis at row `n`, in mm: its rounding, and the way in the rounding of its time.
     pub fn rounding(&self, n: usize) -> [f64; M] {
         let row = &self.rows[n];
         let before = &self.rows[n.saturating_sub(1)];
@@ -83,15 +83,16 @@ impl<const M: usize> Differences<'_, M> {
 
     /// Mean jerk of axis `k` over three steps that take `span`, from the accelerations around the two rows inside them.
     ///
-    /// The means hold for triangles whose centres lie a third of all three steps apart.
+    /// Each mean acceleration is weighted by a triangle over two steps; the centres of the two are a third of `span` apart.
     #[inline]
     pub fn jerk(&self, k: usize, early: &Quotient<M>, late: &Quotient<M>, span: f64) -> f64 {
         let change = (late.value[k] - early.value[k]).abs() - late.rounding[k] - early.rounding[k];
         3.0 * change / span
     }
 
-    /// Without a path: a corner shows in at most two neighbouring accelerations, whose excess adds up to the jump,
-    /// and the velocities before and after differ by no more than a turn at the same speed explains.
+    /// Whether an acceleration above its limit at row `c` can be a corner, where no path is known: at most two neighbouring
+    /// accelerations are above their limits, their excess makes no more than the allowed jump, and the velocities before and after
+    /// differ by no more than a turn at one speed and the acceleration limits explain.
     pub fn looks_like_a_corner(&self, c: usize) -> bool {
         let last = self.rows.len() - 1;
         let exceeds = |i: usize| i >= 1 && i < last && self.excess(i).iter().any(|&excess| excess > 0.0);

@@ -14,11 +14,11 @@ pub struct Place {
 /// A Newton step of this share of the piece is the last one: its error is about the square of that.
 const CLOSE: f64 = 1e-7;
 
-/// At an end where C' is this part of what it is elsewhere it is rounding.
+/// Where |C'| at an end is below this share of |C''| it counts as 0 (rounding).
 const STILL: f64 = 1e-12;
 
 /// (C(u) − q)·C'(u) in t = u / width, up to a factor, a cubic: where it turns from negative to positive the distance has
-/// a local minimum. It is taken as the product: of its coefficients nothing is left next to a place where C' vanishes.
+/// a local minimum. It is evaluated as the product: its coefficients lose all digits next to a place where C' vanishes.
 struct Slope<const M: usize> {
     off: [f64; M],
     first: [f64; M],
@@ -48,7 +48,7 @@ impl<const M: usize> Slope<M> {
         [slope, derivative]
     }
 
-    /// Whether the distance falls at `t`. Where C' is rounding, at an end, the motion beside it tells.
+    /// Whether the distance falls at `t`; where C' is 0, at an end, by the direction of C''.
     fn falls(&self, t: f64) -> bool {
         let tangent: [f64; M] = std::array::from_fn(|k| self.first[k] + t * self.bend[k]);
         if length(&tangent) > STILL * length(&self.bend) {
@@ -59,7 +59,8 @@ impl<const M: usize> Slope<M> {
         (0..M).map(|k| away(k) * inwards * self.bend[k]).sum::<f64>() < 0.0
     }
 
-    /// The root between `a`, where the distance falls, and `b`, where it does not: Newton, halved when it strays.
+    /// The root between `a`, where the distance falls, and `b`, where it does not: by Newton's method, and by halving where a step
+    /// leaves the bracket.
     fn root(&self, mut a: f64, mut b: f64) -> f64 {
         let mut t = a;
         for _ in 0..100 {
@@ -214,7 +215,7 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
         found.distance <= self.close && found.error <= self.allowed
     }
 
-    /// On the path by the larger of both errors; off it by the distance, and always worse.
+    /// The order of places: those on the path by the greater of both errors, then those off it by their distance.
     fn badness(&self, found: &Found) -> f64 {
         if found.distance <= self.close {
             found.error.max(found.distance)
@@ -247,14 +248,14 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
                 let found = self.candidate(piece, u, distance);
                 if self.badness(&found) <= self.badness(&best) {
                     best = found;
-                    // Its neighbour may hold the true minimum, a rounding further on.
+                    // The true minimum may be at the start of the next piece (rounding).
                     falls_on = falls;
                 }
             }
             if self.is_good(&best) && !falls_on {
                 break;
             }
-            // The first piece does not count: the search may start well before the place looked for.
+            // The first piece does not count: the search may start long before the place.
             if piece > from.piece {
                 travelled += distance(&curve.at(start), &curve.at(curve.width()));
             }

@@ -1,8 +1,8 @@
-//! Follows setpoints along the path of their plan: where each lies, and when the profile is there.
+//! Finds the place of each setpoint on the path of its plan, and when the profile is there.
 //!
 //! The place of a setpoint is searched along the path from the place of the one before, never backwards. Where
-//! the speed profile is known, the audit's own integral says when the profile reaches that place; a setpoint
-//! that runs ahead or stays behind is as far from its place as the profile gets in that time.
+//! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
+//! that is early or late is the way that the profile moves in that time.
 
 use rayon::prelude::*;
 
@@ -17,8 +17,8 @@ use super::{tell, Limits, Seen, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE
 /// Setpoints a thread takes at a time.
 const BLOCK: usize = 4096;
 
-/// After so many setpoints on end that are off the path, the rest of their block counts as off by as much as the
-/// last: the verdict is clear, and searching on would take for ever.
+/// After so many consecutive setpoints off the path the others of their block get the place of the last one: the verdict is
+/// clear, and a search for each would take very long.
 const MOST_ASTRAY: u32 = 64;
 
 /// Steps of Newton's method from a guess, and the length of the last one, in mm: the error after it is about the square of
@@ -78,9 +78,9 @@ impl Plan<'_> {
             };
             match &rows[next..] {
                 [] => break,
-                // On the very end of the pause: the next row tells whether the stream goes on or waits.
+                // At the end of the pause: only the next row shows whether the stream moves on or waits.
                 [row] if on_time(row) => break,
-                // A run may begin at a crawl: one that waits, or has not quite arrived, does not move away at all.
+                // A run may begin slowly: a stream that waits, or has not quite arrived, does not move away from the stop.
                 [row, later, ..] if on_time(row) && waits(row, later) => clock.push(later.t),
                 [row, ..] if stands(row) => clock.push(row.t),
                 _ => clock.push(due),
@@ -124,7 +124,7 @@ struct Finder<'a, const M: usize> {
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
     curves: Curves<'a, M>,
-    /// No setpoint gets farther in a period or two, in mm, unless it breaks a limit.
+    /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
 }
 
@@ -138,7 +138,7 @@ impl<'a, const M: usize> Finder<'a, M> {
 
     fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest<M> {
         let (path, limits) = (&self.plan.path, self.limits);
-        // From the place before; where that is not known or not to be trusted, from where the profile was then.
+        // From the place of the setpoint before; where that is not good, from the profile's place one period earlier.
         let known = previous.filter(|before| {
             let near = (row.t - before.t).abs() <= 2.0 * limits.period;
             self.profile.is_none() || (before.nearest.is_good() && near)
@@ -184,8 +184,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         nearest
     }
 
-    /// The place of a setpoint by Newton's method from where the last step leads, on the same piece or the next one, with its
-    /// distance; none where that strays or is not close.
+    /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead, on the same piece or the
+    /// next one; none where that does not converge ahead of `from` or is not close.
     fn guess(&mut self, from: Place, step: f64, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
         let (mut piece, mut u) = (from.piece, from.u + step);
         let mut curve = self.curves.get(piece);
@@ -213,8 +213,7 @@ impl<'a, const M: usize> Finder<'a, M> {
     }
 }
 
-/// Whether one setpoint can be followed to the next: what is out of step is broken already, and whatever path lies
-/// between is not looked at.
+/// Whether two setpoints are one time step apart. Others are judged by their times alone.
 pub fn is_step(from: f64, to: f64, period: f64) -> bool {
     to > from && to - from <= 2.0 * period
 }

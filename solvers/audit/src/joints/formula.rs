@@ -1,13 +1,13 @@
-//! The kinematics' formula as the audit evaluates it: derivatives by the chain rule, with what rounding does to each.
+//! Evaluates the recorded formula of a kinematics: values and derivatives by the chain rule, each with a bound of its rounding.
 //!
-//! A recorded formula is plain data: operations on the results of earlier ones. A jet holds f, f', f'', f''' by the path's
-//! parameter, as many as are asked for; products go by Leibniz's rule, functions by Faà di Bruno's. Beside each derivative
-//! runs a bound of its error in units of the rounding of 1: what the operands' errors do, and the rounding of each term
+//! A recorded formula is a list of operations on the results of earlier ones. A jet holds f, f', f'', f''' by the path's
+//! parameter, as many as are asked for; products go by Leibniz's rule, functions by Faà di Bruno's. Each derivative
+//! has a bound of its error in units of the rounding of 1: the errors of the operands carried over, and the rounding of each term
 //! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.3).
 
 use std::f64::consts::PI;
 
-/// Roundings of an elementary function, in units of the rounding of its value.
+/// Error of an elementary function, in roundings of its value.
 const ELEMENTARY: f64 = 4.0;
 
 /// The first N of f, f', f'', f''' and their errors in units of `EPS`.
@@ -25,7 +25,7 @@ struct Step {
     constant: f64,
 }
 
-/// Joints by the coordinates of the tip.
+/// The joints as functions of the coordinates of the tip.
 #[derive(Clone, Debug)]
 pub struct Formula {
     pub inputs: usize,
@@ -38,7 +38,7 @@ const SINE: i32 = 10;
 const COSINE: i32 = 11;
 
 impl Formula {
-    /// None where an operand is not an earlier result, or a code is none.
+    /// None where an operand is not an earlier result, or a code is unknown.
     pub fn new(inputs: usize, rows: &[[i32; 3]], constants: &[f64], outputs: &[i32]) -> Option<Self> {
         let place = |number: i32, end: usize| usize::try_from(number).ok().filter(|&place| place < end);
         let mut steps: Vec<Step> = Vec::with_capacity(rows.len());
@@ -63,7 +63,7 @@ impl Formula {
         self.inputs + self.steps.len()
     }
 
-    /// Fills a table of results whose inputs are there.
+    /// Fills the table of results, in which the inputs are given.
     pub fn evaluate<const N: usize>(&self, table: &mut [Jet<N>]) {
         // The cosine of an angle comes right after its sine.
         let mut wave = (0.0, 1.0);
@@ -150,7 +150,7 @@ impl<const N: usize> Jet<N> {
         jet
     }
 
-    /// A function of the jet by the function's own value and first four derivatives, known to so many roundings.
+    /// A function of the jet, from the value and the first four derivatives of the function, each with an error of `roundings`.
     #[inline]
     fn composed(&self, f: [f64; 5], roundings: f64) -> Self {
         let (x, e) = (&self.value, &self.error);

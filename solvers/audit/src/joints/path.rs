@@ -1,17 +1,18 @@
-//! Where the joints are along a path, and how fast they move with it: by the kinematics' formula at places of the path.
+//! Positions of the joints and their derivatives at places of the path of the tool's tip, by the formula of the kinematics.
 
 use std::sync::Arc;
 
 use super::formula::{Formula, Jet};
 use crate::curve::{Curve, Followed};
 use crate::phase_by_length::PhaseByLength;
+use crate::phase_motion::curvature;
 use crate::phases::{is_by_length, Phases};
 use crate::station::Station;
 use crate::vectors::length;
 use crate::{EPS, ROUNDINGS};
 
 pub const TURN: f64 = 360.0;
-/// Roundings of a coordinate of the tip, in units of `EPS` of its size: tip, sines and sums lie on the way.
+/// Error of a coordinate of the tip in the formula, in roundings of the greatest coordinate of its piece.
 pub const TIP_ROUNDINGS: f64 = 2.0 * ROUNDINGS;
 
 /// What the words of runs mean.
@@ -28,8 +29,8 @@ pub struct Words {
 
 /// The joints of a problem whose path is that of the tool's tip.
 ///
-/// Angles known up to whole turns are compared the short way round: between two places that are compared they turn by less
-/// than half a turn.
+/// Some angles are known up to whole turns only: between two places that are compared such a joint turns by less than half a
+/// turn.
 pub struct JointPath<'a> {
     pub path: Followed<'a>,
     /// Number of joints.
@@ -55,9 +56,9 @@ pub struct Piece<'a, const M: usize> {
     pub width: f64,
     pub curve: Arc<Curve<M>>,
     words: &'a Words,
-    /// What each axis counts in the way that the feed is about: X, Y, Z where these move, else the others.
+    /// The axes whose motion the feed limits, 1 or 0: X, Y, Z where these move, else the others.
     pub counts: [f64; M],
-    /// Whether only the direction turns, so that the feed is in degrees of it.
+    /// Whether only the direction of the tool turns: then the feed limits the degrees that it turns.
     turns: bool,
     /// What each axis of the path counts in its length.
     pub way_scale: [f64; M],
@@ -69,7 +70,7 @@ pub struct Piece<'a, const M: usize> {
     start_size: f64,
 }
 
-/// A place of a piece: the tip, the joints and their slopes by u, each with how wrong it may be.
+/// A place of a piece: the tip, the joints and their derivatives by u, each with a bound of its error.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<const M: usize> {
     pub u: f64,
@@ -78,15 +79,15 @@ pub struct Place<const M: usize> {
     pub unknown: [f64; M],
     pub slope: [f64; M],
     pub slope_error: [f64; M],
-    /// Way that the feed is about, and way in all axes, per u.
+    /// Derivatives by u of the way that the feed limits, and of the way in all axes.
     pub feed_slope: f64,
     pub way_slope: f64,
 }
 
-/// A number of each joint, and how wrong it may be.
+/// A number of each joint, and a bound of its error.
 pub type Rows<const M: usize> = ([f64; M], [f64; M]);
 
-/// Results of a formula, kept from place to place.
+/// Room for the results of a formula, used again at every place.
 pub struct Work {
     positions: Vec<Jet<1>>,
     slopes: Vec<Jet<2>>,
@@ -155,7 +156,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 impl<const M: usize> Piece<'_, M> {
-    /// Which axes of X, Y, Z the feed is about, 1 or 0.
+    /// The axes of X, Y, Z whose motion the feed limits, 1 or 0.
     pub fn linear(&self) -> [f64; M] {
         times(&self.counts, &self.xyz)
     }
@@ -169,12 +170,18 @@ impl<const M: usize> Piece<'_, M> {
         self.words.turning.get(joint).copied().unwrap_or(false)
     }
 
-    /// C'(u) along the axes that the feed is about.
-    pub fn counted_slope(&self, u: f64) -> [f64; M] {
+    /// C'(u) along the axes whose motion the feed limits.
+    fn counted_slope(&self, u: f64) -> [f64; M] {
         times(&self.counts, &self.curve.derivative(u))
     }
 
-    /// Way that the feed is about, per u.
+    /// Curvature of the path in the axes whose motion the feed limits.
+    pub fn curvature(&self, u: f64) -> f64 {
+        let [tangent, bend, _] = self.curve.derivatives(u);
+        curvature(&times(&self.counts, &tangent), &times(&self.counts, &bend))
+    }
+
+    /// Derivative by u of the way that the feed limits.
     pub fn feed_slope(&self, u: f64) -> f64 {
         if self.turns {
             self.feed_slope_of(&self.curve.at(u), &self.curve.derivative(u))
@@ -192,7 +199,7 @@ impl<const M: usize> Piece<'_, M> {
         (across / direction.iter().map(|x| x * x).sum::<f64>()).to_degrees()
     }
 
-    /// Way that the feed is about, straight from one point of the piece to another.
+    /// The way that the feed limits, straight from one point of the piece to another.
     pub fn feed_way(&self, start: &[f64; M], end: &[f64; M]) -> f64 {
         if !self.turns {
             let way: [f64; M] = std::array::from_fn(|k| self.counts[k] * (end[k] - start[k]));
@@ -215,7 +222,7 @@ impl<const M: usize> Piece<'_, M> {
         for (joint, &place) in self.words.formula.outputs.iter().enumerate() {
             let jet = &table[place];
             (value[joint], error[joint]) = (jet.value[order], EPS * jet.error[order]);
-            // Beside a singular place nothing is known of a slope.
+            // At a singular place nothing is known of a derivative.
             if order > 0 && !(value[joint] + error[joint]).is_finite() {
                 (value[joint], error[joint]) = (0.0, f64::INFINITY);
             }
@@ -234,7 +241,7 @@ impl<const M: usize> Piece<'_, M> {
         self.joints_at(&self.curve.at(u), work)
     }
 
-    /// All that is measured at a place.
+    /// The place at u.
     pub fn place(&self, u: f64, work: &mut Work) -> Place<M> {
         let (tip, slope) = (self.curve.at(u), self.curve.derivative(u));
         self.fill(&mut work.slopes, |k| Jet {
@@ -259,7 +266,7 @@ impl<const M: usize> Piece<'_, M> {
         }
     }
 
-    /// The same, and the first three derivatives of the joints by the length of the way.
+    /// The place at u, and the first three derivatives of the joints by the length of the way.
     pub fn station(&self, u: f64, work: &mut Work) -> (Place<M>, Station<M>) {
         let tip = self.curve.at(u);
         let (slopes, sizes) = (self.curve.derivatives(u), self.curve.derivative_sizes());
@@ -293,8 +300,8 @@ impl<const M: usize> Piece<'_, M> {
         (self.place_of(u, tip, slopes[0], &work.bends), Station::of_joints(u, &joints, way))
     }
 
-    /// From one position to another, both of this piece, or the first of an `other` one: joints that turn on one of them
-    /// go the short way round.
+    /// From one position to another, both of this piece, or the first of an `other` one: joints known up to whole turns on one
+    /// of them turn by the smaller angle.
     pub fn between(&self, before: &[f64; M], after: &[f64; M], other: Option<&Piece<M>>) -> [f64; M] {
         std::array::from_fn(|k| {
             let way = after[k] - before[k];

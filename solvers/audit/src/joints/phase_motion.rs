@@ -1,9 +1,10 @@
-//! How the joints move on phases of a profile, from what each phase holds constant and the kinematics' positions.
+//! Velocities of the joints at places of a phase and the times between them, from the law of the phase and the positions of the
+//! joints there.
 //!
 //! On a phase of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and a way Δq_k
-//! takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the way over it; where p is linear
-//! in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by Kronrod's rule; where jerk is limited, speed
-//! and time follow from the length of the way along the path.
+//! takes the time 2 Δq_k over the sum of the speeds at its ends. Where a joint has a constant speed, the time is its way over that
+//! speed; where p is linear in u, Δu over the mean √p; at the feed, ∫ |C'| du over the speed, by Kronrod's rule; where jerk is
+//! limited, speed and time follow from the length of the way of the tool.
 
 use super::path::{Piece, Place};
 use crate::phase_by_length::PhaseByLength;
@@ -12,10 +13,10 @@ use crate::phases::{Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_AC
 use crate::speed_by_length::integral;
 use crate::{EPS, ROUNDINGS};
 
-/// Rounding of a speed or time that a few operations make.
+/// Relative rounding of a speed or time after a few operations.
 pub const ROUNDING: f64 = 2.0 * ROUNDINGS * EPS;
 
-/// So much of a speed may be uncertain before it is taken from the recorded ends of the phase.
+/// Where a greater part of a speed is uncertain, it is taken from the recorded p at the ends of the phase.
 const HIDDEN: f64 = 1e-3;
 
 /// The motion at a place of a phase.
@@ -24,19 +25,19 @@ pub struct State<const M: usize> {
     /// Way of the joints from the start of the phase.
     pub way: [f64; M],
     pub root_p: f64,
-    /// Share of √p that may be wrong.
+    /// Relative error of √p.
     relative: f64,
-    /// Speed of the phase's own joint, and how wrong it may be.
+    /// Speed of the joint that governs the phase, and a bound of its error.
     speed: f64,
     speed_error: f64,
     pub velocity: [f64; M],
     pub velocity_error: [f64; M],
-    /// Time of the step before, and the share of it that may be wrong.
+    /// Time from the place before, and its relative error.
     pub time: f64,
     pub time_error: f64,
 }
 
-/// The joints at places, as if they did not move.
+/// States at places with their ways alone, all speeds and times 0.
 fn at_rest<const M: usize>(piece: &Piece<M>, places: &[Place<M>]) -> Vec<State<M>> {
     let mut states = vec![State::STILL; places.len()];
     for i in 1..states.len() {
@@ -66,7 +67,7 @@ pub fn motion_by_length<const M: usize>(
         let since = motion.since(&here);
         if i > 0 && place.u != places[i - 1].u {
             state.time = since - before;
-            // The rounding of a time, not only of a step.
+            // Both times since the start are rounded.
             state.time_error = if state.time > 0.0 {
                 ROUNDING * (1.0 + since.abs().max(before.abs()) / state.time)
             } else {
@@ -93,7 +94,7 @@ pub fn motion<const M: usize>(
     let mut states = at_rest(piece, places);
     let own_slope = |i: usize| places[i].slope[own].abs();
     let unknown = places.iter().map(|place| place.unknown[own]).fold(0.0, f64::max);
-    // The speed of the phase's own joint, from the slower end where it accelerates.
+    // The speed of the joint that governs the phase, from the end where that is slower.
     let ends = [own_slope(0).powi(2) * p[0], own_slope(last).powi(2) * p[1]];
     let from_end = !ends[0].is_finite() || ends[1] < ends[0];
     let (slower, slower_p) = if from_end { (last, p[1]) } else { (0, p[0]) };
@@ -133,7 +134,7 @@ pub fn motion<const M: usize>(
             FEED => (value.sqrt() / place.feed_slope, ROUNDING),
             _ => (line(place.u) / place.feed_slope, ROUNDING),
         };
-        // Where rounding hides how the phase's own joint moves, its recorded ends tell: p changes little there.
+        // Where rounding hides the motion of that joint, p is nearly constant: it is taken from the recorded ends.
         let known = 0.5 * (p[1] - p[0]).abs() / p[0].max(p[1]) + ROUNDING;
         let is_known = relative <= HIDDEN;
         if !is_known && known < HIDDEN {
@@ -200,8 +201,8 @@ fn sign(x: f64) -> f64 {
     }
 }
 
-/// The time of a step by the way of the phase's own joint, which may have a constant acceleration, and the share of it that may
-/// be wrong.
+/// The time of a step by the way of the joint that governs the phase, which may have a constant acceleration, and its relative
+/// error.
 fn by_joint<const M: usize>(
     [a, b]: [&State<M>; 2],
     step: f64,
@@ -212,7 +213,7 @@ fn by_joint<const M: usize>(
 ) -> (f64, f64) {
     let (both, errors) = (a.speed + b.speed, a.speed_error + b.speed_error);
     let (mut time, mut error) = (2.0 * way / both, 2.0 * unknown / way + errors / both);
-    // Where the way is too short to tell: by the change of speed.
+    // The change of the speed over the acceleration, where that has the smaller error.
     if let Some(acceleration) = acceleration {
         let by_change = (b.speed - a.speed).abs() / acceleration;
         let change_error = errors / acceleration / by_change;
@@ -220,7 +221,7 @@ fn by_joint<const M: usize>(
             (time, error) = (by_change, change_error);
         }
     }
-    // On phases so short that no joint's way can be told from rounding: by the parameter.
+    // On phases whose ways are all rounding, the step of the parameter over the mean √p.
     let sides = a.root_p + b.root_p;
     let place_error = rounding + (b.root_p - a.root_p).abs() / sides + 0.5 * (a.relative + b.relative);
     let is_known = error <= HIDDEN;

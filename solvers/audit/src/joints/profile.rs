@@ -1,14 +1,14 @@
 //! Audits a profile whose limits belong to joints that are not the path's axes.
 //!
 //! Every phase is sampled at some ten places, or where its speed is known by the length at as many as its piece needs. Between
-//! two of them the acceleration of a joint is the difference of its velocities over the time; what velocities and times may be
-//! wrong by is allowed for.
+//! two of them the mean acceleration of a joint is the difference of its velocities over the time, less what their errors can add.
 
 use rayon::prelude::*;
 
 use super::path::{Piece, Place, Work, TURN};
 use super::phase_motion::{motion, motion_by_length, State, ROUNDING};
 use super::plan::JointAudit;
+use crate::chord::chord_error;
 use crate::curve::Curves;
 use crate::phase_jerk::Jerks;
 use crate::phases::{self, Phases};
@@ -16,23 +16,20 @@ use crate::station::Station;
 use crate::vectors::length;
 use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
 
-/// Places of a phase, as shares of the variable in which √p is linear where p is: close at the ends, where accelerations have
-/// their extremes.
+/// Places of a phase, as shares of the variable in which √p is linear where p is linear in u: closer at the ends, where
+/// accelerations have their extremes.
 const PLACES: [f64; 11] = [0.0, 1.0 / 64.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 63.0 / 64.0, 1.0];
 
-/// Where the speed is known by the length: steps of a phase that covers its whole piece, for each degree, and at least.
+/// Where the speed is known by the length: steps for each degree of a phase that covers its whole piece, and the least number.
 const STEPS: f64 = 4.0;
 const LEAST: usize = 2;
 
-/// Phases measured at once: the memory for their places stays below some 30 MB. Phases a thread takes at a time.
+/// Phases that are measured before they are joined, in some 30 MB, and phases that a thread takes at a time.
 const CHUNK: usize = 2048;
 const BLOCK: usize = 256;
 
 /// Joints that leave a joint at a smaller angle than this, in rad, pass without a corner.
 const SMOOTH: f64 = 1e-6;
-
-/// The chord error is measured with tangents this share of the piece apart.
-const TANGENTS: f64 = 1e-4;
 
 /// A phase at its places.
 struct Measured<'a, const M: usize> {
@@ -63,9 +60,9 @@ struct End<'a, const M: usize> {
 struct Reach<const M: usize> {
     /// Least and greatest, with time and source line.
     ends: [[(f64, f64, i32); 2]; M],
-    /// As the kinematics gives it and as it goes on, at the end of the last phase.
+    /// Piece and positions at the end of the last phase: by the kinematics, and continuous.
     last: Option<(usize, [f64; M], [f64; M])>,
-    /// What these angles are off by, in degrees; not a number before a joint's turn is known.
+    /// Whole turns from the continuous angle to the joint's own, in degrees; not a number while no piece has told them.
     turns: [f64; M],
 }
 
@@ -172,7 +169,7 @@ fn u_at(phases: &Phases, phase: usize, x: f64) -> f64 {
     }
 }
 
-/// Numbers, and phases that cover every piece in order; which phases can be measured.
+/// Offers wrong numbers and phases that do not cover the pieces in order; which phases can be measured.
 fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<bool> {
     let (path, phases, starts) = (&audit.path.path, &audit.phases, audit.starts);
     let piece_of = |phase: usize| (phases.piece[phase] as usize).min(path.len().saturating_sub(1));
@@ -209,7 +206,7 @@ fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<boo
     for run in 0..runs.len() - 1 {
         let (first, end) = (runs[run] as usize, runs[run + 1] as usize);
         let pieces = path.runs[run] as usize..path.runs[run + 1] as usize;
-        // Phase by phase the parameter from the start of the run; pieces passed over show as gaps.
+        // Each phase begins where the one before ends, on the same piece or the next.
         for phase in first..end {
             let piece = piece_of(phase);
             let gap = if phase == first {
@@ -277,7 +274,7 @@ impl<const M: usize> JointAudit<'_, M> {
         }
     }
 
-    /// A jump of a joint's velocity that means nothing: what the pass mark adds in that time.
+    /// A jump of a joint's velocity that is negligible: over that time it adds no more than the pass mark to the acceleration.
     fn negligible(&self, joint: usize, time: f64) -> f64 {
         PASS_EXCESS * self.limits.acceleration.least(joint) * time.max(self.limits.period)
     }
@@ -299,7 +296,7 @@ impl<const M: usize> JointAudit<'_, M> {
                     let change = state.velocity[k] - before.velocity[k];
                     let moved = state.way[k] - before.way[k];
                     let (mut acceleration, mut mean) = (0.0, 0.0);
-                    // Places that rounding has put together have nothing between them.
+                    // Two places may be the same after rounding.
                     if place.u != places[i - 1].u {
                         let doubt = state.velocity_error[k] + before.velocity_error[k];
                         acceleration = (change.abs() - doubt) / state.time;
@@ -336,16 +333,13 @@ impl<const M: usize> JointAudit<'_, M> {
         if !tolerance.is_finite() {
             return;
         }
-        let mut sagitta = 0.0;
-        if piece.linear().iter().any(|&counts| counts != 0.0) {
-            let half = 0.5 * speed * self.limits.period;
-            let reach = half * curvature(piece, place.u);
-            sagitta = if reach < 1.0 { half * reach / (1.0 + (1.0 - reach * reach).sqrt()) } else { half };
-        }
-        tally.offer(Check::Chord, 0, sagitta, tolerance, clock, piece.line);
+        let is_linear = piece.linear().iter().any(|&counts| counts != 0.0);
+        let curvature = if is_linear { piece.curvature(place.u) } else { 0.0 };
+        let error = chord_error(speed * self.limits.period, curvature);
+        tally.offer(Check::Chord, 0, error, tolerance, clock, piece.line);
     }
 
-    /// Velocities at both ends by the recorded p, with how wrong they may be, and the speeds of the tip.
+    /// Velocities at both ends by the recorded p, with bounds of their errors, and the speeds of the tip.
     fn recorded(&self, own: &Measured<M>) -> [([f64; M], [f64; M], f64); 2] {
         let [(first, _), (last, _)] = own.ends();
         [(first, self.phases.p0[own.phase]), (last, self.phases.p1[own.phase])].map(|(place, p)| {
@@ -356,7 +350,7 @@ impl<const M: usize> JointAudit<'_, M> {
         })
     }
 
-    /// Recorded p against the law's.
+    /// Offers the recorded p at both ends against that of the law, as a jump of velocities.
     fn ends(&self, own: &Measured<M>, tally: &mut Tally<M>) {
         let (phase, duration) = (own.phase, self.phases.duration[own.phase]);
         let roots = [self.phases.p0[phase].sqrt(), self.phases.p1[phase].sqrt()];
@@ -365,7 +359,7 @@ impl<const M: usize> JointAudit<'_, M> {
             let time = self.starts[phase] + side as f64 * duration;
             for k in 0..self.path.joints {
                 let mut away = (state.velocity[k] - velocity[k]).abs() - doubt[k] - state.velocity_error[k];
-                // Where the phase's own joint stands the other joints have no velocity to compare.
+                // Where the joint that governs the phase stands, the law tells no other joint's velocity: p is the recorded one.
                 if roots[side] == state.root_p {
                     away = 0.0;
                 }
@@ -374,7 +368,7 @@ impl<const M: usize> JointAudit<'_, M> {
         }
     }
 
-    /// What jumps from the phase before to this one; what this one passes on.
+    /// Offers the jumps of velocities and of the tip's speed from the phase before; what this phase passes on.
     fn joint<'a>(
         &self,
         before: Option<End<'a, M>>,
@@ -397,7 +391,7 @@ impl<const M: usize> JointAudit<'_, M> {
         let (mut step, mut over) = (0.0, 0.0);
         if let Some(before) = joined.filter(|_| corner) {
             let rounding = ROUNDING * (speed + before.speed);
-            // Where the feed is about other axes the speed is another quantity.
+            // The speeds are of one kind only where the feed limits the same axes.
             if before.piece.counts == piece.counts {
                 step = (speed - before.speed).abs() - rounding;
             }
@@ -421,7 +415,7 @@ impl<const M: usize> JointAudit<'_, M> {
         End { phase, piece, velocity: end_velocity, doubt: end_doubt, speed: end_speed }
     }
 
-    /// A jump of the tip's speed that means nothing to any joint.
+    /// A jump of the tip's speed that is negligible for every joint.
     fn slow(&self, duration: f64, place: &Place<M>) -> f64 {
         let mut least = f64::INFINITY;
         let mut weakest = f64::INFINITY;
@@ -455,7 +449,7 @@ impl<const M: usize> JointAudit<'_, M> {
         };
         let mut clock = self.starts[*phase];
         for k in 0..self.path.joints {
-            // Angles known up to whole turns are those that they are where they are known.
+            // A piece on which the joint's angle is known tells its whole turns on all pieces.
             if !piece.turning(k) && reach.turns[k].is_nan() {
                 reach.turns[k] = TURN * ((first[k] - begin[k]) / TURN).round();
             }
@@ -476,7 +470,7 @@ impl<const M: usize> JointAudit<'_, M> {
         reach.last = Some((piece.number, last.position, seen));
     }
 
-    /// The travel; angles that are known up to whole turns everywhere on the turn that suits them best.
+    /// Offers the travel. An angle that is known up to whole turns on all pieces is taken on the turn that fits its travel best.
     fn travel(&self, reach: &Reach<M>, tally: &mut Tally<M>) {
         for k in 0..self.path.joints {
             let [lower, upper] = self.limits.travel[k];
@@ -495,24 +489,5 @@ impl<const M: usize> JointAudit<'_, M> {
             let ratio = ((value - middle).abs() - 2.0 * ROUNDING * value.abs()) / half;
             tally.offer_ratio(Check::Travel, k, Worst { value, limit, ratio, time, line });
         }
-    }
-}
-
-/// Turn of the tip's direction over the way, between two places of the piece.
-fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> f64 {
-    let step = TANGENTS * piece.width;
-    let centre = u.clamp(step, piece.width - step);
-    let [before, here, after] = [centre - step, centre, centre + step].map(|at| piece.counted_slope(at));
-    let direction = |slope: [f64; M]| {
-        let size = length(&slope);
-        slope.map(|x| x / size)
-    };
-    let (before, after) = (direction(before), direction(after));
-    let turn = length::<M>(&std::array::from_fn(|k| after[k] - before[k]));
-    let found = (turn - ROUNDING).max(0.0) / (2.0 * step * length(&here));
-    if found.is_finite() {
-        found
-    } else {
-        0.0
     }
 }

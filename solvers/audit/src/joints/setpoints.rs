@@ -1,8 +1,8 @@
-//! The places of joint setpoints on the path of the tool tip, and when the profile is there.
+//! Audits setpoints of joints against the plan: their distances from the path, and when the profile is at their places.
 //!
-//! A setpoint is compared with K(C(u)): u on the phase that the profile is on at its time, moved along it until no nearer place
-//! is found. How far the setpoint stays off is one error, how far the profile gets between the time of the setpoint and being
-//! at that place the other. The clock starts every run anew: setpoints may wait at a stop for their next period.
+//! A setpoint is compared with the joints at u, for the u that is nearest to it on the phase that the profile is on at its time.
+//! Its distance from there is one error; how far the profile moves between the time of the setpoint and its own time at u is the
+//! other. The clock starts every run anew: setpoints may wait at a stop for their next period.
 
 use rayon::prelude::*;
 
@@ -17,13 +17,13 @@ use crate::{Check, Tally, EPS, PLACE_TOLERANCE, ROUNDINGS};
 /// How far a setpoint may lie from its place, as a share of its step.
 const STEP_SHARE: f64 = 1e-6;
 
-/// What times may be off, as a share of the period.
+/// How much a time may be uneven, as a share of the period.
 const UNEVEN: f64 = 1e-6;
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
 const VELOCITY_SHARE: f64 = 1e-3;
 
-/// A setpoint this near its stop stands on it, beyond rounding.
+/// A setpoint no farther from its stop than this, beyond rounding, stands on it.
 const STANDING: f64 = 1e-9;
 
 /// Steps towards the nearest place.
@@ -48,12 +48,12 @@ struct Nearest<const M: usize> {
     piece: usize,
     u: f64,
     tip: [f64; M],
-    /// The position, or 0 where it is none.
+    /// The position, or 0 where that is not finite.
     target: [f64; M],
-    /// From the place, and how far the profile is from it at the time of the setpoint.
+    /// Distance from the place, and distance of the profile from there at the time of the setpoint.
     off: f64,
     late: f64,
-    /// Of the profile there, and how wrong it may be.
+    /// Velocity of the profile there, and a bound of its error.
     velocity: [f64; M],
     velocity_error: [f64; M],
 }
@@ -67,7 +67,7 @@ struct Chord {
     line: i32,
 }
 
-/// Looks at setpoints chunk by chunk; what two chunks share is kept, nothing else.
+/// Takes setpoints chunk by chunk; only what two chunks share is kept.
 pub struct JointSetpoints<const M: usize> {
     tally: Tally<M>,
     is_usable: bool,
@@ -202,7 +202,7 @@ impl<const M: usize> JointSetpoints<M> {
     fn settle_chord(&mut self, audit: &JointAudit<M>, after: Option<f64>) -> Option<f64> {
         let (chord, before) = self.chord.take()?;
         let length = chord.length;
-        // The limit is that of a circle: where the tip gains speed the path leans to one end of the chord.
+        // The tolerance holds for a circle at constant speed: where the tip gains speed the error is greater on one side.
         let gain = (length - before).abs().max((after.unwrap_or(length) - length).abs()) / length;
         let gain = if gain.is_nan() { 0.0 } else { gain.clamp(0.0, 1.0) };
         let limit = audit.limits.chord_tolerance * (1.0 + 0.5 * gain);
@@ -279,7 +279,7 @@ impl<'a, const M: usize> Judge<'a, M> {
         let good =
             nearest.off <= PLACE_TOLERANCE && nearest.velocity.iter().all(|velocity| velocity.is_finite());
         for k in 0..self.audit.path.joints {
-            // From rest, a place known to `away` is passed at a speed known to this.
+            // From rest over a way of `away` the velocity reaches this.
             let unknown = (2.0 * limits.acceleration.greatest(k) * away).sqrt() + nearest.velocity_error[k];
             let value = if good { (recorded[k] - nearest.velocity[k]).abs() - unknown } else { 0.0 };
             let jump = if at_joint { limits.jump[k] } else { 0.0 };
@@ -305,7 +305,7 @@ impl<'a, const M: usize> Judge<'a, M> {
                 &made
             }
         };
-        // To the end of the piece before, and from the start of this one, whose words may mean another thing.
+        // To the end of the piece before, and from the start of this one: their words may have different meanings.
         let until = if crosses { first.width } else { nearest.u };
         let since = if crosses { 0.0 } else { nearest.u };
         let [there, here] =
@@ -433,7 +433,7 @@ fn nearest<const M: usize>(
     let share = if share.is_nan() { 0.5 } else { share };
     let mut place = piece.place((low + (high - low) * share).clamp(low, high), work);
     let mut to = piece.between(&place.position, target, None);
-    // No place is known more closely: next to rest it would be passed at another time.
+    // Steps below the rounding of the place stop: next to rest they would change its time.
     let known = rounding(piece, target);
     for _ in 0..MOST_STEPS {
         let (mut along, mut slope_sq) = (0.0, 0.0);
@@ -441,7 +441,6 @@ fn nearest<const M: usize>(
             along += to[k] * place.slope[k];
             slope_sq += place.slope[k] * place.slope[k];
         }
-        // A step within rounding brings it no nearer.
         if along.abs() <= known * slope_sq.sqrt() {
             break;
         }
@@ -461,13 +460,13 @@ fn nearest<const M: usize>(
     place
 }
 
-/// Distance of a position from a place, less rounding; the same angle on whichever turn.
+/// Distance of a position from a place, less rounding; angles known up to whole turns by the smaller angle.
 fn off<const M: usize>(piece: &Piece<M>, position: &[f64; M], place: &[f64; M]) -> f64 {
     let away = length(&piece.between(place, position, None));
     away - rounding(piece, position).max(rounding(piece, place))
 }
 
-/// What rounding makes of a distance: relative to the greatest coordinate of joints and tip.
+/// Rounding of a distance, by the greatest coordinate of joints and tip.
 fn rounding<const M: usize>(piece: &Piece<M>, position: &[f64; M]) -> f64 {
     let size = position.iter().fold(piece.start_size(), |most: f64, x| most.max(x.abs()));
     ROUNDING * (piece.joints() as f64).sqrt() * size
