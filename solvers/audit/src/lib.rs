@@ -5,7 +5,7 @@
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
 //! The path: `vectors`, `polygon`, `hodographs`, `curve`, `station`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `deviation`. The
-//! profile: `phases`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
+//! profile: `phases`, `phase_order`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
 //! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
 
 mod against_plan;
@@ -24,6 +24,7 @@ mod peak;
 mod phase_by_length;
 mod phase_jerk;
 mod phase_motion;
+mod phase_order;
 mod phase_time;
 pub mod phases;
 mod polygon;

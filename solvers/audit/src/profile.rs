@@ -14,6 +14,7 @@ use super::chord::chord_error;
 use super::curve::Followed;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
+use super::phase_order::PhaseOrder;
 use super::phases::Phases;
 use super::station::Stations;
 use super::vectors::length;
@@ -197,58 +198,19 @@ impl<const M: usize> Auditor<'_, M> {
 
     /// Phases must follow each other without gap over every piece, and runs begin and end at rest.
     fn order(&self, tally: &mut Tally<M>) {
-        let (phases, path) = (self.phases, self.path);
-        let runs = path.runs.len().saturating_sub(1);
-        if phases.runs.len() != path.runs.len()
-            || phases.runs.first().is_some_and(|&first| first != 0)
-            || phases.runs.last().is_some_and(|&last| last != phases.len() as i64)
-            || phases.runs.windows(2).any(|pair| pair[0] > pair[1])
-        {
-            tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, self.line(0));
+        let Self { path, phases, starts, .. } = *self;
+        if !(PhaseOrder { path, phases, starts, axes: path.axes }).audit(tally) {
             return;
         }
-        for run in 0..runs {
-            let [first, last] = [run, run + 1].map(|r| path.runs[r] as usize);
-            let mut next = Next { piece: first, u: 0.0 };
-            let here = phases.runs[run] as usize..phases.runs[run + 1] as usize;
-            for i in here.clone() {
-                if !phases.has_good_numbers(i, path.axes) {
-                    return; // reported with the phase itself
-                }
-                let entered = phases.piece[i] as usize;
-                if entered != next.piece {
-                    self.finish_piece(&mut next, entered.min(last), self.starts[i], tally);
-                }
-                let gap = if entered == next.piece { (phases.u0[i] - next.u).abs() } else { f64::INFINITY };
-                let slack = ROUNDINGS * EPS * path.width[entered];
-                tally.offer(Check::Order, 0, gap - slack, GAP_TOLERANCE, self.starts[i], self.line(entered));
-                next.u = phases.u1[i];
-                if i == here.start {
-                    let at_path_start = run == 0;
-                    let wanted = if at_path_start { self.limits.end_speeds[0] } else { 0.0 };
-                    self.run_end(i, phases.u0[i], phases.p0[i], wanted, self.starts[i], tally);
-                }
-                if i + 1 == here.end {
-                    let at_path_end = run + 1 == runs;
-                    let wanted = if at_path_end { self.limits.end_speeds[1] } else { 0.0 };
-                    let time = self.starts[i] + phases.duration[i];
-                    self.run_end(i, phases.u1[i], phases.p1[i], wanted, time, tally);
-                }
-            }
-            let time = here.end.checked_sub(1).map_or(0.0, |i| self.starts[i] + phases.duration[i]);
-            self.finish_piece(&mut next, last, time, tally);
-        }
-    }
-
-    /// Moves on to `piece`: what is left of the pieces before it has been passed over.
-    fn finish_piece(&self, next: &mut Next, piece: usize, time: f64, tally: &mut Tally<M>) {
-        while next.piece < piece {
-            let left = self.path.width[next.piece] - next.u;
-            if !self.path.curve::<M>(next.piece).is_motionless() {
-                let slack = ROUNDINGS * EPS * self.path.width[next.piece];
-                tally.offer(Check::Order, 0, left - slack, GAP_TOLERANCE, time, self.line(next.piece));
-            }
-            *next = Next { piece: next.piece + 1, u: 0.0 };
+        let [start_speed, end_speed] = self.limits.end_speeds;
+        let runs = phases.runs.windows(2).enumerate();
+        for (run, ends) in runs.filter(|(_, ends)| ends[0] < ends[1]) {
+            let (first, last) = (ends[0] as usize, ends[1] as usize - 1);
+            let wanted = if run == 0 { start_speed } else { 0.0 };
+            self.run_end(first, phases.u0[first], phases.p0[first], wanted, starts[first], tally);
+            let wanted = if run + 2 == phases.runs.len() { end_speed } else { 0.0 };
+            let time = starts[last] + phases.duration[last];
+            self.run_end(last, phases.u1[last], phases.p1[last], wanted, time, tally);
         }
     }
 
@@ -321,12 +283,6 @@ impl<const M: usize> Auditor<'_, M> {
     fn line(&self, piece: usize) -> i32 {
         self.path.line.get(piece).copied().unwrap_or(0)
     }
-}
-
-/// Where the next phase has to begin.
-struct Next {
-    piece: usize,
-    u: f64,
 }
 
 /// Walks one phase and offers what it meets.

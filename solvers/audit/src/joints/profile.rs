@@ -11,10 +11,11 @@ use super::plan::JointAudit;
 use crate::chord::chord_error;
 use crate::curve::Curves;
 use crate::phase_jerk::Jerks;
+use crate::phase_order::PhaseOrder;
 use crate::phases::{self, Phases};
 use crate::station::Station;
 use crate::vectors::length;
-use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
+use crate::{Check, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
 /// Places of a phase, as shares of the variable in which √p is linear where p is linear in u: closer at the ends, where
 /// accelerations have their extremes.
@@ -172,71 +173,20 @@ fn u_at(phases: &Phases, phase: usize, x: f64) -> f64 {
 /// Offers wrong numbers and phases that do not cover the pieces in order; which phases can be measured.
 fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<bool> {
     let (path, phases, starts) = (&audit.path.path, &audit.phases, audit.starts);
-    let piece_of = |phase: usize| (phases.piece[phase] as usize).min(path.len().saturating_sub(1));
-    let line = |phase: usize| path.line.get(piece_of(phase)).copied().unwrap_or(0);
-    let mut offer = |check: Check, value: f64, limit: f64, time: f64, line: i32| {
-        tally.offer(check, 0, value, limit, time, line);
-    };
+    PhaseOrder { path, phases, starts, axes: audit.path.joints }.audit(tally);
     let wrong = |good: bool| if good { 0.0 } else { f64::INFINITY };
-    let numbers: Vec<bool> =
-        (0..phases.len()).map(|phase| phases.has_good_numbers(phase, audit.path.joints)).collect();
-    for (phase, &good) in numbers.iter().enumerate() {
-        offer(Check::Numbers, wrong(good), 0.0, starts[phase], line(phase));
-    }
-    if path.is_empty() {
-        return numbers;
-    }
-    let slack = |phase: usize| 8.0 * EPS * path.width[piece_of(phase)];
-    let mut good = numbers;
-    for (phase, good) in good.iter_mut().enumerate() {
-        let (u0, u1) = (phases.u0[phase], phases.u1[phase]);
-        let inside = u1 > u0 && u0 >= 0.0 && u1 <= path.width[piece_of(phase)] + slack(phase);
-        offer(Check::Order, wrong(inside || !*good), GAP_TOLERANCE, starts[phase], line(phase));
-        *good &= inside;
-    }
-    let runs = phases.runs;
-    let fits = runs.len() == path.runs.len()
-        && runs.first() == Some(&0)
-        && runs.last() == Some(&(phases.len() as i64))
-        && runs.windows(2).all(|pair| pair[0] <= pair[1]);
-    if !fits {
-        offer(Check::Order, f64::INFINITY, GAP_TOLERANCE, 0.0, path.line[0]);
-        return good;
-    }
-    for run in 0..runs.len() - 1 {
-        let (first, end) = (runs[run] as usize, runs[run + 1] as usize);
-        let pieces = path.runs[run] as usize..path.runs[run + 1] as usize;
-        // Each phase begins where the one before ends, on the same piece or the next.
-        for phase in first..end {
-            let piece = piece_of(phase);
-            let gap = if phase == first {
-                if piece == pieces.start {
-                    phases.u0[phase].abs()
-                } else {
-                    f64::INFINITY
-                }
-            } else {
-                let (before, ended) = (piece_of(phase - 1), phases.u1[phase - 1]);
-                match piece {
-                    same if same == before => (phases.u0[phase] - ended).abs(),
-                    next if next == before + 1 => phases.u0[phase].abs() + (path.width[before] - ended).abs(),
-                    _ => f64::INFINITY,
-                }
-            };
-            offer(Check::Order, gap - 2.0 * slack(phase), GAP_TOLERANCE, starts[phase], line(phase));
-        }
-        let whole = if end > first {
-            let (last, piece) = (end - 1, pieces.end.wrapping_sub(1));
-            piece_of(last) == piece && path.width[piece] - phases.u1[last] <= GAP_TOLERANCE + slack(last)
-        } else {
-            pieces.is_empty()
-        };
-        if !whole {
-            let line = path.line[pieces.end.saturating_sub(1)];
-            offer(Check::Order, f64::INFINITY, GAP_TOLERANCE, starts[end.saturating_sub(1)], line);
-        }
-    }
-    good
+    let measurable = |phase: usize| {
+        let (piece, u0, u1) = (phases.piece[phase] as usize, phases.u0[phase], phases.u1[phase]);
+        let line = path.line.get(piece).copied().unwrap_or(0);
+        let has_numbers = phases.has_good_numbers(phase, audit.path.joints);
+        tally.offer(Check::Numbers, 0, wrong(has_numbers), 0.0, starts[phase], line);
+        let is_inside =
+            has_numbers && u1 > u0 && u0 >= 0.0 && u1 <= path.width[piece] * (1.0 + ROUNDINGS * EPS);
+        let off = wrong(is_inside || !has_numbers);
+        tally.offer(Check::Order, 0, off, GAP_TOLERANCE, starts[phase], line);
+        is_inside
+    };
+    (0..phases.len()).map(measurable).collect()
 }
 
 impl<const M: usize> JointAudit<'_, M> {

@@ -1,0 +1,71 @@
+//! Whether the phases of a profile follow each other without gap over every piece of every run.
+
+use super::curve::Followed;
+use super::phases::Phases;
+use super::{Check, Tally, EPS, GAP_TOLERANCE, ROUNDINGS};
+
+/// A path and the phases on it, whose laws are about so many axes or joints.
+pub struct PhaseOrder<'a> {
+    pub path: &'a Followed<'a>,
+    pub phases: &'a Phases<'a>,
+    pub starts: &'a [f64],
+    pub axes: usize,
+}
+
+/// Where the next phase has to begin.
+struct Next {
+    piece: usize,
+    u: f64,
+}
+
+impl PhaseOrder<'_> {
+    /// Offers the gaps; whether the runs are those of the path and all numbers are good, so that the ends of runs can be judged.
+    pub fn audit<const M: usize>(&self, tally: &mut Tally<M>) -> bool {
+        let Self { path, phases, starts, axes } = *self;
+        if phases.runs.len() != path.runs.len()
+            || phases.runs.first().is_some_and(|&first| first != 0)
+            || phases.runs.last().is_some_and(|&last| last != phases.len() as i64)
+            || phases.runs.windows(2).any(|pair| pair[0] > pair[1])
+        {
+            tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, self.line(0));
+            return false;
+        }
+        for (runs, pieces) in phases.runs.windows(2).zip(path.runs.windows(2)) {
+            let [first, last] = [pieces[0], pieces[1]].map(|piece| piece as usize);
+            let mut next = Next { piece: first, u: 0.0 };
+            let here = runs[0] as usize..runs[1] as usize;
+            for i in here.clone() {
+                if !phases.has_good_numbers(i, axes) {
+                    return false; // reported with the phase itself
+                }
+                let entered = phases.piece[i] as usize;
+                if entered != next.piece {
+                    self.finish_piece(&mut next, entered.min(last), starts[i], tally);
+                }
+                let gap = if entered == next.piece { (phases.u0[i] - next.u).abs() } else { f64::INFINITY };
+                let slack = ROUNDINGS * EPS * path.width[entered];
+                tally.offer(Check::Order, 0, gap - slack, GAP_TOLERANCE, starts[i], self.line(entered));
+                next.u = phases.u1[i];
+            }
+            let time = here.end.checked_sub(1).map_or(0.0, |i| starts[i] + phases.duration[i]);
+            self.finish_piece(&mut next, last, time, tally);
+        }
+        true
+    }
+
+    /// Moves on to `piece`: what is left of the pieces before it has been passed over.
+    fn finish_piece<const M: usize>(&self, next: &mut Next, piece: usize, time: f64, tally: &mut Tally<M>) {
+        while next.piece < piece {
+            let left = self.path.width[next.piece] - next.u;
+            if !self.path.curve::<M>(next.piece).is_motionless() {
+                let slack = ROUNDINGS * EPS * self.path.width[next.piece];
+                tally.offer(Check::Order, 0, left - slack, GAP_TOLERANCE, time, self.line(next.piece));
+            }
+            *next = Next { piece: next.piece + 1, u: 0.0 };
+        }
+    }
+
+    fn line(&self, piece: usize) -> i32 {
+        self.path.line.get(piece).copied().unwrap_or(0)
+    }
+}
