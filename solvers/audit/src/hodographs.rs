@@ -44,13 +44,13 @@ impl<const M: usize> Hodographs<M> {
             let least = weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
             ratio = degree as f64 * weights.iter().fold(0.0_f64, |most, w| most.max(*w)) / least;
         }
-        let (mut rows, mut bounds) = derivatives(ways, degree);
+        let (mut rows, mut bounds) = derivatives(ways, degree, if rational { 4 } else { 1 });
         if !rational {
             // From the steps themselves: differences of sums of them lose digits.
             let mut own = [[0.0; M]; MOST + 1];
             own[..degree].copy_from_slice(steps);
             let scale = degree as f64;
-            let (slopes, lengths) = derivatives(own, degree.saturating_sub(1));
+            let (slopes, lengths) = derivatives(own, degree.saturating_sub(1), 5);
             bounds = lengths.map(|length| scale * length);
             for order in 1..4 {
                 for i in 0..degree {
@@ -68,7 +68,7 @@ impl<const M: usize> Hodographs<M> {
             degree,
             rational,
             rows,
-            weights: derivatives(of_weights, degree).0,
+            weights: derivatives(of_weights, degree, if rational { 4 } else { 0 }).0,
             sizes,
             bounds: if rational { [f64::INFINITY; 4] } else { [bounds[1], bounds[2], bounds[3], bounds[4]] },
         }
@@ -153,11 +153,11 @@ fn sum<const M: usize>(rows: &[[f64; M]], t: f64, rest: f64) -> [f64; M] {
     value
 }
 
-/// The coefficients, times binomials, of a function of this degree and of its derivatives up to order 3, and the greatest lengths
-/// of its coefficients of each order up to 4.
-fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize) -> ([Rows<M>; 4], [f64; 5]) {
+/// The coefficients, times binomials, of a function of this degree and of its derivatives, as many as are asked for up to order 3,
+/// and the greatest lengths of its coefficients of each order up to 4.
+fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize, orders: usize) -> ([Rows<M>; 4], [f64; 5]) {
     let (mut found, mut lengths) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 5]);
-    for order in 0..5.min(degree + 1) {
+    for order in 0..orders.min(degree + 1) {
         let count = degree - order;
         let mut binomial = 1.0;
         for i in 0..=count {

@@ -23,12 +23,14 @@ struct Measured {
     middle: [f64; 2],
 }
 
-/// A place of a phase: u, the length from the anchor, and the motion along the path.
+/// A place of a phase: u, the length from the anchor, the motion along the path, and the time from the anchor where the motion
+/// follows from that.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub u: f64,
     pub way: f64,
     pub pace: Pace,
+    time: Option<f64>,
 }
 
 /// How far, at most, velocity, acceleration, jerk and dT/ds between two places are as vectors from the straight line between
@@ -118,16 +120,16 @@ impl<const M: usize> PhaseByLength<M> {
         } else {
             before
         };
-        let mut pace = self.speed.pace(way);
+        let (mut pace, time) = self.speed.pace(way);
         if self.anchored_at_end {
             pace.a = -pace.a;
         }
-        Place { u, way, pace }
+        Place { u, way, pace, time }
     }
 
     /// Time since the start of the phase at a place.
     pub fn since(&self, place: &Place) -> f64 {
-        let time = self.speed.time(place.way);
+        let time = place.time.unwrap_or_else(|| self.speed.time(place.way));
         if self.anchored_at_end {
             self.duration - time
         } else {

@@ -56,17 +56,20 @@ impl SpeedByLength {
         }
     }
 
-    /// The motion at a length from the anchor.
-    pub fn pace(&self, way: f64) -> Pace {
+    /// The motion at a length from the anchor, and the time to there where the motion follows from it.
+    pub fn pace(&self, way: f64) -> (Pace, Option<f64>) {
         match self {
-            Self::Constant { speed } => Pace { v: *speed, a: 0.0, j: 0.0 },
-            Self::Jerk { start, .. } => start.after(self.time(way)),
+            Self::Constant { speed } => (Pace { v: *speed, a: 0.0, j: 0.0 }, None),
+            Self::Jerk { start, .. } => {
+                let time = self.time(way);
+                (start.after(time), Some(time))
+            }
             Self::Cubic { c, length } => {
                 let x = way / length;
                 let slope = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]);
                 let bend = 2.0 * c[2] + 6.0 * c[3] * x;
                 let v = square(c, x).sqrt();
-                Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }
+                (Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }, None)
             }
         }
     }
@@ -136,8 +139,8 @@ fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
         return duration * (way / whole);
     }
     let (mut low, mut high) = (0.0, duration);
-    // From rest the time is as the cube root of the length.
-    let mut t = duration * (way / whole).cbrt();
+    // From rest the time is as the cube root of the length; where the speed changes little, as the length.
+    let mut t = (duration * (way / whole).cbrt()).min(way / start.v);
     for _ in 0..MOST_STEPS {
         let miss = start.way(t) - way;
         if miss > 0.0 {
@@ -193,7 +196,7 @@ mod tests {
         let speed = SpeedByLength::Jerk { start, duration: 2.0 };
         for t in [1e-9, 1e-3, 0.5, 1.9, 2.0] {
             let t: f64 = t;
-            let (time, pace) = (speed.time(t.powi(3)), speed.pace(t.powi(3)));
+            let (time, (pace, _)) = (speed.time(t.powi(3)), speed.pace(t.powi(3)));
             assert!((time / t - 1.0).abs() < 1e-15, "{t}");
             assert!((pace.v / (3.0 * t * t) - 1.0).abs() < 1e-14 && (pace.a / (6.0 * t) - 1.0).abs() < 1e-14);
         }
@@ -207,7 +210,7 @@ mod tests {
         let speed = SpeedByLength::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
         for t in [0.01, 0.2, 0.4] {
             let way = 5.0 * t + 15.0 * t * t;
-            let (time, Pace { v, a, j }) = (speed.time(way), speed.pace(way));
+            let (time, (Pace { v, a, j }, _)) = (speed.time(way), speed.pace(way));
             assert!((time - t).abs() < 1e-12);
             assert!((v - 5.0 - 30.0 * t).abs() < 1e-13 && (a - 30.0).abs() < 1e-13 && j.abs() < 1e-12);
         }
