@@ -34,8 +34,9 @@ pub struct Prepared<'a, G, const M: usize> {
     rows: Option<Constraints<M>>,
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
-    /// The time to stop from the greatest speed, in s.
-    pub stop_time: f64,
+    /// The speeds that the envelope allows on the intervals, in mm/s; the optimum stays about below them.
+    pub speeds: Vec<f64>,
+    pub slopes: Slopes,
     watch: Watch<'a>,
 }
 
@@ -59,18 +60,18 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         watch.check();
         let whole = || grid.constraints(problem, 0..grid.pieces.len());
         let rows = (grid.pieces.len() <= effort.window).then(whole);
-        let mut prepared = Self { problem, grid, ends, bound_ends, rows, x: vec![], stop_time: 0.0, watch };
-        prepared.begin(slopes)?;
+        let mut prepared =
+            Self { problem, grid, ends, bound_ends, rows, x: vec![], speeds: vec![], slopes, watch };
+        prepared.begin()?;
         Ok(prepared)
     }
 
     /// The first plan.
-    fn begin(&mut self, slopes: Slopes) -> Result<(), Fault> {
-        let limits = &self.problem.limits;
+    fn begin(&mut self) -> Result<(), Fault> {
+        let (limits, slopes) = (&self.problem.limits, self.slopes);
         let mut caps =
             self.each(|rows, n, _| rows.intervals[n].envelope_cap(limits, slopes.k), f64::INFINITY);
-        let fastest = caps.iter().copied().fold(0.0, f64::max).power(2.0 / 3.0);
-        self.stop_time = slopes.stop_time(fastest);
+        self.speeds = caps.iter().map(|r| r.power(2.0 / 3.0)).collect();
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
             self.watch.check();

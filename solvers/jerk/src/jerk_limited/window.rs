@@ -118,7 +118,8 @@ impl<const M: usize> Window<M> {
         None
     }
 
-    /// Starts inside the tightened limits, on the ways back from the last plan y, the nearest to y first.
+    /// Starts on the ways back from the last plan y that are inside the tightened limits, the nearest to y first, and at last
+    /// one from afar, by the first plan.
     fn starts<'e>(
         &self,
         ends: &[WindowEnd; 2],
@@ -132,13 +133,15 @@ impl<const M: usize> Window<M> {
         let ways = ways_back(ends, inside(x));
         let is_near = |part: f64| ways.iter().find(|way| is_inside(&blend(way, y, part)));
         let near = BACK.into_iter().find_map(|part| Some((part, is_near(part)?)));
-        let Some((least, way)) = near else { return vec![] };
-        BACK.into_iter()
-            .filter(|&part| part >= least)
-            .map(|part| {
+        let parts =
+            near.into_iter().flat_map(|(least, way)| BACK.map(|part| (part >= least).then_some((part, way))));
+        parts
+            .flatten()
+            .map(|(part, way)| {
                 let start = Effort { barrier: BARRIER * part, warm: true, ..*effort };
                 (blend(way, y, FURTHER * part), start)
             })
+            .chain([(inside(x), *effort)])
             .collect()
     }
 

@@ -21,10 +21,10 @@ use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use crate::path_problem::{Effort, Fault, Geometry, Problem};
 
-/// Windows reach this many stop times of the first plan (the optimum takes a third or more) and intervals beyond their
-/// cuts.
+/// Windows reach this many stop times and intervals beyond their cuts: the time of the first plan on the way there (the optimum
+/// takes a third of it or more) over the time to stop from the greatest speed that the envelope allows on that way.
 const REACH: (f64, usize) = (14.0, 80);
-/// Least travel time from cut to cut, in stop times of the first plan.
+/// Least travel time from cut to cut, in the same stop times.
 const LONG: f64 = 36.0;
 /// Windows in memory, for each thread.
 const BATCH: usize = 2;
@@ -120,14 +120,21 @@ struct Run<'a, G, const M: usize> {
     stations: &'a [f64],
 }
 
+/// Some intervals: the time of the first plan in s, and the greatest speed that the envelope allows in mm/s.
+#[derive(Default)]
+struct Drive {
+    time: f64,
+    speed: f64,
+}
+
 impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     /// The windows, each with its overlaps.
     fn windows(&self, cuts: &[usize]) -> Vec<Range<usize>> {
         let reach = |from: usize, to: usize| {
             let step = |n: usize| if to > from { n + 1 } else { n - 1 };
-            let (mut n, mut time) = (from, 0.0);
-            while n != to && (n.abs_diff(from) < REACH.1 || time < REACH.0 * self.prepared.stop_time) {
-                time += self.lasts(n.min(step(n)));
+            let (mut n, mut drive) = (from, Drive::default());
+            while n != to && (n.abs_diff(from) < REACH.1 || self.stops(&drive) < REACH.0) {
+                drive = self.onward(&drive, n.min(step(n)));
                 n = step(n);
             }
             n
@@ -146,14 +153,13 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     /// The stations where windows are cut, including the ends of the path.
     fn cuts(&self) -> Vec<usize> {
         let count = self.stations.len() - 1;
-        let long = LONG * self.prepared.stop_time;
         let mut cuts = vec![0];
-        let (mut last, mut time) = (0, 0.0);
+        let (mut last, mut drive) = (0, Drive::default());
         for n in 0..count {
-            time += self.lasts(n);
-            if n + 1 - last >= self.effort.window && time >= long {
+            drive = self.onward(&drive, n);
+            if n + 1 - last >= self.effort.window && self.stops(&drive) >= LONG {
                 cuts.push(n + 1);
-                (last, time) = (n + 1, 0.0);
+                (last, drive) = (n + 1, Drive::default());
             }
         }
         // A short remainder belongs to the window before it.
@@ -166,9 +172,16 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         cuts
     }
 
-    /// Time of an interval in the first plan, in s.
-    fn lasts(&self, n: usize) -> f64 {
-        duration(&self.prepared.x, n, self.stations[n + 1] - self.stations[n])
+    /// A drive and interval n.
+    fn onward(&self, drive: &Drive, n: usize) -> Drive {
+        let x = &self.prepared.x;
+        let time = drive.time + duration(x, n, self.stations[n + 1] - self.stations[n]);
+        Drive { time, speed: drive.speed.max(self.prepared.speeds[n]) }
+    }
+
+    /// The time of a drive in stop times.
+    fn stops(&self, drive: &Drive) -> f64 {
+        drive.time / self.prepared.slopes.stop_time(drive.speed)
     }
 
     /// Solves a window between states of the first plan; with the lower bound of the intervals `core` in it.
