@@ -34,7 +34,7 @@ pub struct Prepared<'a, G, const M: usize> {
     rows: Option<Constraints<M>>,
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
-    /// The speeds that the envelope allows on the intervals, in mm/s; the optimum stays about below them.
+    /// The greatest speed that the envelope allows on each interval, in mm/s.
     pub speeds: Vec<f64>,
     pub slopes: Slopes,
     watch: Watch<'a>,

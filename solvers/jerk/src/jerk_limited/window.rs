@@ -118,8 +118,8 @@ impl<const M: usize> Window<M> {
         None
     }
 
-    /// Starts on the ways back from the last plan y that are inside the tightened limits, the nearest to y first, and at last
-    /// one from afar, by the first plan.
+    /// Starts inside the tightened limits, on the ways back from the last plan y, the nearest to y first; the last of all is the
+    /// start of the first round, far from y.
     fn starts<'e>(
         &self,
         ends: &[WindowEnd; 2],
@@ -130,19 +130,18 @@ impl<const M: usize> Window<M> {
         let is_inside = |z: &[f64]| {
             (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
         };
-        let ways = ways_back(ends, inside(x));
+        let far = inside(x);
+        let ways = ways_back(ends, far.clone());
         let is_near = |part: f64| ways.iter().find(|way| is_inside(&blend(way, y, part)));
-        let near = BACK.into_iter().find_map(|part| Some((part, is_near(part)?)));
-        let parts =
-            near.into_iter().flat_map(|(least, way)| BACK.map(|part| (part >= least).then_some((part, way))));
-        parts
-            .flatten()
-            .map(|(part, way)| {
+        let mut starts = vec![];
+        if let Some((least, way)) = BACK.into_iter().find_map(|part| Some((part, is_near(part)?))) {
+            starts.extend(BACK.into_iter().filter(|&part| part >= least).map(|part| {
                 let start = Effort { barrier: BARRIER * part, warm: true, ..*effort };
                 (blend(way, y, FURTHER * part), start)
-            })
-            .chain([(inside(x), *effort)])
-            .collect()
+            }));
+        }
+        starts.push((far, *effort));
+        starts
     }
 
     /// The spline nearest to y on a way back that holds all limits, and its time in s.

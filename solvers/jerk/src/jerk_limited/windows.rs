@@ -172,7 +172,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         cuts
     }
 
-    /// A drive and interval n.
+    /// The drive that goes on over interval n.
     fn onward(&self, drive: &Drive, n: usize) -> Drive {
         let x = &self.prepared.x;
         let time = drive.time + duration(x, n, self.stations[n + 1] - self.stations[n]);
