@@ -6,6 +6,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows};
+use super::memory;
 use super::native::Of;
 use super::plan::to_exception;
 use super::problem::Problem;
@@ -64,6 +65,7 @@ fn plan_jerk_limited<'py>(
         let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
         let [excess, bounds] = [&arcs.excess, &arcs.lower_bound].map(|part| PyArray1::from_slice(py, part));
         let stopped = arcs.stopped;
+        py.detach(memory::give_back);
         Ok((arcs.into(), stopped, excess, bounds))
     })
 }

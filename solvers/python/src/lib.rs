@@ -10,6 +10,7 @@ mod gcode;
 mod jerk;
 mod joint_audit;
 mod kinematics;
+mod memory;
 mod moves;
 mod native;
 mod path;

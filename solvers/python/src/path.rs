@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::arrays::{indices, padded, padded_rows, row, rows, to_array2};
 use super::curve::{Curve, Padded};
+use super::memory;
 use super::moves::Moves;
 use super::native::Of;
 use super::with_padded_axes;
@@ -192,7 +193,10 @@ fn build_path<'py>(
             let (line, name, sentence) = (moves.line[error.index], &rules.name, sentence(error.fault));
             ProgramError::new_err((format!("{name}, line {line}: {sentence}"), line))
         })?;
-        columns(py, &path, &splines, axes, progress.as_ref())
+        let columns = columns(py, &path, &splines, axes, progress.as_ref());
+        drop(path);
+        py.detach(memory::give_back);
+        columns
     })
 }
 
