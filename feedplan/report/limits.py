@@ -22,7 +22,8 @@ from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]
 
-_SAMPLES = 400_000
+# Most samples in all: 16 for each two of the 12 000 points that the page keeps of a curve.
+_SAMPLES = 100_000
 _SAMPLES_AT_ONCE = 10_000
 _SAMPLES_PER_PHASE = 33
 
