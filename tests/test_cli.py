@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import os
@@ -29,6 +30,8 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             raise box["result"]
         return box["result"]
 
+    # It keeps the planner that it finds when it is imported first.
+    importlib.import_module("feedplan.one_step_more")
     monkeypatch.setattr("feedplan.planning.plan", fake)
     return box
 

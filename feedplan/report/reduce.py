@@ -70,8 +70,11 @@ class Envelope:
             return
         columns = np.ascontiguousarray(values.T).reshape(values.shape[1], -1, width)
         # A gap (NaN) is not an extreme, but stays if all of the bucket is a gap.
-        least = np.where(np.isnan(columns), np.inf, columns).argmin(axis=2)
-        greatest = np.where(np.isnan(columns), -np.inf, columns).argmax(axis=2)
+        gap = np.isnan(columns)
+        low, high = columns, columns
+        if gap.any():
+            low, high = np.where(gap, np.inf, columns), np.where(gap, -np.inf, columns)
+        least, greatest = low.argmin(axis=2), high.argmax(axis=2)
         start = np.arange(columns.shape[1]) * width
         pick = np.sort(np.stack([start + least, start + greatest], axis=-1), axis=-1)
         value = np.take_along_axis(values.T[:, :, None], pick.reshape(len(pick), -1, 1), axis=1)
@@ -151,21 +154,22 @@ def _limited(kept: Kept, tolerance: float, limit: int) -> tuple[Kept, float]:
 def _thin(points: Floats, tag: NDArray[np.int64], cost: Floats, tolerance: float) -> Kept:
     """Removes points within `tolerance`; `cost` is the part of it already used between each point and the
     next."""
+    kept = np.arange(len(points))
     idle = 0
     parity = 1
     while idle < 2 and len(points) > 2:
         # Every second point is a candidate: its neighbours stay, so all candidates can be judged at once.
-        middle = np.arange(parity, len(points) - 1, 2)
-        spent = np.maximum(cost[middle - 1], cost[middle])
-        total = spent + _distance(points[middle], points[middle - 1], points[middle + 1])
+        before, middle, after = (slice(parity + k, len(points) - 1 + k, 2) for k in (-1, 0, 1))
+        spent = np.maximum(cost[before], cost[middle])
+        total = spent + _distance(points[middle], points[before], points[after])
         gone = total <= tolerance
         keep = np.ones(len(points), dtype=bool)
-        keep[middle[gone]] = False
-        cost[middle[gone] - 1] = total[gone]
-        points, tag, cost = points[keep], tag[keep], cost[keep]
+        keep[middle] = ~gone
+        cost[before][gone] = total[gone]
+        points, kept, cost = points[keep], kept[keep], cost[keep]
         idle = idle + 1 if np.count_nonzero(gone) <= len(points) // 50 else 0
         parity = 3 - parity
-    return points, tag, cost
+    return points, tag[kept], cost
 
 
 def _distance(points: Floats, a: Floats, b: Floats) -> Floats:
