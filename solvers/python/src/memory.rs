@@ -1,7 +1,7 @@
 //! Memory that kernels have freed goes back to the system.
 //!
 //! A fit or a plan makes many small arrays on several threads. The C library of Linux keeps what they free for each thread,
-//! and the stages that follow, on other threads, would add theirs to it: a plan of a million blocks holds 0.5 GB so.
+//! and the stages that follow, on other threads, would add theirs to it: 0.5 GB in a plan of a million blocks.
 
 /// Gives back the memory that has been freed, where the allocator keeps it until it is asked.
 #[allow(unsafe_code)]
