@@ -10,7 +10,7 @@ use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::phase_motion::Phase;
+use feedplan_setpoints::phase_motion::{Phase, Phases};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 
 const PIECES: usize = 1000;
@@ -45,7 +45,7 @@ fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
     raised
 }
 
-fn profile(law: PhaseLaw, curve: &CompositeCurve<3>, r: f64) -> Vec<Phase> {
+fn profile(law: PhaseLaw, curve: &CompositeCurve<3>, r: f64) -> Phases {
     let lengths = CurveLength::new(curve, 1e-13, Watch::default());
     // x' of the weights 1, r, …, r^d on a piece with x' = 1 without them: r at its start, 1/r at its end.
     let at_ends = |p0: f64, p1: f64| (p0 / (r * r), p1 * r * r);
@@ -91,9 +91,10 @@ fn setpoints(c: &mut Criterion) {
             for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
                 let curve = changed(&spline(), by, r);
                 let phases = profile(law, &curve, r);
-                let time: f64 = phases.iter().map(|phase| phase.duration).sum();
+                let time: f64 = phases.duration.iter().sum();
                 let path = PathData {
                     curve: curve.into(),
+                    axes: 3,
                     tip_speed: None,
                     way_speed: None,
                     feed_share: vec![],
@@ -103,8 +104,9 @@ fn setpoints(c: &mut Criterion) {
                     dwell: vec![0.0],
                 };
                 let period = time / (SETPOINTS - 1) as f64;
-                let sampler = Sampler::on(&path.into(), phases, &[0, PIECES], period, Watch::default())
-                    .expect("a profile");
+                let sampler =
+                    Sampler::on(&path.into(), &phases.into(), &[0, PIECES], period, Watch::default())
+                        .expect("a profile");
                 let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{law:?}"));
                 group.bench_function(name, |b| {
                     b.iter(|| {

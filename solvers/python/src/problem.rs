@@ -93,6 +93,7 @@ impl<const M: usize> Rows<M> {
         Ok(Self {
             path: Arc::new(PathData {
                 curve: arrays.curve.padded()?.clone(),
+                axes: arrays.curve.axes(),
                 tip_speed: speed(&arrays.tip_speed)?,
                 way_speed: speed(&arrays.way_speed)?,
                 feed_share: match &arrays.feed_share {

@@ -1,5 +1,8 @@
 //! `Profile`: the columns of a speed profile.
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -7,6 +10,7 @@ use pyo3::types::PyDict;
 use super::views::view;
 use feedplan_jerk::jerk_profile::JerkProfile;
 use feedplan_planner::profile::{self, NO_AXIS};
+use feedplan_setpoints::phase_motion::Phases;
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
@@ -15,7 +19,8 @@ macro_rules! profile {
         /// The columns of `feedplan.profile.SpeedProfile`.
         #[pyclass(frozen, module = "feedplan._solvers")]
         pub struct Profile {
-            $(pub $column: Vec<$type>,)+
+            /// Shared with all that read them.
+            pub phases: Arc<Phases>,
             $(pub $other: Vec<$of>,)+
         }
 
@@ -30,8 +35,9 @@ macro_rules! profile {
             /// From the arrays of a `SpeedProfile`. Raises InputError where those of its phases differ in length.
             #[new]
             fn new(columns: Columns<'_>) -> PyResult<Self> {
+                let phases = Phases { $($column: columns.$column.as_slice()?.to_vec(),)+ };
                 let profile = Self {
-                    $($column: columns.$column.as_slice()?.to_vec(),)+
+                    phases: phases.into(),
                     $($other: columns.$other.as_slice()?.to_vec(),)+
                 };
                 let count = profile.piece.len();
@@ -60,10 +66,18 @@ profile! {
     others: runs: i64, slowed: u32, kinked: u32
 }
 
+impl Deref for Profile {
+    type Target = Phases;
+
+    fn deref(&self) -> &Phases {
+        &self.phases
+    }
+}
+
 impl From<profile::Profile> for Profile {
     fn from(planned: profile::Profile) -> Self {
         let count = planned.len();
-        Self {
+        let phases = Phases {
             piece: planned.piece,
             kind: planned.kind,
             axis: planned.axis,
@@ -75,16 +89,14 @@ impl From<profile::Profile> for Profile {
             duration: planned.duration,
             a0: vec![0.0; count],
             a1: vec![0.0; count],
-            runs: planned.runs,
-            slowed: planned.slowed,
-            kinked: vec![],
-        }
+        };
+        Self { phases: phases.into(), runs: planned.runs, slowed: planned.slowed, kinked: vec![] }
     }
 }
 
 impl From<JerkProfile> for Profile {
     fn from(planned: JerkProfile) -> Self {
-        Self {
+        let phases = Phases {
             axis: vec![NO_AXIS; planned.len()],
             piece: planned.piece,
             kind: planned.kind,
@@ -96,10 +108,8 @@ impl From<JerkProfile> for Profile {
             duration: planned.duration,
             a0: planned.a0,
             a1: planned.a1,
-            runs: planned.runs,
-            slowed: vec![],
-            kinked: planned.kinks,
-        }
+        };
+        Self { phases: phases.into(), runs: planned.runs, slowed: vec![], kinked: planned.kinks }
     }
 }
 

@@ -13,8 +13,6 @@ use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::phase_motion::Phase;
 use feedplan_setpoints::sampling::{Chunk, Interpolator, Resume, Sampler};
 use feedplan_setpoints::{Sampled, States};
 
@@ -33,31 +31,6 @@ type ChunkArrays<'py> = (
     u32,
     f64,
 );
-
-/// Phase i of a profile on a path in so many axes. The error is a sentence for the user.
-fn phase(profile: &Profile, i: usize, axes: usize) -> Result<Phase, String> {
-    let (kind, axis) = (profile.kind[i], profile.axis[i]);
-    let law = PhaseLaw::from_number(kind)
-        .ok_or_else(|| format!("phase {i} of the profile has the unknown kind {kind}"))?;
-    if matches!(law, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) && axis as usize >= axes {
-        return Err(format!(
-            "phase {i} of the profile is governed by axis {axis}, but the path has {axes}: plan this path again"
-        ));
-    }
-    Ok(Phase {
-        piece: profile.piece[i],
-        law,
-        axis,
-        value: profile.value[i],
-        u0: profile.u0[i],
-        u1: profile.u1[i],
-        p0: profile.p0[i],
-        p1: profile.p1[i],
-        duration: profile.duration[i],
-        a0: profile.a0[i],
-        a1: profile.a1[i],
-    })
-}
 
 fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> ChunkArrays<'_> {
     (
@@ -113,16 +86,8 @@ impl PySampler {
         let runs = profile.runs.iter().map(offset).collect::<PyResult<Vec<_>>>()?;
         let sampler = with_padded_axes!(axes, M, {
             let path = &problem.rows::<M>()?.path;
-            let sampler = run(py, progress.as_ref(), |watch| {
-                let count = profile.piece.len();
-                let each = watch.part(0.5).each(count);
-                let counted = |i: usize| {
-                    each.count(i);
-                    phase(profile, i, axes)
-                };
-                let phases = (0..count).map(counted).collect::<Result<Vec<_>, String>>()?;
-                path.sampled(phases, &runs, period, watch.part(0.5))
-            })?;
+            let sampler =
+                run(py, progress.as_ref(), |watch| path.sampled(&profile.phases, &runs, period, watch))?;
             sampler.map(InAxes::new).map_err(InputError::new_err)
         })?;
         Ok(Self { axes, sampler, resume: Mutex::new(None) })

@@ -5,19 +5,20 @@ pub mod phase_motion;
 pub mod sampling;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
-use phase_motion::Phase;
+use phase_motion::Phases;
 use sampling::{Chunk, Interpolator, Resume, Sampler};
 
 instances! {
     /// Setpoints of a path.
-    pub trait Sampled for [3, 6, 9] std::sync::Arc<sampling::PathData<M>> = {
+    pub trait Sampled for [3, 6, 9] Arc<sampling::PathData<M>> = {
         /// Lays the times of the setpoints of a profile: its phases, the phase offsets of its runs, and the period in s. The
         /// error is a sentence for the user.
-        fn sampled(&self, phases: Vec<Phase>, runs: &[usize], period: f64, watch: Watch)
+        fn sampled(&self, phases: &Arc<Phases>, runs: &[usize], period: f64, watch: Watch)
             -> Result<Sampler<M>, String> = Sampler::on;
     }
 }

@@ -35,8 +35,8 @@ use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::Coefficients;
 use feedplan_planner::phase_law::PhaseLaw;
 pub use lengths::{Counts, PiecePath};
-pub use phase::Phase;
 use phase::{Part, SLOW};
+pub use phase::{Phase, Phases};
 pub use rate::{TipSpeed, MAX_TIP};
 
 /// A step's length is met within this part of the step. 1e-6 would do for the length; four digits more keep the second

@@ -23,7 +23,7 @@ use self::check::check;
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
 pub use self::path_data::PathData;
-use crate::phase_motion::{Phase, PhaseMotion, PiecePath, Rates, State};
+use crate::phase_motion::{Phase, PhaseMotion, Phases, PiecePath, Rates, State};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::watch::Watch;
 
@@ -80,7 +80,7 @@ pub struct Resume {
 /// A profile on its path, ready to be read at any setpoint.
 pub struct Sampler<const M: usize> {
     path: Arc<PathData<M>>,
-    phases: Vec<Phase>,
+    phases: Arc<Phases>,
     /// Time from the start of the phase's run.
     starts: Vec<f64>,
     runs: Vec<Run>,
@@ -94,12 +94,12 @@ impl<const M: usize> Sampler<M> {
     /// Lays the time grid. `phase_runs` are the phase offsets of the runs. The error is a sentence for the user.
     pub fn on(
         path: &Arc<PathData<M>>,
-        phases: Vec<Phase>,
+        phases: &Arc<Phases>,
         phase_runs: &[usize],
         period: f64,
         watch: Watch,
     ) -> Result<Self, String> {
-        check(path, &phases, phase_runs, watch)?;
+        check(path, phases, phase_runs, watch)?;
         if !(period.is_finite() && period > 0.0) {
             return Err(format!("the period is {period} s: give a positive one"));
         }
@@ -110,13 +110,13 @@ impl<const M: usize> Sampler<M> {
         for r in 0..path.dwell.len() {
             let (of_run, pieces) = (phase_runs[r]..phase_runs[r + 1], path.runs[r]..path.runs[r + 1]);
             let mut time = 0.0;
-            for phase in &phases[of_run.clone()] {
+            for duration in &phases.duration[of_run.clone()] {
                 starts.push(time);
-                time += phase.duration;
+                time += duration;
             }
             let last = r + 1 == path.dwell.len();
-            if let Some(phase) = phases[of_run.clone()].last() {
-                let motion = path.motion(phase);
+            if let Some(phase) = of_run.clone().last().and_then(|i| phases.get(i)) {
+                let motion = path.motion(&phase);
                 let speed = |u| norm(&motion.rates(&motion.at(u)).velocity);
                 if phase.p1 > 0.0 && speed(phase.u1) > STANDSTILL * speed(phase.u0) {
                     let line = path.lines[phase.piece as usize];
@@ -155,7 +155,8 @@ impl<const M: usize> Sampler<M> {
             begin += time + path.dwell[r];
         }
         let count = first as usize + 1;
-        let sampler = Self { path: path.clone(), phases, starts, runs, period, count, ends_moving };
+        let sampler =
+            Self { path: path.clone(), phases: phases.clone(), starts, runs, period, count, ends_moving };
         match sampler.start() {
             Some((speed, ..)) if speed > 0.0 && sampler.path.start_dwell > 0.0 => Err(format!(
                 "line {}: the plan begins at {speed:.6} mm/s, but the program pauses {} s there: plan with start speed 0",
@@ -259,19 +260,19 @@ impl<const M: usize> Sampler<M> {
             for i in 0..part.t.len() {
                 watch.check_at(i);
                 let (piece, u) = (pieces[part.start + i], u[part.start + i]);
-                let after = self.phases.partition_point(|phase| (phase.piece, phase.u1) < (piece, u));
-                let Some(found) = self.phases.get(after) else {
+                let after = self.phases.up_to(piece, u);
+                if after == self.phases.len() {
                     let run = &self.runs[self.runs.len() - 1];
                     self.set_end(run, &mut part, i, self.ends_moving);
                     part.t[i] = run.begin + run.time;
                     continue;
-                };
+                }
                 let run = &self.runs[self.runs.partition_point(|run| run.phases.end <= after)];
                 if kept.as_ref().is_none_or(|(phase, _)| *phase != after) {
-                    kept = Some((after, self.path.motion(found)));
+                    kept = Some((after, self.path.motion(&self.phase(after))));
                 }
                 let Some((_, motion)) = &kept else { unreachable!("a motion is kept") };
-                let state = motion.at(u.clamp(found.u0, found.u1));
+                let state = motion.at(u.clamp(self.phases.u0[after], self.phases.u1[after]));
                 self.set(&mut part, i, after, motion, &state);
                 part.t[i] = run.begin + self.starts[after] + state.pace.t;
             }
@@ -289,6 +290,10 @@ impl<const M: usize> Sampler<M> {
                 self.runs[from..].iter().take_while(inner).map(|run| run.first + 1).collect()
             }
         }
+    }
+
+    fn phase(&self, i: usize) -> Phase {
+        self.phases.get(i).expect("all laws are known")
     }
 
     /// The run that leads to a setpoint other than the first.
@@ -326,7 +331,7 @@ impl<const M: usize> Sampler<M> {
                 };
                 let phase = cursor.seek(run, time);
                 let state = cursor.motion().at_time(time - self.starts[phase], self.period);
-                effort.raise(state.iterations, state.error * self.phases[phase].duration / self.period);
+                effort.raise(state.iterations, state.error * self.phases.duration[phase] / self.period);
                 self.set(&mut part, i, phase, cursor.motion(), &state);
             }
             i = stop;
@@ -372,7 +377,7 @@ impl<const M: usize> Sampler<M> {
             let phase = cursor.seek(run, time);
             let motion = cursor.motion();
             if phase != at.phase || at.u.is_nan() {
-                at = Resume { phase, u: self.phases[phase].u0, ..at };
+                at = Resume { phase, u: self.phases.u0[phase], ..at };
             }
             let (rounds, error) = self.step(motion, time - self.starts[phase], &mut at.u);
             effort.raise(rounds, error);
@@ -422,7 +427,7 @@ impl<const M: usize> Sampler<M> {
 
     fn set(&self, part: &mut Slices<M>, i: usize, phase: usize, motion: &PhaseMotion<M>, state: &State) {
         let (position, Rates { velocity, acceleration, jerk }) = motion.sample(state);
-        let piece = self.phases[phase].piece;
+        let piece = self.phases.piece[phase];
         part.position[i] = position;
         part.velocity[i] = velocity;
         part.acceleration[i] = acceleration;
@@ -435,8 +440,8 @@ impl<const M: usize> Sampler<M> {
     /// Speed, first phase and its motion where the path begins; a speed of 0 is exact.
     fn start(&self) -> Option<(f64, usize, PhaseMotion<'_, M>)> {
         let first = self.runs[0].phases.clone().next()?;
-        let phase = &self.phases[first];
-        let motion = self.path.motion(phase);
+        let phase = self.phase(first);
+        let motion = self.path.motion(&phase);
         let [begin, end] = [phase.u0, phase.u1].map(|u| norm(&motion.rates(&motion.at(u)).velocity));
         let rests = phase.p0 == 0.0 || begin <= STANDSTILL * end;
         Some((if rests { 0.0 } else { begin }, first, motion))
@@ -445,7 +450,7 @@ impl<const M: usize> Sampler<M> {
     fn set_start(&self, part: &mut Slices<M>, i: usize) {
         if let Some((speed, phase, motion)) = self.start() {
             if speed > 0.0 {
-                self.set(part, i, phase, &motion, &motion.at(self.phases[phase].u0));
+                self.set(part, i, phase, &motion, &motion.at(self.phases.u0[phase]));
             }
         }
         part.position[i] = self.path.curve.control[0];
@@ -457,9 +462,10 @@ impl<const M: usize> Sampler<M> {
     /// The end of a run; `moving` where the path ends there at a speed.
     fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize, moving: bool) {
         let curve = &self.path.curve;
-        if let (true, Some(phase)) = (moving, self.phases[run.phases.clone()].last()) {
-            let motion = self.path.motion(phase);
-            self.set(part, i, run.phases.end - 1, &motion, &motion.at(phase.u1));
+        if let (true, Some(last)) = (moving, run.phases.clone().last()) {
+            let phase = self.phase(last);
+            let motion = self.path.motion(&phase);
+            self.set(part, i, last, &motion, &motion.at(phase.u1));
         }
         part.position[i] = curve.control[curve.offsets[run.last_piece + 1] - 1];
         part.line[i] = self.path.lines[run.last_piece];
@@ -525,13 +531,13 @@ impl<'a, const M: usize> Cursor<'a, M> {
             self.phase += 1;
         }
         if self.motion.as_ref().is_none_or(|(phase, _)| *phase != self.phase) {
-            let phase = &self.sampler.phases[self.phase];
+            let phase = self.sampler.phase(self.phase);
             let piece = match self.piece.take() {
                 Some((number, piece)) if number == phase.piece => piece,
                 _ => Rc::new(self.sampler.path.piece(phase.piece as usize)),
             };
             self.piece = Some((phase.piece, piece.clone()));
-            self.motion = Some((self.phase, PhaseMotion::new(piece, phase)));
+            self.motion = Some((self.phase, PhaseMotion::new(piece, &phase)));
         }
         self.phase
     }

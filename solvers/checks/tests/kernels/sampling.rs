@@ -5,7 +5,7 @@ use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::phase_motion::{Counts, Phase, PhaseMotion, PiecePath, State};
+use feedplan_setpoints::phase_motion::{Counts, Phase, PhaseMotion, Phases, PiecePath, State};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
 
@@ -36,6 +36,7 @@ fn triangle() -> (Quadratic<2>, [Phase; 2]) {
 fn path_of(piece: &Quadratic<2>) -> PathData<2> {
     PathData {
         curve: raised(piece, 0).into(),
+        axes: 2,
         tip_speed: None,
         way_speed: None,
         feed_share: vec![],
@@ -49,7 +50,7 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
 fn sampler(period: f64) -> Sampler<2> {
     let (line, phases) = triangle();
     let path = path_of(&line);
-    Sampler::on(&path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).unwrap()
+    Sampler::on(&path.into(), &Phases::from_iter(phases).into(), &[0, 2], period, Watch::default()).unwrap()
 }
 
 #[test]
@@ -147,7 +148,7 @@ fn nonsense_is_refused_with_a_sentence() {
         let (line, mut phases) = triangle();
         change(&mut phases[1]);
         let path = path_of(&line);
-        Sampler::on(&path.into(), phases.to_vec(), &[0, 2], period, Watch::default()).err()
+        Sampler::on(&path.into(), &Phases::from_iter(phases).into(), &[0, 2], period, Watch::default()).err()
     };
     assert!(build(&|_| (), 0.001).is_none());
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12, 5e-324] {

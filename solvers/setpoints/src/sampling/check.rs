@@ -1,14 +1,14 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::path_data::PathData;
-use crate::phase_motion::{flaw, Phase, MAX_TIP};
+use crate::phase_motion::{flaw, Phase, Phases, MAX_TIP};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
     path: &PathData<M>,
-    phases: &[Phase],
+    phases: &Phases,
     phase_runs: &[usize],
     watch: Watch,
 ) -> Result<(), String> {
@@ -53,11 +53,12 @@ pub(super) fn check<const M: usize>(
                 r + 1
             ));
         }
-        for (i, phase) in phases[phase_runs[r]..phase_runs[r + 1]].iter().enumerate() {
+        for i in phase_runs[r]..phase_runs[r + 1] {
             watch.each(phases.len()).count(i);
-            check_phase(path, r, phase).map_err(|what| {
-                format!("phase {} of the profile {what}: plan this path again", phase_runs[r] + i)
-            })?;
+            let known = phases.get(i).ok_or_else(|| format!("has the unknown kind {}", phases.kind[i]));
+            known
+                .and_then(|phase| check_phase(path, r, &phase))
+                .map_err(|what| format!("phase {i} of the profile {what}: plan this path again"))?;
         }
     }
     Ok(())
@@ -72,20 +73,20 @@ fn fits_pieces(values: &[f64], offsets: &[usize], pieces: usize) -> bool {
         && values.iter().all(|value| value.is_finite())
 }
 
-fn check_phase<const M: usize>(path: &PathData<M>, run: usize, phase: &Phase) -> Result<(), &'static str> {
+fn check_phase<const M: usize>(path: &PathData<M>, run: usize, phase: &Phase) -> Result<(), String> {
     if !(path.runs[run]..path.runs[run + 1]).contains(&(phase.piece as usize)) {
-        return Err("is on no piece of its run");
+        return Err("is on no piece of its run".into());
     }
     let width = path.curve.width[phase.piece as usize];
     if !(0.0 <= phase.u0 && phase.u0 < phase.u1 && phase.u1 <= width) {
-        return Err("leaves its piece");
+        return Err("leaves its piece".into());
     }
     if !(phase.duration >= 0.0 && phase.duration.is_finite()) {
-        return Err("has a duration that is negative or not finite");
+        return Err("has a duration that is negative or not finite".into());
     }
     let of_axis = matches!(phase.law, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity);
-    if of_axis && phase.axis as usize >= M {
-        return Err("is governed by an axis that the path lacks");
+    if of_axis && phase.axis as usize >= path.axes {
+        return Err(format!("is governed by axis {}, but the path has {}", phase.axis, path.axes));
     }
     let signed = matches!(
         phase.law,
@@ -93,12 +94,12 @@ fn check_phase<const M: usize>(path: &PathData<M>, run: usize, phase: &Phase) ->
     );
     let speeds = [phase.p0, phase.p1].iter().all(|p| *p >= 0.0 && p.is_finite());
     if !(speeds && phase.value.is_finite() && (signed || phase.value >= 0.0)) {
-        return Err("has a speed that is negative or not finite");
+        return Err("has a speed that is negative or not finite".into());
     }
     let right = |a: f64| if phase.law.is_along() { a.is_finite() } else { a == 0.0 };
     if !(right(phase.a0) && right(phase.a1)) {
-        return Err("has an acceleration along the path that is not finite, or not of its kind");
+        return Err("has an acceleration along the path that is not finite, or not of its kind".into());
     }
     let flaw = phase.law.is_along().then(|| flaw(&path.piece(phase.piece as usize), phase));
-    flaw.flatten().map_or(Ok(()), Err)
+    flaw.flatten().map_or(Ok(()), |flaw| Err(flaw.into()))
 }

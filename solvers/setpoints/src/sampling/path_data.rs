@@ -11,6 +11,8 @@ use feedplan_geometry::spline::CompositeCurve;
 /// pieces, runs as piece offsets, and the pauses before the first run and after each.
 pub struct PathData<const M: usize> {
     pub curve: Arc<CompositeCurve<M>>,
+    /// Number of axes; those beyond rest.
+    pub axes: usize,
     pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
     pub way_speed: Option<(Vec<f64>, Vec<usize>)>,
     /// What the axes count in the feed on each piece; empty where that is not by shares.
