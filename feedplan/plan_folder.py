@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from numbers import Real
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, format_named
 from feedplan.outputs._staging import require_folder, staged
 from feedplan.planned_feeds import PlannedProgram
-from feedplan.progress import Progress, of_stage, part, tell
+from feedplan.progress import Listener, Progress, beside, of_stage, part, tell
 from feedplan.setpoints import SetpointChunk, Sink
 from feedplan.units import duration_text
 
@@ -32,9 +33,9 @@ PROGRAM_FILE = "program.ngc"
 DRAWING_FILE = "drawing.bin"
 COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 10_000
-# Parts of the progress: of the setpoints for the account; of the writing for the setpoints, if the audit was
-# made before; of the rest of the writing for the data of the page.
-ACCOUNT, SAMPLED, DRAWN = 0.1, 0.75, 0.8
+# Parts of the progress: of the setpoints for the lengths of the path; of the writing for the setpoints, if
+# the audit was made before.
+LENGTHS, SAMPLED = 0.05, 0.75
 
 
 def write_plan(
@@ -62,6 +63,7 @@ def write_plan(
     from feedplan.report.figures import SetpointFigures, chart_data
     from feedplan.report.page import FILE as REPORT_FILE
     from feedplan.report.page import write_report
+    from feedplan.report.tool_motion import tool_motion
     from feedplan.report.tool_path import MANY_POINTS, POINTS
 
     formats = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")  # type: ignore[assignment]
@@ -85,21 +87,22 @@ def write_plan(
         (part(share, 0.0, SAMPLED), SAMPLED) if plan.audited else (of_stage(progress, "audit"), 0.0)
     )
     tell(reading, 0.0)
-    account = plan.make_account(part(reading, 0.0, ACCOUNT))
+    motion = tool_motion(plan.problem, part(reading, 0.0, LENGTHS))
     setpoints = plan.setpoints()
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period, setpoints.events)
     points = MANY_POINTS if drawing else POINTS
-    figures = SetpointFigures(plan.problem, account.motion, setpoints.count, points)
+    figures = SetpointFigures(plan.problem, motion, setpoints.count, points)
     with staged(folder, last=SUMMARY_FILE) as stage:
-        with ExitStack() as stack:
+        with beside(partial(_along_path, plan)) as along_path, ExitStack() as stack:
             sinks = [
                 stack.enter_context(output.writer(stage / output.FILE, header, setpoints.count))
                 for output in outputs.values()
                 if output.ROWS == SETPOINTS
             ]
-            beside = stack.enter_context(_beside((*sinks, figures.add)))
-            audit = plan.pass_setpoints((beside,), part(reading, ACCOUNT, 1.0))
+            passed_on = stack.enter_context(_passing_on((*sinks, figures.add)))
+            audit = plan.pass_setpoints((passed_on,), part(reading, LENGTHS, 1.0))
+        over_length, account = along_path.result(), plan.account
         for check in audit.broken:
             figures.mark(setpoints.around(check.time), check.time)
         share = part(share, begun, 1.0)
@@ -118,8 +121,7 @@ def write_plan(
                     with output.writer(stage / output.FILE, header, knots.count) as add:
                         for chunk in knots.chunks(_ROWS_AT_ONCE):
                             add(chunk)
-        drawn = part(share, 0.0, DRAWN)
-        data = chart_data(plan.problem, plan.profile, account, figures, audit, drawn)
+        data = chart_data(plan.problem, account, figures, audit, over_length)
         if drawing:
             (stage / DRAWING_FILE).write_bytes(contained(data))
             data["path"] = figures.tool_path(account.activity, POINTS)
@@ -139,8 +141,16 @@ def write_plan(
     return tuple(folder / name for name in names)
 
 
+def _along_path(plan: Plan, progress: Listener) -> dict[str, Any]:
+    """The account of a plan, which is kept in it, then the curves over length. It needs no setpoints."""
+    from feedplan.report.figures import over_length
+
+    motion = plan.make_account(part(progress, 0.0, 0.5)).motion
+    return over_length(plan.problem, plan.profile, motion, part(progress, 0.5, 1.0))
+
+
 @contextmanager
-def _beside(sinks: Sequence[Sink]) -> Iterator[Sink]:
+def _passing_on(sinks: Sequence[Sink]) -> Iterator[Sink]:
     """Passes chunks to the sinks on a second thread, while the next chunk is computed and audited.
 
     Two chunks are in memory at most. What a sink raises is raised by the next call or at the end.

@@ -6,9 +6,14 @@ raised to the caller of the computation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
+from threading import Event
+from typing import TypeVar
 
+T = TypeVar("T")
 Listener = Callable[[float], None]
 # The same for a computation in stages, with the name of the stage.
 Progress = Callable[[str, float], None]
@@ -30,3 +35,23 @@ def part(whole: Listener | None, start: float, end: float) -> Listener | None:
     if whole is None:
         return None
     return lambda done: whole(start + (end - start) * done)
+
+
+@contextmanager
+def beside(work: Callable[[Listener], T]) -> Iterator[Future[T]]:
+    """Does `work` in another thread while the block runs; the block ends after it.
+
+    `work` gets a listener. An exception in the block ends the work too, where it next tells how far it is.
+    """
+    unwanted = Event()
+
+    def listen(done: float) -> None:
+        if unwanted.is_set():
+            raise RuntimeError("the result is not wanted any more")
+
+    with ThreadPoolExecutor(1) as thread:
+        try:
+            yield thread.submit(work, listen)
+        except BaseException:
+            unwanted.set()
+            raise

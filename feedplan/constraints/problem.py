@@ -170,7 +170,7 @@ class Problem:
         return NativeProblem(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "native"}
+        return {name: value for name, value in vars(self).items() if name not in ("native", "tool_motion")}
 
     @property
     def curve(self) -> CompositeCurve:

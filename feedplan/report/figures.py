@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -121,13 +122,12 @@ def over_length(
 
 def chart_data(
     problem: Problem,
-    profile: SpeedProfile,
     account: Account,
     figures: SetpointFigures,
     audit: Audit,
-    progress: Listener | None = None,
+    length: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """All data that a page draws, with its arrays."""
+    """All data that a page draws, with its arrays; `length` is the result of `over_length`."""
     limits = {
         name: [float(value) if np.isfinite(value) else None for value in getattr(problem, f"max_{name}")]
         for name in ("velocity", "acceleration", "jerk")
@@ -143,7 +143,7 @@ def chart_data(
         "feed": float(problem.feed.max()) if len(problem.feed) else None,
         "duration": figures.duration,
         "path": figures.tool_path(account.activity),
-        "length": over_length(problem, profile, account.motion, progress),
+        "length": length,
         "time": figures.over_time(),
         "slow": [asdict(line) for line in account.slow],
         "failures": [{"name": check.name, "axis": check.axis, "time": check.time} for check in audit.broken],

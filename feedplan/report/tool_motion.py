@@ -18,7 +18,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.lazy import cached_property
-from feedplan.progress import Listener
+from feedplan.progress import Listener, tell
 
 Floats = NDArray[np.float64]
 
@@ -78,8 +78,15 @@ class ToolMotion:
 
 
 def tool_motion(problem: Problem, progress: Listener | None = None) -> ToolMotion:
-    """The tool's motion along a problem's path."""
+    """The tool's motion along a problem's path, computed once and kept with the problem."""
+    kept: ToolMotion | None = vars(problem).get("tool_motion")
+    if kept is None:
+        kept = vars(problem)["tool_motion"] = _tool_motion(problem, progress)
+    tell(progress, 1.0)
+    return kept
 
+
+def _tool_motion(problem: Problem, progress: Listener | None) -> ToolMotion:
     def motion(curve: CompositeCurve, share: Floats | None, turns: NDArray[np.bool_]) -> ToolMotion:
         table = CurveLength(curve, progress=progress) if len(curve) else None
         return ToolMotion(curve, table, share, turns, problem.way_units)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from feedplan.report.container import contained
-from feedplan.report.figures import SetpointFigures, chart_data
+from feedplan.report.figures import SetpointFigures, chart_data, over_length
 from feedplan.report.page import SCRIPT, asset, missing_pictures, write_report
 from tests.report.drawn import data_of, unpacked
 
@@ -31,7 +31,13 @@ def page(plan: Any, file: Path, source: Path | None = None) -> str:
         problem=plan.problem,
         account=account,
         audit=plan.verdict,
-        data=chart_data(plan.problem, plan.profile, account, figures, plan.verdict),
+        data=chart_data(
+            plan.problem,
+            account,
+            figures,
+            plan.verdict,
+            over_length(plan.problem, plan.profile, account.motion),
+        ),
         setpoints=figures.count,
         text=source,
     )
