@@ -8,6 +8,8 @@ INSTALL := $(BIN)/pip install --quiet --no-compile --constraint constraints.txt
 CARGO := MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target
 MANYLINUX := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux_2_28)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Modules that are compiled in each start of Python, instead of once, would take a tenth of a second each time.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test native lint clippy page wheel docs bench campaign clean cargo
 
