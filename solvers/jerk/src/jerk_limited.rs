@@ -17,6 +17,7 @@
 //! | `interior_point`, `newton`, `working_space`, `band` | the primal-dual interior-point method on one window |
 //! | `intersample_check`, `window` | the limits between the collocation points |
 //! | `windows` | paths of any length |
+//! | `moving_axes` | the axes that move on a path |
 //! | `held` | where the feed is held, and the stretches between such places |
 //! | `speed_limit`, `lower_bound` | speeds that no motion exceeds; a lower bound on the time on the same grid |
 //! | `on_path` | the planner on the package's own paths |
@@ -40,6 +41,7 @@ mod intersample_check;
 mod levels;
 mod lower_bound;
 mod model;
+mod moving_axes;
 mod newton;
 pub mod on_path;
 mod prepare;

@@ -121,7 +121,7 @@ impl Default for Effort<'_> {
             tolerance: 1e-7,
             max_iterations: 400,
             deadline: None,
-            window: 4000,
+            window: 1500,
             proves: false,
             watch: Watch::default(),
         }

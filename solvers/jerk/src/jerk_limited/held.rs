@@ -87,12 +87,7 @@ pub fn stretches<const M: usize>(
     ends: [End; 2],
 ) -> Vec<Stretch> {
     let knots = path.knots();
-    let mut moving = [false; M];
-    for part in path.parts {
-        for (all, own) in moving.iter_mut().zip(moves(&piece(problem, part.piece))) {
-            *all |= own;
-        }
-    }
+    let moving = moving(problem, path, [0.0, path.total()]);
     let slopes = Slopes::new(limits, &[directions(&moving); 2], path.total());
     let steepest = Slopes::steepest(limits, &moving);
     let shares = shares(path, junctions);
@@ -132,6 +127,21 @@ pub fn stretches<const M: usize>(
     }
     out.push(Stretch { ends: [from, path.total()], states: [state, ends[1]], held: None });
     out
+}
+
+/// Whether each axis moves between two lengths of a path.
+pub fn moving<const M: usize>(
+    problem: &Problem<M>,
+    path: &ArcLengthPath<M>,
+    [from, to]: [f64; 2],
+) -> [bool; M] {
+    let mut moving = [false; M];
+    for part in &path.parts[path.part(from)..=path.part(to)] {
+        for (all, own) in moving.iter_mut().zip(moves(&piece(problem, part.piece))) {
+            *all |= own;
+        }
+    }
+    moving
 }
 
 /// The speed caps of a path between two lengths, and those before and after that reach in: of the neighbours beyond.

@@ -9,9 +9,9 @@
 
 use rayon::prelude::*;
 
-use super::held::{caps_between, stretches, Between, Stretch};
+use super::held::{caps_between, moving, stretches, Between, Stretch};
+use super::moving_axes;
 use super::turns::{lower, Line};
-use super::windows;
 use crate::arc_length_path::{ArcLengthPath, Junction, Part};
 use crate::jerk_profile::JerkProfile;
 use crate::path_problem::{self, Effort, End, Limits, SpeedCap};
@@ -282,7 +282,8 @@ impl<const M: usize> Task<'_, M> {
             caps: caps_between(caps, ends),
             ends: states,
         };
-        let plan = windows::plan(&problem, &Effort { watch, ..*effort })?;
+        let moves = moving(self.problem, path, ends);
+        let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort })?;
         phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
         phases.stopped = !plan.converged && effort.expired();
         phases.lower_bound.push(plan.lower_bound);
@@ -384,11 +385,12 @@ impl<const M: usize> Task<'_, M> {
         caps: &[SpeedCap],
     ) -> Result<JerkProfile, Fault> {
         let effort = Effort { deadline: None, tolerance: 1e-4, ..*self.effort };
+        let moves = moving(self.problem, path, [0.0, path.total()]);
         let speeds = ends.map(|end| end.speed());
         let possible = |speeds: [f64; 2]| {
             let ends = speeds.map(|speed| end_of(speed, [0.0; 2]));
             let problem = path_problem::Problem { geometry: path, limits: self.limits, caps, ends };
-            windows::plan(&problem, &effort).is_ok()
+            moving_axes::plan(&problem, &moves, &effort).is_ok()
         };
         // The end is at fault where the start alone can be met.
         let at = usize::from(speeds[0] == 0.0 || (speeds[1] > 0.0 && possible([speeds[0], 0.0])));

@@ -36,6 +36,8 @@ pub struct Prepared<'a, G, const M: usize> {
     pub x: Vec<f64>,
     /// The greatest speed that the envelope allows on each interval, in mm/s.
     pub speeds: Vec<f64>,
+    /// How much of its limits the valid plan uses on each interval, in terms of w.
+    pub used: Vec<f64>,
     pub slopes: Slopes,
     watch: Watch<'a>,
 }
@@ -60,8 +62,18 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         watch.check();
         let whole = || grid.constraints(problem, 0..grid.pieces.len());
         let rows = (grid.pieces.len() <= effort.window).then(whole);
-        let mut prepared =
-            Self { problem, grid, ends, bound_ends, rows, x: vec![], speeds: vec![], slopes, watch };
+        let mut prepared = Self {
+            problem,
+            grid,
+            ends,
+            bound_ends,
+            rows,
+            x: vec![],
+            speeds: vec![],
+            used: vec![],
+            slopes,
+            watch,
+        };
         prepared.begin()?;
         Ok(prepared)
     }
@@ -76,15 +88,15 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         for _ in 0..ROUNDS {
             self.watch.check();
             self.x = initial_plan::smooth(&self.grid.stations, &caps, slopes, &self.ends);
-            let used = self.each(|rows, n, x| initial_plan::used(rows, x, n), 0.0);
-            worst = used.iter().copied().fold(0.0, f64::max);
+            self.used = self.each(|rows, n, x| initial_plan::used(rows, x, n), 0.0);
+            worst = self.used.iter().copied().fold(0.0, f64::max);
             if worst <= 1.0 {
                 return Ok(());
             }
-            for n in 0..used.len() {
-                if used[n] > 1.0 {
+            for (n, &used) in self.used.iter().enumerate() {
+                if used > 1.0 {
                     let r = self.x[2 * n].max(self.x[2 * n + 2]).power(0.75);
-                    caps[n] = caps[n].min(2.0 * r) * initial_plan::factor(used[n]);
+                    caps[n] = caps[n].min(2.0 * r) * initial_plan::factor(used);
                 }
             }
         }
@@ -151,7 +163,15 @@ fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [[Win
         }
         End::Held { speed } => [WindowEnd::Fixed { w: speed * speed, slope: 0.0 }, WindowEnd::Free],
     });
-    [0, 1].map(|which| both.map(|end| end[which]))
+    // Lengths are rounded to this: it is a large part of the shortest ramps, so that a plan keeps away from their limits.
+    let rounding = f64::EPSILON * total;
+    let planned = both.map(|end| match end[0] {
+        WindowEnd::Rest { ramp, greatest } => {
+            WindowEnd::Rest { ramp, greatest: greatest / (1.0 + rounding / ramp.length) }
+        }
+        end => end,
+    });
+    [planned, both.map(|end| end[1])]
 }
 
 /// Whether each number is greater than the one before.

@@ -1,9 +1,9 @@
 //! Paths of any length: overlapping windows, solved in parallel and joined to one plan.
 //!
-//! The ends of a window are states of the first plan, well inside all limits; ends on another window's optimum would
-//! lie on its limits and leave almost no interior to start from. The effect of an end decays with the travel time from
-//! it: two windows agree to 1e-8 within two or three stop times inside their overlap, and are blended there. Only a few
-//! windows at a time are in memory.
+//! The ends of a window are states of the first plan inside all limits; ends on another window's optimum would lie on
+//! its limits and leave almost no interior to start from. The effect of an end decays with the travel time from
+//! it: two windows agree to 1e-8 within two or three stop times inside their overlap, and are blended there. Where no
+//! blend keeps the limits, both windows are solved as one. Only a few windows at a time are in memory.
 
 use std::ops::Range;
 
@@ -24,6 +24,9 @@ use crate::path_problem::{Effort, Fault, Geometry, Problem};
 /// Windows reach this many stop times and intervals beyond their cuts: the time of the first plan on the way there (the optimum
 /// takes a third of it or more) over the time to stop from the greatest speed that the envelope allows on that way.
 const REACH: (f64, usize) = (14.0, 80);
+/// They end where the first plan uses its limits least, of this many stations from there on: beside an end on a limit
+/// there is almost no interior.
+const EASE: usize = 20;
 /// Least travel time from cut to cut, in the same stop times.
 const LONG: f64 = 36.0;
 /// Windows in memory, for each thread.
@@ -62,13 +65,22 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
             parts.extend(part);
             counts.add(&verdict, windows[at].len());
             let reached = if at == 0 { 0 } else { windows[at - 1].end };
-            if !run.join(&mut x, reached, &windows[at], &y) {
-                // No blend keeps the limits: this window starts again from the first plan, where the last one ends.
-                let rest = reached..windows[at].end;
-                let (y, verdict, _) = run.solve(&rest, rest.start..rest.start, &mut Spaces::default());
-                counts.add(&verdict, rest.len());
-                counts.converged = false;
-                x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
+            let joined = run.join(&mut x, reached, windows[at].start, &y).or_else(|| {
+                let both = windows[at - 1].start..windows[at].end;
+                let (y, verdict, _) = run.solve(&both, both.start..both.start, &mut Spaces::default());
+                counts.add(&verdict, both.len());
+                run.join(&mut x, reached, both.start, &y)
+            });
+            match joined {
+                Some(loss) => counts.excess += loss,
+                None => {
+                    // The window starts again from the first plan, where the last one ends.
+                    let rest = reached..windows[at].end;
+                    let (y, verdict, _) = run.solve(&rest, rest.start..rest.start, &mut Spaces::default());
+                    counts.add(&verdict, rest.len());
+                    counts.converged = false;
+                    x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
+                }
             }
         }
     }
@@ -137,7 +149,12 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
                 drive = self.onward(&drive, n.min(step(n)));
                 n = step(n);
             }
-            n
+            let used = |n: usize| self.prepared.used[n - 1].max(self.prepared.used[n]);
+            (0..EASE)
+                .map(|further| if to > from { n + further } else { n.saturating_sub(further) })
+                .filter(|station| station.abs_diff(from) < to.abs_diff(from))
+                .min_by(|&a, &b| used(a).total_cmp(&used(b)))
+                .unwrap_or(n)
         };
         let middle = |i: usize| (cuts[i] + cuts[i + 1]) / 2;
         let last = cuts.len() - 2;
@@ -235,47 +252,49 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         (y, verdict, part)
     }
 
-    /// Continues x, planned up to the station `reached`, by the plan y of a window; false if no blend keeps the limits.
-    fn join(&self, x: &mut [f64], reached: usize, window: &Range<usize>, y: &[f64]) -> bool {
-        let shared = reached - window.start;
-        let y_from = |station: usize| &y[2 * (station - window.start)..];
+    /// Continues x, planned up to the station `reached`, by the plan y from the station `start` on. Returns by how many
+    /// seconds the overlap takes longer than with the quicker of both at each interval; None if no blend keeps the limits.
+    fn join(&self, x: &mut [f64], reached: usize, start: usize, y: &[f64]) -> Option<f64> {
+        let step = |n: usize| self.stations[n + 1] - self.stations[n];
+        let least: f64 =
+            (start..reached).map(|n| duration(x, n, step(n)).min(duration(y, n - start, step(n)))).sum();
+        let (stations, blend) = self.blend(x, reached, start, y)?;
+        x[2 * stations.start..][..blend.len()].copy_from_slice(&blend);
+        x[2 * stations.end..2 * start + y.len()].copy_from_slice(&y[2 * (stations.end - start)..]);
+        let time: f64 = (start..reached).map(|n| duration(x, n, step(n))).sum();
+        Some(time - least)
+    }
+
+    /// The spline that leads from x to y, and its stations; empty where both are the same.
+    fn blend(&self, x: &[f64], reached: usize, start: usize, y: &[f64]) -> Option<(Range<usize>, Vec<f64>)> {
+        let y_from = |station: usize| &y[2 * (station - start)..];
         // Where one plan was not improved, it is still the first plan, in which the other one ends.
-        for station in [window.start, reached] {
-            if shared == 0 || x[2 * station..2 * station + 2] == y_from(station)[..2] {
-                x[2 * station..2 * window.end + 2].copy_from_slice(y_from(station));
-                return true;
-            }
+        let same = |&station: &usize| x[2 * station..2 * station + 2] == y_from(station)[..2];
+        if let Some(station) = [start, reached].into_iter().find(|station| start == reached || same(station))
+        {
+            return Some((station..station, vec![]));
         }
         let apart = |n: usize| (y_from(n)[0] / x[2 * n] - 1.0).abs();
-        for parts in BLENDS.into_iter().filter(|&parts| shared >= parts) {
+        BLENDS.into_iter().filter(|&parts| reached - start >= parts).find_map(|parts| {
             // Each part overlaps the next by half.
-            let size = shared / parts;
-            let begins = (0..2 * parts - 1).map(|i| window.start + i * size / 2);
-            let worst = |start: usize| (start..=start + size).map(apart).fold(0.0, f64::max);
-            let Some(start) = begins.min_by(|&a, &b| worst(a).total_cmp(&worst(b))) else {
-                continue;
-            };
-            let stations = start..start + size;
-            let mut blend = x[2 * stations.start..2 * stations.end + 2].to_vec();
-            let (from, length) =
-                (self.stations[stations.start], self.stations[stations.end] - self.stations[stations.start]);
-            for (n, (z, y)) in
-                blend.chunks_exact_mut(2).zip(y_from(stations.start).chunks_exact(2)).enumerate()
-            {
-                let t = (self.stations[stations.start + n] - from) / length;
+            let size = (reached - start) / parts;
+            let worst = |from: usize| (from..=from + size).map(apart).fold(0.0, f64::max);
+            let starts = (0..2 * parts - 1).map(|i| start + i * size / 2);
+            let from = starts.min_by(|&a, &b| worst(a).total_cmp(&worst(b)))?;
+            let length = self.stations[from + size] - self.stations[from];
+            let mut blend = x[2 * from..2 * (from + size) + 2].to_vec();
+            for (n, (z, y)) in blend.chunks_exact_mut(2).zip(y_from(from).chunks_exact(2)).enumerate() {
+                let t = (self.stations[from + n] - self.stations[from]) / length;
                 let (weight, rate) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / length);
                 let [w, slope] = [y[0] - z[0], y[1] - z[1]];
                 z[0] += weight * w;
                 z[1] += weight * slope + rate * w;
             }
-            let overlap = self.prepared.window(stations.clone());
-            if overlap.holds(&blend, BLENDED) {
-                x[2 * stations.start..2 * stations.end + 2].copy_from_slice(&blend);
-                x[2 * stations.end..2 * window.end + 2].copy_from_slice(y_from(stations.end));
-                return true;
-            }
-        }
-        false
+            self.prepared
+                .window(from..from + size)
+                .holds(&blend, BLENDED)
+                .then_some((from..from + size, blend))
+        })
     }
 
     /// The profile with its ramps.
