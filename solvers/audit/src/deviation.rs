@@ -7,6 +7,7 @@
 
 use rayon::prelude::*;
 
+use super::close_places::ClosePlaces;
 use super::curve::Followed;
 use super::moves::{Move, Programmed};
 use super::nearest::{distance_to_piece, outwards};
@@ -37,42 +38,47 @@ pub(crate) fn audit_path<const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let times = entry_times(path, phases);
-    blocks(path.len(), seen, |i, tally| {
-        let (time, line) = (times[i], path.line[i]);
-        let (rows, width) = (path.rows(i), path.width[i]);
-        let control = &path.control[rows.start * path.stride..rows.end * path.stride];
-        let weights = if path.weights.is_empty() { &[][..] } else { &path.weights[rows] };
-        let finite = control.iter().all(|q| q.is_finite())
-            && weights.iter().all(|w| w.is_finite() && *w > 0.0)
-            && width.is_finite();
-        if !finite || width < 0.0 || (width == 0.0 && !path.curve::<M>(i).is_motionless()) {
-            tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
-            return;
-        }
-        tally.offer(Check::Numbers, 0, 0.0, 0.0, time, line);
-        if i > 0 {
-            let start = path.start::<M>(i);
-            let rounding = ROUNDINGS * EPS * magnitude(&start);
-            let gap = distance(&path.end(i - 1), &start) - rounding;
-            if gap <= 0.0 || !path.begins_elsewhere(i) {
-                tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
+    blocks(
+        path.len(),
+        seen,
+        || (),
+        |i, (), tally| {
+            let (time, line) = (times[i], path.line[i]);
+            let (rows, width) = (path.rows(i), path.width[i]);
+            let control = &path.control[rows.start * path.stride..rows.end * path.stride];
+            let weights = if path.weights.is_empty() { &[][..] } else { &path.weights[rows] };
+            let finite = control.iter().all(|q| q.is_finite())
+                && weights.iter().all(|w| w.is_finite() && *w > 0.0)
+                && width.is_finite();
+            if !finite || width < 0.0 || (width == 0.0 && !path.curve::<M>(i).is_motionless()) {
+                tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
+                return;
             }
-        }
-        for k in 0..path.axes {
-            for q in [path.start::<M>(i)[k], path.end::<M>(i)[k]] {
-                offer_travel(tally, limits, k, q, time, line);
-            }
-            // The control points enclose the piece: where they are fine it is.
-            let reach = control.iter().skip(k).step_by(path.stride);
-            let worst = tally.get(Check::Travel, k).ratio;
-            if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
-                for q in path.curve::<M>(i).extremes(k) {
-                    offer_travel(tally, limits, k, q, time, line);
+            tally.offer(Check::Numbers, 0, 0.0, 0.0, time, line);
+            if i > 0 {
+                let start = path.start::<M>(i);
+                let rounding = ROUNDINGS * EPS * magnitude(&start);
+                let gap = distance(&path.end(i - 1), &start) - rounding;
+                if gap <= 0.0 || !path.begins_elsewhere(i) {
+                    tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
                 }
             }
-        }
-        tally.samples += 1;
-    })
+            for k in 0..path.axes {
+                for q in [path.start::<M>(i)[k], path.end::<M>(i)[k]] {
+                    offer_travel(tally, limits, k, q, time, line);
+                }
+                // The control points enclose the piece: where they are fine it is.
+                let reach = control.iter().skip(k).step_by(path.stride);
+                let worst = tally.get(Check::Travel, k).ratio;
+                if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
+                    for q in path.curve::<M>(i).extremes(k) {
+                        offer_travel(tally, limits, k, q, time, line);
+                    }
+                }
+            }
+            tally.samples += 1;
+        },
+    )
 }
 
 /// The share of half the travel that a position is away from the middle.
@@ -112,10 +118,22 @@ pub(crate) fn audit_deviation<const M: usize>(
 ) -> Tally<M> {
     let times = entry_times(path, phases);
     let followers = followers(path, program.len());
-    let from_path =
-        blocks(path.len(), seen, |i, tally| piece_to_moves(path, program, &followers, i, times[i], tally));
-    let from_program =
-        blocks(program.len(), seen, |m, tally| move_to_pieces(path, program, m, followers[m], &times, tally));
+    let from_path = blocks(
+        path.len(),
+        seen,
+        || (),
+        |i, (), tally| {
+            piece_to_moves(path, program, &followers, i, times[i], tally);
+        },
+    );
+    let from_program = blocks(
+        program.len(),
+        seen,
+        || ClosePlaces::new(path.pieces),
+        |m, close, tally| {
+            move_to_pieces(path, program, (m, followers[m]), &times, close, tally);
+        },
+    );
     let mut ends = Tally::default();
     if !path.is_empty() && !program.is_empty() {
         let last = path.len() - 1;
@@ -209,9 +227,9 @@ fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
 fn move_to_pieces<const M: usize>(
     path: &Followed,
     program: &Programmed,
-    m: usize,
-    (first, last): Followers,
+    (m, (first, last)): (usize, Followers),
     times: &[f64],
+    close: &mut ClosePlaces<M>,
     tally: &mut Tally<M>,
 ) {
     let programmed: Move<M> = program.get(m);
@@ -232,14 +250,22 @@ fn move_to_pieces<const M: usize>(
         let q = programmed.at(i as f64 / places as f64);
         // The nearest piece counts, measured by its own tolerance.
         let mut nearest = (f64::INFINITY, f64::INFINITY, GAP_TOLERANCE);
-        let enough = settled(tally);
+        let (enough, tolerance_of) =
+            (settled(tally), |piece: usize| path.tolerance[piece].max(GAP_TOLERANCE));
+        if let Some((piece, away)) =
+            close.find(&q, [least, most], |piece| enough * tolerance_of(piece) + rounding)
+        {
+            tally.offer(Check::Deviation, 0, away - rounding, tolerance_of(piece), times[first], line);
+            expected = piece;
+            continue;
+        }
         for piece in outwards(expected, least, most) {
-            let tolerance = path.tolerance[piece].max(GAP_TOLERANCE);
+            let tolerance = tolerance_of(piece);
             let beyond = nearest.0 * tolerance + rounding;
             if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond {
                 continue;
             }
-            let away = distance_to_piece(&path.curve::<M>(piece), &q) - rounding;
+            let away = distance_to_piece(close.curves.get(piece), &q) - rounding;
             if away / tolerance < nearest.0 {
                 nearest = (away / tolerance, away, tolerance);
                 expected = piece;
@@ -269,15 +295,20 @@ fn entry_times(path: &Followed, phases: Option<&Phases>) -> Vec<f64> {
     times
 }
 
-/// Calls `check` for every index, in parallel.
-fn blocks<const M: usize>(count: usize, seen: Seen, check: impl Fn(usize, &mut Tally<M>) + Sync) -> Tally<M> {
+/// Calls `check` for every index, in parallel; each thread `keeps` something from one to the next.
+fn blocks<const M: usize, K>(
+    count: usize,
+    seen: Seen,
+    keeps: impl Fn() -> K + Sync,
+    check: impl Fn(usize, &mut K, &mut Tally<M>) + Sync,
+) -> Tally<M> {
     (0..count.div_ceil(BLOCK))
         .into_par_iter()
         .map(|block| {
-            let mut tally = Tally::default();
+            let (mut tally, mut kept) = (Tally::default(), keeps());
             for i in block * BLOCK..((block + 1) * BLOCK).min(count) {
                 tell(seen, i);
-                check(i, &mut tally);
+                check(i, &mut kept, &mut tally);
             }
             tally
         })

@@ -4,13 +4,14 @@
 //! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `station`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `deviation`. The
+//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `station`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. The
 //! profile: `phases`, `phase_order`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
 //! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
 
 mod against_plan;
 mod arc_slope;
 mod chord;
+mod close_places;
 pub mod curve;
 mod deviation;
 mod differences;

@@ -1,0 +1,95 @@
+//! Places of a path that are close enough to points, one point after the other.
+//!
+//! By Newton's method from the place of the point before, on its piece or from piece to piece. The distance of a point from any
+//! place of the path is at least its distance from the path: where it is small enough, the nearest place need not be searched.
+
+use super::curve::{Curves, Pieces};
+use super::nearest::Place;
+use super::vectors::{from_to, inner, length};
+
+/// Steps towards the nearest place; points come mostly in the order of the path, so that two are usual.
+const MOST_STEPS: usize = 8;
+
+pub struct ClosePlaces<'a, const M: usize> {
+    pub curves: Curves<'a, M>,
+    /// Of the point before.
+    place: Place,
+}
+
+impl<'a, const M: usize> ClosePlaces<'a, M> {
+    pub fn new(pieces: Pieces<'a>) -> Self {
+        Self { curves: Curves::new(pieces), place: Place { piece: 0, u: 0.0 } }
+    }
+
+    /// A place on the pieces from `least` to `most` whose distance from `q` is no more than that piece's `enough`, and the
+    /// distance; none where a few steps lead to none.
+    pub fn find(
+        &mut self,
+        q: &[f64; M],
+        [least, most]: [usize; 2],
+        enough: impl Fn(usize) -> f64,
+    ) -> Option<(usize, f64)> {
+        let Place { mut piece, mut u } = self.place;
+        if piece < least || piece > most {
+            (piece, u) = (least, 0.0);
+        }
+        for _ in 0..MOST_STEPS {
+            let curve = self.curves.get(piece);
+            let ([point, tangent], width) = (curve.place(u), curve.width());
+            let away = from_to(&point, q);
+            self.place = Place { piece, u };
+            if length(&away) <= enough(piece) {
+                return Some((piece, length(&away)));
+            }
+            let next = u + inner(&away, &tangent) / inner(&tangent, &tangent);
+            if next > width && u == width && piece < most {
+                (piece, u) = (piece + 1, 0.0);
+            } else if next < 0.0 && u == 0.0 && piece > least {
+                piece -= 1;
+                u = self.curves.get(piece).width();
+            } else if next.is_nan() {
+                return None;
+            } else {
+                u = next.clamp(0.0, width);
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_on_any_piece_ahead_or_behind_is_close_to_a_place_there() {
+        // Along X from 0 to 3 in three pieces of degree 2, then up.
+        let control: Vec<f64> = (0..4)
+            .flat_map(|i| {
+                let x = f64::from(i);
+                if i < 3 {
+                    [x, 0.0, x + 0.5, 0.0, x + 1.0, 0.0]
+                } else {
+                    [3.0, 0.0, 3.0, 0.5, 3.0, 1.0]
+                }
+            })
+            .collect();
+        let offsets = [0, 3, 6, 9, 12];
+        let pieces = Pieces {
+            axes: 2,
+            stride: 2,
+            control: &control,
+            weights: &[],
+            offsets: &offsets,
+            width: &[1.0; 4],
+        };
+        let mut places = ClosePlaces::new(pieces);
+        for (q, piece) in [([0.3, 0.01], 0), ([2.4, 0.01], 2), ([0.7, 0.0], 0), ([3.01, 0.6], 3)] {
+            let (found, distance) = places.find(&q, [0, 3], |_| 0.0100001).unwrap();
+            assert!(found == piece && distance <= 0.0100001, "{q:?}: {found}, {distance}");
+        }
+        assert!(places.find(&[0.3, 0.01], [2, 3], |_| 0.5).is_none());
+        assert!(places.find(&[0.3, 1.0], [0, 3], |_| 0.5).is_none());
+        assert!(places.find(&[f64::NAN, 0.0], [0, 3], |_| 0.5).is_none());
+    }
+}
