@@ -104,6 +104,13 @@ impl Pieces<'_> {
         self.point(self.rows(i).end - 1)
     }
 
+    /// Whether piece `i` goes nowhere.
+    pub fn is_motionless(&self, i: usize) -> bool {
+        let rows = self.rows(i);
+        let row = |row: usize| &self.control[row * self.stride..(row + 1) * self.stride];
+        rows.clone().all(|other| row(other) == row(rows.start))
+    }
+
     /// Piece `i`, ready to be evaluated.
     #[inline]
     pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
@@ -306,14 +313,6 @@ impl<const M: usize> Curve<M> {
         }
     }
 
-    /// Whether the piece goes nowhere.
-    pub fn is_motionless(&self) -> bool {
-        match self {
-            Curve::Quadratic(curve) => curve.is_motionless(),
-            Curve::General(general) => general.polygon.is_motionless(),
-        }
-    }
-
     /// Greatest coordinate: what rounding is relative to.
     #[inline]
     pub fn magnitude(&self) -> f64 {
@@ -400,11 +399,6 @@ impl<const M: usize> Quadratic<M> {
     pub fn second_derivative(&self) -> [f64; M] {
         let scale = 2.0 / (self.width * self.width);
         std::array::from_fn(|k| scale * (self.second[k] - self.first[k]))
-    }
-
-    /// Whether the piece goes nowhere.
-    pub fn is_motionless(&self) -> bool {
-        self.first.iter().chain(&self.second).all(|&d| d == 0.0)
     }
 
     /// Greatest coordinate: what rounding is relative to.

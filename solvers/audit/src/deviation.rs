@@ -50,7 +50,7 @@ pub(crate) fn audit_path<const M: usize>(
             let finite = control.iter().all(|q| q.is_finite())
                 && weights.iter().all(|w| w.is_finite() && *w > 0.0)
                 && width.is_finite();
-            if !finite || width < 0.0 || (width == 0.0 && !path.curve::<M>(i).is_motionless()) {
+            if !finite || width < 0.0 || (width == 0.0 && !path.is_motionless(i)) {
                 tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
                 return;
             }

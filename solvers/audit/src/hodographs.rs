@@ -4,7 +4,7 @@
 //! positive weights of these lose no digits (scheme of Schumaker and Volk 1986). The quotient rule makes the derivatives of C.
 
 use super::polygon::{Polygon, MOST};
-use super::vectors::{length, vector_of};
+use super::vectors::{inner, vector_of};
 
 /// Coefficients of a function of the piece, times binomials.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];
@@ -44,34 +44,30 @@ impl<const M: usize> Hodographs<M> {
             let least = weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
             ratio = degree as f64 * weights.iter().fold(0.0_f64, |most, w| most.max(*w)) / least;
         }
-        let (mut rows, mut bounds) = derivatives(ways, degree, if rational { 4 } else { 1 });
-        if !rational {
-            // From the steps themselves: differences of sums of them lose digits.
-            let mut own = [[0.0; M]; MOST + 1];
-            own[..degree].copy_from_slice(steps);
-            let scale = degree as f64;
-            let (slopes, lengths) = derivatives(own, degree.saturating_sub(1), 5);
-            bounds = lengths.map(|length| scale * length);
-            for order in 1..4 {
-                for i in 0..degree {
-                    rows[order][i] = vector_of(|k| scale * slopes[order - 1][i][k]);
-                }
-            }
-        }
         let mut scale = 0.5;
         let sizes = std::array::from_fn(|order| {
             scale *= 2.0 * ratio * degree.saturating_sub(order) as f64;
             longest.map(|step| scale * step)
         });
-        Self {
-            start: polygon.start,
-            degree,
-            rational,
-            rows,
-            weights: derivatives(of_weights, degree, if rational { 4 } else { 0 }).0,
-            sizes,
-            bounds: if rational { [f64::INFINITY; 4] } else { [bounds[1], bounds[2], bounds[3], bounds[4]] },
+        let (rows, weights) = ([[[0.0; M]; MOST + 1]; 4], [[[0.0]; MOST + 1]; 4]);
+        let bounds = [f64::INFINITY; 4];
+        let mut own = Self { start: polygon.start, degree, rational, rows, weights, sizes, bounds };
+        if rational {
+            derive(ways, degree, 4, &mut own.rows);
+            derive(of_weights, degree, 4, &mut own.weights);
+        } else {
+            derive(ways, degree, 1, &mut own.rows[..1]);
+            // From the steps themselves: differences of sums of them lose digits.
+            let mut slopes = [[0.0; M]; MOST + 1];
+            slopes[..degree].copy_from_slice(steps);
+            let scale = degree as f64;
+            let [_, bounds @ ..] = derive(slopes, degree.saturating_sub(1), 5, &mut own.rows[1..]);
+            own.bounds = bounds.map(|length| scale * length);
+            for row in own.rows[1..].iter_mut().flat_map(|rows| &mut rows[..degree]) {
+                *row = vector_of(|k| scale * row[k]);
+            }
         }
+        own
     }
 
     /// C, counted from the start of the piece, and its first R − 1 derivatives by t, where `rest` is 1 − t.
@@ -153,10 +149,15 @@ fn sum<const M: usize>(rows: &[[f64; M]], t: f64, rest: f64) -> [f64; M] {
     value
 }
 
-/// The coefficients, times binomials, of a function of this degree and of its derivatives, as many as are asked for up to order 3,
-/// and the greatest lengths of its coefficients of each order up to 4.
-fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize, orders: usize) -> ([Rows<M>; 4], [f64; 5]) {
-    let (mut found, mut lengths) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 5]);
+/// The coefficients, times binomials, of a function of this degree and of its first derivatives; returns the greatest lengths of
+/// the coefficients of so many orders.
+fn derive<const M: usize>(
+    mut rows: Rows<M>,
+    degree: usize,
+    orders: usize,
+    found: &mut [Rows<M>],
+) -> [f64; 5] {
+    let mut squares = [0.0_f64; 5];
     for order in 0..orders.min(degree + 1) {
         let count = degree - order;
         let mut binomial = 1.0;
@@ -164,14 +165,14 @@ fn derivatives<const M: usize>(mut rows: Rows<M>, degree: usize, orders: usize) 
             if let Some(found) = found.get_mut(order) {
                 found[i] = vector_of(|k| binomial * rows[i][k]);
             }
-            lengths[order] = f64::max(lengths[order], length(&rows[i]));
+            squares[order] = squares[order].max(inner(&rows[i], &rows[i]));
             binomial *= (count - i) as f64 / (i + 1) as f64;
         }
         for i in 0..count {
             rows[i] = vector_of(|k| count as f64 * (rows[i + 1][k] - rows[i][k]));
         }
     }
-    (found, lengths)
+    squares.map(f64::sqrt)
 }
 
 #[cfg(test)]

@@ -57,7 +57,7 @@ impl PhaseOrder<'_> {
     fn finish_piece<const M: usize>(&self, next: &mut Next, piece: usize, time: f64, tally: &mut Tally<M>) {
         while next.piece < piece {
             let left = self.path.width[next.piece] - next.u;
-            if !self.path.curve::<M>(next.piece).is_motionless() {
+            if !self.path.is_motionless(next.piece) {
                 let slack = ROUNDINGS * EPS * self.path.width[next.piece];
                 tally.offer(Check::Order, 0, left - slack, GAP_TOLERANCE, time, self.line(next.piece));
             }

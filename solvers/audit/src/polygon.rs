@@ -255,10 +255,6 @@ impl<const M: usize> Polygon<M> {
         first_direction(self.steps[..self.degree].iter().rev())
     }
 
-    pub fn is_motionless(&self) -> bool {
-        self.steps[..self.degree].iter().flatten().all(|&d| d == 0.0)
-    }
-
     /// Greatest coordinate of the ends.
     pub fn magnitude(&self) -> f64 {
         self.start.iter().chain(&self.end).fold(0.0, |most, q| q.abs().max(most))

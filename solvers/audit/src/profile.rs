@@ -256,7 +256,7 @@ impl<const M: usize> Auditor<'_, M> {
             for junction in before + 1..=after {
                 let allowed = self.junction_speed[junction] + self.negligible_speed();
                 tally.offer(Check::Junction, 0, speeds[0].max(speeds[1]), allowed, time, line);
-                if !stations.curves.get(junction).is_motionless() {
+                if !self.path.is_motionless(junction) {
                     break;
                 }
             }

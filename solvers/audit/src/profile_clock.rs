@@ -37,7 +37,7 @@ pub struct Reader<'a, const M: usize> {
     path: Followed<'a>,
     phase: usize,
     run: usize,
-    curves: Curves<'a, M>,
+    pub curves: Curves<'a, M>,
     motion: Motion<M>,
     /// Where it was last.
     last: Option<(Place, Passage)>,

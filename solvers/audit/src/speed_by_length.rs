@@ -4,6 +4,7 @@
 //! it is integrated.
 
 use super::phase_time::{kronrod, MOST_HALVINGS, RULES_AGREE};
+use super::EPS;
 
 /// Halvings of a bracket of the time until it is as narrow as its numbers.
 const MOST_STEPS: u32 = 1100;
@@ -149,8 +150,12 @@ fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
             low = t;
         }
         let newton = t - miss / start.after(t).v;
+        // A step of rounding alone leads out of the bracket as often as not.
+        if (newton - t).abs() <= EPS * t {
+            break;
+        }
         let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
-        if next == t || next <= low || next >= high {
+        if next <= low || next >= high {
             break;
         }
         t = next;

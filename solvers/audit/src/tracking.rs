@@ -123,6 +123,7 @@ struct Finder<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
+    /// The pieces, where there is no profile that has them.
     curves: Curves<'a, M>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
@@ -134,6 +135,10 @@ impl<'a, const M: usize> Finder<'a, M> {
         let curves = Curves::new(plan.path.pieces);
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
         Self { plan, limits, profile, curves, reach }
+    }
+
+    fn curves(&mut self) -> &mut Curves<'a, M> {
+        self.profile.as_mut().map_or(&mut self.curves, |profile| &mut profile.curves)
     }
 
     fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest<M> {
@@ -152,7 +157,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
         let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
-        let most = self.curves.get(from.piece).magnitude();
+        let most = self.curves().get(from.piece).magnitude();
         let magnitude = row.q.iter().fold(most, |most, q| q.abs().max(most));
         let rounding = ROUNDINGS * EPS * magnitude * (path.axes as f64).sqrt();
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
@@ -188,14 +193,16 @@ impl<'a, const M: usize> Finder<'a, M> {
     /// next one; none where that does not converge ahead of `from` or is not close.
     fn guess(&mut self, from: Place, step: f64, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
         let (mut piece, mut u) = (from.piece, from.u + step);
-        let mut curve = self.curves.get(piece);
+        let pieces = self.plan.path.len();
+        let curves = self.curves();
+        let mut curve = curves.get(piece);
         for _ in 0..MOST_GUESSES {
             if u > curve.width() {
                 piece += 1;
-                if piece > from.piece + 1 || piece == self.plan.path.len() {
+                if piece > from.piece + 1 || piece == pieces {
                     return None;
                 }
-                (curve, u) = (self.curves.get(piece), 0.0);
+                (curve, u) = (curves.get(piece), 0.0);
             }
             let [point, tangent] = curve.place(u);
             let (away, square) = (from_to(&point, q), inner(&tangent, &tangent));

@@ -1,7 +1,7 @@
 //! The lengths of one piece that laws are about, as tables shared by all phases on it: of the axes, of what the feed counts,
 //! and of the whole path. The place at a length comes from `feedplan_geometry::inverse_length`.
 
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 
 use super::phase::{Phase, SLOW};
 use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
@@ -85,7 +85,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
     /// The length from the start of the piece to u.
     pub(super) fn length(&self, law: PhaseLaw, u: f64) -> f64 {
         let lengths = self.of(law);
-        lengths.even.map_or_else(|| lengths.table().integral(u), |even| even * u)
+        lengths.even.map_or_else(|| lengths.up_to(u), |even| even * u)
     }
 
     /// The place at a length, with the proven error of the table in its miss.
@@ -221,6 +221,8 @@ struct Lengths<const M: usize> {
     foot: f64,
     nodes: Vec<Node>,
     error: f64,
+    /// A parameter and the length up to it that was asked for last: most phases begin where one has ended.
+    last: Cell<[f64; 2]>,
 }
 
 impl<const M: usize> Lengths<M> {
@@ -231,7 +233,18 @@ impl<const M: usize> Lengths<M> {
         if even.is_none() {
             error = fill(speeds.rate(foot, Line::ONE), (0.0, piece.width), &mut nodes);
         }
-        Self { speeds, even, foot, nodes, error }
+        Self { speeds, even, foot, nodes, error, last: Cell::new([0.0; 2]) }
+    }
+
+    /// The length up to u.
+    fn up_to(&self, u: f64) -> f64 {
+        let [last, length] = self.last.get();
+        if u == last {
+            return length;
+        }
+        let length = self.table().integral(u);
+        self.last.set([u, length]);
+        length
     }
 
     fn table(&self) -> Table<'_, Rate<'_, M>> {

@@ -1,7 +1,7 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::path_data::PathData;
-use crate::phase_motion::{flaw, Phase, Phases, MAX_TIP};
+use crate::phase_motion::{flaw, Phase, Phases, PiecePath, MAX_TIP};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 
@@ -53,11 +53,12 @@ pub(super) fn check<const M: usize>(
                 r + 1
             ));
         }
+        let mut piece = None;
         for i in phase_runs[r]..phase_runs[r + 1] {
             watch.each(phases.len()).count(i);
             let known = phases.get(i).ok_or_else(|| format!("has the unknown kind {}", phases.kind[i]));
             known
-                .and_then(|phase| check_phase(path, r, &phase))
+                .and_then(|phase| check_phase(path, r, &phase, &mut piece))
                 .map_err(|what| format!("phase {i} of the profile {what}: plan this path again"))?;
         }
     }
@@ -73,7 +74,13 @@ fn fits_pieces(values: &[f64], offsets: &[usize], pieces: usize) -> bool {
         && values.iter().all(|value| value.is_finite())
 }
 
-fn check_phase<const M: usize>(path: &PathData<M>, run: usize, phase: &Phase) -> Result<(), String> {
+/// `piece` keeps the piece of the phase before.
+fn check_phase<'a, const M: usize>(
+    path: &'a PathData<M>,
+    run: usize,
+    phase: &Phase,
+    piece: &mut Option<(u32, PiecePath<'a, M>)>,
+) -> Result<(), String> {
     if !(path.runs[run]..path.runs[run + 1]).contains(&(phase.piece as usize)) {
         return Err("is on no piece of its run".into());
     }
@@ -100,6 +107,10 @@ fn check_phase<const M: usize>(path: &PathData<M>, run: usize, phase: &Phase) ->
     if !(right(phase.a0) && right(phase.a1)) {
         return Err("has an acceleration along the path that is not finite, or not of its kind".into());
     }
-    let flaw = phase.law.is_along().then(|| flaw(&path.piece(phase.piece as usize), phase));
-    flaw.flatten().map_or(Ok(()), |flaw| Err(flaw.into()))
+    if !phase.law.is_along() {
+        return Ok(());
+    }
+    let known = piece.take().filter(|(number, _)| *number == phase.piece);
+    let (_, piece) = piece.insert(known.unwrap_or_else(|| (phase.piece, path.piece(phase.piece as usize))));
+    flaw(piece, phase).map_or(Ok(()), |flaw| Err(flaw.into()))
 }
