@@ -94,13 +94,19 @@ def _sample(
     piece = profile.piece[phase].astype(np.int64)
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
     slope = motion.slope(piece, u)
+    # u̇ at both ends of each phase is the profile's own, and costs nothing.
+    ends = np.empty((len(phases), count))
+    ends[:, 0], ends[:, -1] = np.sqrt(profile.p0[phases]), np.sqrt(profile.p1[phases])
+    rate = ends.ravel()
+    inside = np.arange(len(u)) % count % (count - 1) > 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        velocity = states.along(piece.astype(np.uint32), u)[2]
+        velocity = states.along(piece[inside].astype(np.uint32), u[inside])[2]
+        rate[inside] = parameter_speed(tangent[inside], velocity)
         joint = np.linalg.norm(tangent, axis=1)
         feed = _quotient(problem.feed[piece], np.sqrt(feed_square(problem, piece, u)))
         return LimitSamples(
             length=motion.drawn_length(piece, u),
-            speed=slope * parameter_speed(tangent, velocity),
+            speed=slope * rate,
             acceleration=slope
             * np.sqrt(limit_curve(tangent, second, problem.max_acceleration, problem.min_acceleration)),
             feed=slope * feed,
