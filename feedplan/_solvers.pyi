@@ -1,6 +1,7 @@
 """Types of the native module."""
 
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any, Final, final
 
 import numpy as np
@@ -69,7 +70,7 @@ _Chunk = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, NDArray[np.int32], _
 
 @final
 class Problem:
-    def __new__(cls, problem: _Problem | Part) -> Problem: ...
+    def __new__(cls, problem: _Problem | SimpleNamespace) -> Problem: ...
 
 @final
 class Profile:

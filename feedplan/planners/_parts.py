@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,8 +18,6 @@ from numpy.typing import NDArray
 from feedplan._solvers import PlanError
 from feedplan._solvers import Problem as NativeProblem
 from feedplan.constraints.problem import Problem
-from feedplan.curves.composite import CompositeCurve
-from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.lazy import cached_property
 from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
 from feedplan.progress import Listener
@@ -38,47 +37,34 @@ class Elsewhere(Protocol):
         """What `work(*arguments, progress)` returns for each of the arguments that are given."""
 
 
-@dataclass(frozen=True)
-class Runs:
-    """The fields of a `Path` that native code takes, for some of its runs; offsets count from 0."""
-
-    runs: NDArray[np.int64]
-    line: NDArray[np.int32]
-    start_dwell: float
-    dwell: Floats
+# The fields of a problem that kernels take: with a value for each piece, and those that all parts share.
+_OF_EACH_PIECE = ("curve", "tip_speed", "way_speed", "tip_curve", "feed_share", "feed")
+_SHARED = (
+    "max_velocity",
+    "max_acceleration",
+    "min_velocity",
+    "min_acceleration",
+    "chord_tolerance",
+    "period",
+)
 
 
 @dataclass(frozen=True)
 class Part:
-    """What native planners take of a `Problem`, for the runs from the `run`-th to before the `end_run`-th.
+    """The runs of a problem from the `run`-th to before the `end_run`-th; the `first` is their first piece.
 
-    Their pieces begin with the `first`.
+    `given` has the fields of a `Problem` that kernels take, for these runs alone.
     """
 
     run: int
     end_run: int
     first: int
-    path: Runs
-    curve: CompositeCurve
-    tip_speed: SpeedPolynomial | None
-    way_speed: SpeedPolynomial | None
-    tip_curve: CompositeCurve | None
-    feed_share: Floats | None
-    feed: Floats
-    junction_speed: Floats
-    max_velocity: Floats
-    max_acceleration: Floats
-    min_velocity: Floats
-    min_acceleration: Floats
-    chord_tolerance: float
-    period: float
-    start_speed: float
-    end_speed: float
+    given: SimpleNamespace
 
     @cached_property
     def native(self) -> NativeProblem:
         """The part as kernels take it."""
-        return NativeProblem(self)
+        return NativeProblem(self.given)
 
 
 def parts(problem: Problem, count: int) -> list[Part]:
@@ -90,34 +76,23 @@ def parts(problem: Problem, count: int) -> list[Part]:
 
 
 def _part(problem: Problem, run: int, end_run: int) -> Part:
-    runs = problem.path.runs
+    path, runs = problem.path, problem.path.runs
     first, end = int(runs[run]), int(runs[end_run])
-    return Part(
-        run=run,
-        end_run=end_run,
-        first=first,
-        path=Runs(
+    columns = {name: getattr(problem, name) for name in _OF_EACH_PIECE}
+    given = SimpleNamespace(
+        path=SimpleNamespace(
             runs=runs[run : end_run + 1] - first,
-            line=problem.path.line[first:end],
+            line=path.line[first:end],
             start_dwell=0.0,
-            dwell=problem.path.dwell[run:end_run],
+            dwell=path.dwell[run:end_run],
         ),
-        curve=problem.curve[first:end],
-        tip_speed=None if problem.tip_speed is None else problem.tip_speed[first:end],
-        way_speed=None if problem.way_speed is None else problem.way_speed[first:end],
-        tip_curve=None if problem.tip_curve is None else problem.tip_curve[first:end],
-        feed_share=None if problem.feed_share is None else problem.feed_share[first:end],
-        feed=problem.feed[first:end],
+        **{name: None if column is None else column[first:end] for name, column in columns.items()},
+        **{name: getattr(problem, name) for name in _SHARED},
         junction_speed=problem.junction_speed[first : end + 1],
-        max_velocity=problem.max_velocity,
-        max_acceleration=problem.max_acceleration,
-        min_velocity=problem.min_velocity,
-        min_acceleration=problem.min_acceleration,
-        chord_tolerance=problem.chord_tolerance,
-        period=problem.period,
         start_speed=problem.start_speed if run == 0 else 0.0,
         end_speed=problem.end_speed if end_run == len(runs) - 1 else 0.0,
     )
+    return Part(run, end_run, first, given)
 
 
 def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, Floats]]) -> SpeedProfile:
