@@ -105,7 +105,11 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
             let (before, after) = (path.length(phase.law, u0), path.length(phase.law, u1));
             (Measure::Length { before, total: after - before }, clock(after - before))
         };
-        let speeds = || path.end_speeds(phase);
+        let squares = match phase.law {
+            PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity | PhaseLaw::ParameterAcceleration => [1.0; 2],
+            _ => path.end_squares(phase),
+        };
+        let speeds = || phase.end_speeds(squares);
         let (measure, clock) = match phase.law {
             PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity => match AxisWay::new(path.piece(), phase) {
                 Some((way, even)) => (Measure::Axis(Box::new(way)), Clock::Even(even)),
@@ -128,7 +132,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
             }
         };
         let mut motion = Self { path, phase: *phase, measure, clock, safe: [u0, u1], straight: None };
-        let off = motion.off_ends();
+        let off = motion.off_ends(squares);
         if off != [0.0; 2] {
             motion.safe = [u0 + off[0], u1 - off[1]];
             motion.straight = motion.direction();
@@ -136,13 +140,12 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         motion
     }
 
-    /// How far from the ends the quotients have to be taken.
-    fn off_ends(&self) -> [f64; 2] {
+    /// How far from the ends, where the lengths per u have these squares, the quotients have to be taken.
+    fn off_ends(&self, squares: [f64; 2]) -> [f64; 2] {
         let Phase { law, u0, u1, .. } = self.phase;
         let of_length = || {
             let middle = self.path.square(law, 0.5 * (u0 + u1));
-            [u0, u1]
-                .map(|u| if self.path.square(law, u) <= SLOW * middle { OFF_CUSP * (u1 - u0) } else { 0.0 })
+            squares.map(|square| if square <= SLOW * middle { OFF_CUSP * (u1 - u0) } else { 0.0 })
         };
         match (&self.measure, &self.clock) {
             (Measure::Axis(way), _) => way.turns.map(|turns| if turns { OFF_TURN * (u1 - u0) } else { 0.0 }),
@@ -364,10 +367,10 @@ fn rates_of<const M: usize>(q: &[[f64; M]; 4], du: f64, ddu: f64, dddu: f64) -> 
 
 /// Why nothing can follow a phase whose numbers are finite.
 pub fn flaw<const M: usize>(path: &PiecePath<M>, phase: &Phase) -> Option<&'static str> {
-    let length = || path.rough_length(phase);
+    let speeds = || phase.end_speeds(path.end_squares(phase));
     match phase.law {
-        PhaseLaw::PathJerk => Jerk::new(phase, path.end_speeds(phase)).flaw(),
-        PhaseLaw::SpeedCubic => Cubic::flaw(phase, path.end_speeds(phase), length()),
+        PhaseLaw::PathJerk => Jerk::new(phase, speeds()).flaw(),
+        PhaseLaw::SpeedCubic => Cubic::flaw(phase, speeds(), path.rough_length(phase)),
         _ => None,
     }
 }

@@ -211,12 +211,18 @@ impl<const M: usize> JointSetpoints<M> {
     }
 }
 
-/// The phase of the last setpoint, its piece, the places at its ends, and its motion where that is known by the length.
+/// The phase of the last setpoint, its piece, the place at its start, and its motion.
 struct Known<'a, const M: usize> {
     phase: usize,
     piece: Piece<'a, M>,
-    ends: [Place<M>; 2],
-    by_length: Option<PhaseByLength<M>>,
+    start: Place<M>,
+    motion: Motion<M>,
+}
+
+/// The motion on a phase: known by the length, or between its start and its end.
+enum Motion<const M: usize> {
+    ByLength(PhaseByLength<M>),
+    To(Place<M>),
 }
 
 /// Judges setpoints that follow each other.
@@ -366,19 +372,22 @@ impl<'a, const M: usize> Judge<'a, M> {
                     audit.path.piece(number)
                 }
             };
-            let ends = [phases.u0[phase], phases.u1[phase]].map(|u| piece.place(u, &mut self.work));
-            let by_length = piece.by_length(phases, phase);
-            self.known = Some(Known { phase, piece, ends, by_length });
+            let start = piece.place(phases.u0[phase], &mut self.work);
+            let motion = match piece.by_length(phases, phase) {
+                Some(motion) => Motion::ByLength(motion),
+                None => Motion::To(piece.place(phases.u1[phase], &mut self.work)),
+            };
+            self.known = Some(Known { phase, piece, start, motion });
         }
-        let Some(Known { piece, ends, by_length, .. }) = &self.known else {
+        let Some(Known { piece, start, motion: known, .. }) = &self.known else {
             unreachable!("the phase is known")
         };
         let is_finite = row.t.is_finite() && row.position.iter().all(|x| x.is_finite());
         let target = if is_finite { row.position } else { [0.0; M] };
         let place = nearest(piece, phases, phase, since, &target, &mut self.work);
-        let states = match by_length {
-            Some(by_length) => motion_by_length(piece, by_length, &[ends[0], place]),
-            None => motion(piece, phases, phase, &[ends[0], place, ends[1]], 1),
+        let states = match known {
+            Motion::ByLength(by_length) => motion_by_length(piece, by_length, &[*start, place]),
+            Motion::To(end) => motion(piece, phases, phase, &[*start, place, *end], 1),
         };
         let here = &states[1];
         let doubt = here.time * here.time_error;

@@ -20,21 +20,21 @@ use feedplan_planner::phase_law::PhaseLaw;
 const ERROR: f64 = 0.125 * tolerance::TABLE;
 
 /// Whose length a law is about.
-#[derive(Clone, Copy, Debug)]
-pub enum Counts<'a, const M: usize> {
+#[derive(Clone, Debug)]
+pub enum Counts<const M: usize> {
     /// All axes of the piece.
     Axes,
     /// Each axis times its share.
     Shares([f64; M]),
     /// The tool tip, whose joints the piece moves.
-    Tip(TipSpeed<'a>),
+    Tip(TipSpeed),
 }
 
 /// A piece with its lengths, which are tabulated when they are first asked for.
 pub struct PiecePath<'a, const M: usize> {
     piece: Piece<'a, M>,
-    feed: Counts<'a, M>,
-    way: Counts<'a, M>,
+    feed: Counts<M>,
+    way: Counts<M>,
     /// The end of the piece where C' vanishes; not a number where it does not.
     foot: f64,
     /// Of the axes, of the feed, of the way.
@@ -45,7 +45,7 @@ const AXES: usize = 0;
 
 impl<'a, const M: usize> PiecePath<'a, M> {
     /// What counts at the feed, and in laws about the way along the path. On a speed line shares do not count.
-    pub fn new(piece: Piece<'a, M>, feed: Counts<'a, M>, way: Counts<'a, M>) -> Self {
+    pub fn new(piece: Piece<'a, M>, feed: Counts<M>, way: Counts<M>) -> Self {
         let square = |u: f64| {
             let q = derivatives(&piece, u)[1];
             dot(&q, &q)
@@ -59,7 +59,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         &self.piece
     }
 
-    fn counts(&self, law: PhaseLaw) -> (usize, &Counts<'a, M>) {
+    fn counts(&self, law: PhaseLaw) -> (usize, &Counts<M>) {
         match (law, &self.feed, &self.way) {
             (PhaseLaw::PathJerk | PhaseLaw::SpeedCubic, _, way @ Counts::Tip(_)) => (2, way),
             (PhaseLaw::Feed, feed @ (Counts::Tip(_) | Counts::Shares(_)), _) => (1, feed),
@@ -72,7 +72,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         matches!(self.counts(law).1, Counts::Tip(_))
     }
 
-    fn lengths(&self, number: usize, counts: &Counts<'a, M>) -> &Lengths<M> {
+    fn lengths(&self, number: usize, counts: &Counts<M>) -> &Lengths<M> {
         self.tables[number].get_or_init(|| Lengths::new(&self.piece, counts, self.foot))
     }
 
@@ -113,7 +113,16 @@ impl<'a, const M: usize> PiecePath<'a, M> {
 
     /// Square of the length per u.
     pub(super) fn square(&self, law: PhaseLaw, u: f64) -> f64 {
-        let g = self.slopes(law, u, &derivatives(&self.piece, u))[0];
+        let of = |share: &dyn Fn([f64; M]) -> [f64; M]| {
+            let q = share(derivatives(&self.piece, u)[1]);
+            dot(&q, &q)
+        };
+        let square = match self.counts(law).1 {
+            Counts::Axes => of(&|q| q),
+            Counts::Shares(share) => of(&|q| times(share, &q)),
+            Counts::Tip(tip) => tip.derivatives[0].value(u / self.piece.width),
+        };
+        let g = square.max(0.0).sqrt();
         g * g
     }
 
@@ -126,7 +135,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         let [square, slope, bend] = match self.counts(law).1 {
             Counts::Axes => of_axes(q),
             Counts::Shares(share) => of_axes(&q.map(|q| times(share, &q))),
-            Counts::Tip(tip) => tip.derivatives().map(|d| d.value(u / self.piece.width)),
+            Counts::Tip(tip) => tip.derivatives.each_ref().map(|d| d.value(u / self.piece.width)),
         };
         // A square that touches 0 may be a rounding error below it.
         let g = square.max(0.0).sqrt();
@@ -142,9 +151,9 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         }
     }
 
-    /// The speeds that p makes of the length per u at both ends of a phase.
-    pub(super) fn end_speeds(&self, phase: &Phase) -> [f64; 2] {
-        [(phase.u0, phase.p0), (phase.u1, phase.p1)].map(|(u, p)| (self.square(phase.law, u) * p).sqrt())
+    /// Squares of the length per u at both ends of a phase.
+    pub(super) fn end_squares(&self, phase: &Phase) -> [f64; 2] {
+        [phase.u0, phase.u1].map(|u| self.square(phase.law, u))
     }
 
     /// The place a length of the axes ahead of u, within `tolerance` mm, by Newton–Raphson.
@@ -185,7 +194,7 @@ impl<const M: usize> Speeds<M> {
         match counts {
             Counts::Axes => Self::Axes { coefficients, width },
             Counts::Shares(share) => Self::Axes { coefficients: coefficients.scaled(share), width },
-            Counts::Tip(tip) => Self::Tip { square: Box::new(tip.square()), width },
+            Counts::Tip(tip) => Self::Tip { square: Box::new(tip.derivatives[0]), width },
         }
     }
 

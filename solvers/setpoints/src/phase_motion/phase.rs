@@ -93,6 +93,13 @@ impl FromIterator<Phase> for Phases {
     }
 }
 
+impl Phase {
+    /// The speeds that p makes of the squares of a length per u at both ends.
+    pub fn end_speeds(&self, squares: [f64; 2]) -> [f64; 2] {
+        [(squares[0] * self.p0).sqrt(), (squares[1] * self.p1).sqrt()]
+    }
+}
+
 /// A share of the whole measure of a phase, counted from its start or from its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {

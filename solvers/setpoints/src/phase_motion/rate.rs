@@ -8,24 +8,18 @@ use feedplan_geometry::spline::speed::{greatest_ratio, to_taylor, Speed};
 /// Most coefficients of a tip speed.
 pub const MAX_TIP: usize = 37;
 
-/// D(u), the square of the tip's speed per parameter on one piece, by its Bernstein coefficients.
-#[derive(Clone, Copy, Debug)]
-pub struct TipSpeed<'a> {
-    pub coefficients: &'a [f64],
-    pub width: f64,
+/// D(u), the square of the tip's speed per parameter on one piece, D' and D'' over t = u / width.
+#[derive(Clone, Debug)]
+pub struct TipSpeed {
+    pub derivatives: Box<[Polynomial<MAX_TIP>; 3]>,
 }
 
-impl TipSpeed<'_> {
-    /// D over t = u / width.
-    pub fn square(&self) -> Polynomial<MAX_TIP> {
-        Polynomial::from_bernstein(self.coefficients.iter().copied())
-    }
-
-    /// D, D' and D'' over t = u / width.
-    pub fn derivatives(&self) -> [Polynomial<MAX_TIP>; 3] {
-        let square = self.square();
-        let slope = square.derivative().scale(1.0 / self.width);
-        [square, slope, slope.derivative().scale(1.0 / self.width)]
+impl TipSpeed {
+    /// By the Bernstein coefficients of D on a piece of this width.
+    pub fn new(coefficients: &[f64], width: f64) -> Self {
+        let square = Polynomial::from_bernstein(coefficients.iter().copied());
+        let slope = square.derivative().scale(1.0 / width);
+        Self { derivatives: Box::new([square, slope, slope.derivative().scale(1.0 / width)]) }
     }
 }
 

@@ -110,7 +110,9 @@ fn check_phase<'a, const M: usize>(
     if !phase.law.is_along() {
         return Ok(());
     }
-    let known = piece.take().filter(|(number, _)| *number == phase.piece);
-    let (_, piece) = piece.insert(known.unwrap_or_else(|| (phase.piece, path.piece(phase.piece as usize))));
-    flaw(piece, phase).map_or(Ok(()), |flaw| Err(flaw.into()))
+    if piece.as_ref().is_none_or(|(number, _)| *number != phase.piece) {
+        *piece = Some((phase.piece, path.piece(phase.piece as usize)));
+    }
+    let flaw = piece.as_ref().and_then(|(_, piece)| flaw(piece, phase));
+    flaw.map_or(Ok(()), |flaw| Err(flaw.into()))
 }

@@ -29,7 +29,7 @@ impl<const M: usize> PathData<M> {
         let [feed, way] = [&self.tip_speed, &self.way_speed].map(|speed| {
             speed.as_ref().map(|(coefficients, offsets)| {
                 let coefficients = &coefficients[offsets[i]..offsets[i + 1]];
-                Counts::Tip(TipSpeed { coefficients, width: self.curve.width[i] })
+                Counts::Tip(TipSpeed::new(coefficients, self.curve.width[i]))
             })
         });
         let shares = self.feed_share.get(i).filter(|share| **share != [1.0; M]).copied();
