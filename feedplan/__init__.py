@@ -9,10 +9,12 @@
 `FeedplanError`, one sentence with the remedy.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from feedplan._solvers import __version__ as __version__
 from feedplan.audit import Audit, LimitCheck
 from feedplan.checking import check
-from feedplan.client.client import Client
 from feedplan.comparison import Row, compare
 from feedplan.errors import (
     FeedplanError,
@@ -25,11 +27,9 @@ from feedplan.errors import (
 )
 from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
-from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Machine
 from feedplan.machine.machine import bundled_machines as machines
 from feedplan.plan_folder import write_plan
-from feedplan.planned_feeds import PlannedProgram, planned_program, write_program
 from feedplan.planners import methods
 from feedplan.planning import Plan, plan
 from feedplan.profile import SpeedProfile
@@ -37,6 +37,11 @@ from feedplan.program.program import Program
 from feedplan.program.read import read_program
 from feedplan.setpoints import SetpointChunk, Setpoints
 from feedplan.trajectory import State, Trajectory
+
+if TYPE_CHECKING:
+    from feedplan.client.client import Client
+    from feedplan.machine.importers import import_machine
+    from feedplan.planned_feeds.rewrite import PlannedProgram, planned_program, write_program
 
 __all__ = [
     "Audit",
@@ -72,6 +77,22 @@ __all__ = [
     "write_plan",
     "write_program",
 ]
+
+
+# Names that a plan does without, with their modules, which are imported when a name is first used.
+_LATER = {
+    "Client": "feedplan.client.client",
+    "import_machine": "feedplan.machine.importers",
+    "PlannedProgram": "feedplan.planned_feeds.rewrite",
+    "planned_program": "feedplan.planned_feeds.rewrite",
+    "write_program": "feedplan.planned_feeds.rewrite",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_LATER[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -17,7 +17,6 @@ from feedplan.arguments import callback, file_path, flag, list_of_names, refuse
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, format_named
 from feedplan.outputs._staging import require_folder, staged
-from feedplan.planned_feeds import PlannedProgram
 from feedplan.progress import Listener, Progress, beside, of_stage, part, tell
 from feedplan.setpoints import SetpointChunk, Sink
 from feedplan.units import duration_text
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from feedplan.comparison import Row
     from feedplan.knots import Knots
     from feedplan.one_step_more import Step
+    from feedplan.planned_feeds.rewrite import PlannedProgram
     from feedplan.planning import Plan
 
 SUMMARY_FILE = "plan.json"
@@ -76,8 +76,8 @@ def write_plan(
     for name, output in outputs.items():
         if (other := by_file[output.FILE]) != name:
             raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
-    if program is not None and not isinstance(program, PlannedProgram):
-        raise refuse("the program", program, "what feedplan.planned_program returns")
+    if program is not None:
+        _require_program(program)
     flag(drawing, "the drawing")
     steps = _steps(one_step_more)
     knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)
@@ -244,6 +244,13 @@ def _folder(given: str | os.PathLike[str]) -> FilePath:
     folder = file_path(given, "the folder", "the path of a folder, as a text or a pathlib.Path")
     require_folder(folder)
     return folder
+
+
+def _require_program(given: object) -> None:
+    from feedplan.planned_feeds.rewrite import PlannedProgram
+
+    if not isinstance(given, PlannedProgram):
+        raise refuse("the program", given, "what feedplan.planned_program returns")
 
 
 def _steps(given: Sequence[Step]) -> tuple[Step, ...]:

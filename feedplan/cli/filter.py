@@ -22,7 +22,6 @@ from feedplan.cli import terminal
 from feedplan.cli.options import METHOD, PROGRAM, TOLERANCE
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.errors import InfeasibleError
-from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Machine
 from feedplan.program.program import Program
 from feedplan.program.read import Reading
@@ -62,7 +61,8 @@ def filter_(
     reading: Reading,
 ) -> None:
     """Write PROGRAM with planned feeds to standard output, as a program filter of LinuxCNC."""
-    from feedplan.planned_feeds import planned_program
+    from feedplan.machine.importers import import_machine
+    from feedplan.planned_feeds.rewrite import planned_program
     from feedplan.planning import plan
 
     def write(text: str) -> None:

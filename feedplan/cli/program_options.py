@@ -13,7 +13,7 @@ from feedplan.cli.options import with_options
 from feedplan.planned_feeds.dialects import DIALECTS
 
 if TYPE_CHECKING:
-    from feedplan.planned_feeds import PlannedProgram
+    from feedplan.planned_feeds.rewrite import PlannedProgram
     from feedplan.planning import Plan
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -57,7 +57,7 @@ class ProgramWanted:
         """Makes the program if it is wanted, and writes it to the file if one is given; else returns None."""
         if self.file is None and not self.in_folder:
             return None
-        from feedplan.planned_feeds import planned_program
+        from feedplan.planned_feeds.rewrite import planned_program
 
         planned = planned_program(plan, **self.options)
         if self.file is not None:

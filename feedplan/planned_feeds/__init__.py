@@ -9,7 +9,3 @@ without one the geometry is the same bit for bit. The text is read back and comp
 Lines that run more than once, in loops and subroutines, stay as they are, and so do threads and lines whose F
 is computed; the program's own F is restored before them. G0 stays G0.
 """
-
-from feedplan.planned_feeds.rewrite import PlannedProgram, planned_program, write_program
-
-__all__ = ["PlannedProgram", "planned_program", "write_program"]
