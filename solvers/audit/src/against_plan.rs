@@ -3,14 +3,14 @@
 use super::curve::Curves;
 use super::deviation::{settled, window};
 use super::neighbours::Neighbours;
-use super::profile_clock::ACCELERATION_SHARE;
+use super::profile_reader::ACCELERATION_SHARE;
 use super::rows::Row;
 use super::tracking::{is_step, Plan};
 use super::vectors::{distance, from_to, inner, length, Segment};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
-const VELOCITY_SHARE: f64 = 1e-3;
+pub const VELOCITY_SHARE: f64 = 1e-3;
 
 /// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
 const SMOOTH: f64 = 1e-9;

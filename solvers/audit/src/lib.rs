@@ -6,7 +6,7 @@
 //!
 //! The path: `vectors`, `polygon`, `hodographs`, `curve`, `station`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. The
 //! profile: `phases`, `phase_order`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
-//! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
+//! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
 
 mod against_plan;
 mod arc_slope;
@@ -31,6 +31,7 @@ pub mod phases;
 mod polygon;
 mod profile;
 pub mod profile_clock;
+mod profile_reader;
 mod rows;
 pub mod setpoints;
 mod speed_by_length;

@@ -60,6 +60,17 @@ impl Phases<'_> {
         self.piece.is_empty()
     }
 
+    /// Whether the phases are those of the runs of a path, with good numbers on so many axes or joints.
+    pub fn fits(&self, path: &Followed, axes: usize) -> bool {
+        let runs = self.runs;
+        !self.is_empty()
+            && runs.len() == path.runs.len()
+            && runs.first() == Some(&0)
+            && runs.last() == Some(&(self.len() as i64))
+            && runs.windows(2).all(|pair| pair[0] <= pair[1])
+            && (0..self.len()).all(|i| self.has_good_numbers(i, axes))
+    }
+
     /// When each phase begins, and when the last one ends, in s; pauses before and between the runs included.
     pub fn starts(&self, path: &Followed) -> Vec<f64> {
         let mut starts = Vec::with_capacity(self.len() + 1);

@@ -35,6 +35,21 @@ pub struct Chunk<'a> {
     pub line: Option<&'a [i32]>,
 }
 
+impl Chunk<'_> {
+    /// Setpoint `i`, its place not yet known.
+    pub(crate) fn row<const M: usize>(&self, i: usize) -> Row<M> {
+        let of = |table| vector(table, self.axes, i);
+        Row {
+            t: self.t[i],
+            q: of(self.position),
+            velocity: self.velocity.map(of),
+            acceleration: self.acceleration.map(of),
+            line: self.line.map_or(0, |line| line[i]),
+            nearest: Nearest::default(),
+        }
+    }
+}
+
 /// The audit of a stream.
 pub struct Stream<const M: usize> {
     limits: Limits<M>,
@@ -60,14 +75,7 @@ impl<const M: usize> Stream<M> {
     pub(crate) fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
-        rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| Row {
-            t: chunk.t[i],
-            q: vector(chunk.position, chunk.axes, i),
-            velocity: chunk.velocity.map(|table| vector(table, chunk.axes, i)),
-            acceleration: chunk.acceleration.map(|table| vector(table, chunk.axes, i)),
-            line: chunk.line.map_or(0, |line| line[i]),
-            nearest: Nearest::default(),
-        }));
+        rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| chunk.row(i)));
         if let Some(plan) = plan {
             plan.extend_clock(&self.limits, &rows, &mut self.clock);
         }

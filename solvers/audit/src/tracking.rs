@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use super::curve::{Curves, Followed};
 use super::moves::Programmed;
 use super::nearest::{Found, Place, Search};
-use super::profile_clock::{ProfileClock, Reader};
+use super::profile_clock::ProfileClock;
+use super::profile_reader::Reader;
 use super::rows::{Nearest, Row};
 use super::vectors::{distance, from_to, inner, length};
-use super::{tell, Limits, Seen, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
+use super::{tell, Limits, Seen, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// Setpoints a thread takes at a time.
 const BLOCK: usize = 4096;
@@ -27,7 +28,7 @@ const MOST_GUESSES: usize = 6;
 const SETTLED: f64 = 1e-7;
 
 /// A setpoint may lie this share of its step from its place on the path: what sampling promises.
-const STEP_SHARE: f64 = 1e-6;
+pub const STEP_SHARE: f64 = 1e-6;
 
 /// What the setpoints of a plan follow.
 #[derive(Clone, Copy)]
@@ -54,38 +55,18 @@ impl Plan<'_> {
         Plan { profile: self.profile.map(|profile| ProfileClock { run_starts, ..profile }), ..*self }
     }
 
-    /// Adds to the clock the starts of the runs that the rows reach. A run starts when the pause before it is
-    /// over or, where the setpoints stand still on the stop for it, at the next of them.
+    /// Adds to the clock the starts of the runs that the rows reach.
     pub fn extend_clock<const M: usize>(&self, limits: &Limits<M>, rows: &[Row<M>], clock: &mut Vec<f64>) {
         let Some(profile) = &self.profile else { return };
-        while clock.len() + 1 < profile.phases.runs.len() {
-            let (due, stop) = match clock.len().checked_sub(1) {
-                None => (self.path.start_dwell, self.start::<M>()),
-                Some(run) => {
-                    let piece = (self.path.runs[run + 1] as usize).max(1) - 1;
-                    let due = clock[run] + profile.motion_time(run) + self.path.dwell[run];
-                    (due, self.path.end::<M>(piece))
-                }
+        let away = |run: usize, row: &Row<M>| {
+            let stop = match run {
+                0 => self.start::<M>(),
+                _ => self.path.end::<M>((self.path.runs[run] as usize).max(1) - 1),
             };
-            let slack = PASS_EXCESS * limits.period + ROUNDINGS * EPS * due;
-            let next = rows.partition_point(|row| row.t < due - slack);
             let magnitude = stop.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
-            let stands =
-                |row: &Row<M>| distance(&row.q, &stop) <= GAP_TOLERANCE + ROUNDINGS * EPS * magnitude;
-            let on_time = |row: &Row<M>| row.t <= due + slack;
-            let waits = |row: &Row<M>, later: &Row<M>| {
-                stands(later) && distance(&later.q, &stop) <= distance(&row.q, &stop)
-            };
-            match &rows[next..] {
-                [] => break,
-                // At the end of the pause: only the next row shows whether the stream moves on or waits.
-                [row] if on_time(row) => break,
-                // A run may begin slowly: a stream that waits, or has not quite arrived, does not move away from the stop.
-                [row, later, ..] if on_time(row) && waits(row, later) => clock.push(later.t),
-                [row, ..] if stands(row) => clock.push(row.t),
-                _ => clock.push(due),
-            }
-        }
+            distance(&row.q, &stop) - ROUNDINGS * EPS * magnitude
+        };
+        profile.extend(&self.path, limits.period, rows, away, false, clock);
     }
 
     /// Finds the places of the rows from `old` on.

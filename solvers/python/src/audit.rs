@@ -435,14 +435,7 @@ fn compare(
     let mut usable = None;
     if let Some(profile) = profile {
         let phases = phases(&profile, &arrays)?;
-        let runs = phases.runs;
-        let good = !phases.is_empty()
-            && runs.len() == path.runs.len()
-            && runs.first() == Some(&0)
-            && runs.last() == Some(&(phases.len() as i64))
-            && runs.windows(2).all(|pair| pair[0] <= pair[1])
-            && (0..phases.len()).all(|i| phases.has_good_numbers(i, path.axes));
-        if good {
+        if phases.fits(&path, path.axes) {
             starts = phases.starts(&path);
             usable = Some(profile.native().clone_ref(problem.py()));
         }

@@ -2,6 +2,7 @@
 
 use super::path::JointPath;
 use crate::phases::Phases;
+use crate::profile_clock::ProfileClock;
 use crate::Limits;
 
 /// What an audit of joints knows.
@@ -13,7 +14,15 @@ pub struct JointAudit<'a, const M: usize> {
     pub starts: &'a [f64],
 }
 
-impl<const M: usize> JointAudit<'_, M> {
+impl<'a, const M: usize> JointAudit<'a, M> {
+    /// The profile on the clock of setpoints whose runs have begun at these times.
+    pub fn clock<'b>(&self, run_starts: &'b [f64]) -> ProfileClock<'b>
+    where
+        'a: 'b,
+    {
+        ProfileClock { phases: self.phases, starts: self.starts, run_starts }
+    }
+
     /// Whether a phase is the first of a run.
     pub fn is_first(&self, phase: usize) -> bool {
         self.phases.runs.binary_search(&(phase as i64)).is_ok()

@@ -9,22 +9,14 @@ use rayon::prelude::*;
 use super::path::{Piece, Place, Work};
 use super::phase_motion::{motion, motion_by_length, ROUNDING};
 use super::plan::JointAudit;
+use crate::against_plan::VELOCITY_SHARE;
 use crate::phase_by_length::PhaseByLength;
+use crate::profile_clock::ProfileClock;
+use crate::rows::Row;
 use crate::setpoints::Chunk;
+use crate::tracking::STEP_SHARE;
 use crate::vectors::{length, Segment};
-use crate::{Check, Tally, EPS, PLACE_TOLERANCE, ROUNDINGS};
-
-/// How far a setpoint may lie from its place, as a share of its step.
-const STEP_SHARE: f64 = 1e-6;
-
-/// How much a time may be uneven, as a share of the period.
-const UNEVEN: f64 = 1e-6;
-
-/// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
-const VELOCITY_SHARE: f64 = 1e-3;
-
-/// A setpoint no farther from its stop than this, beyond rounding, stands on it.
-const STANDING: f64 = 1e-9;
+use crate::{Check, Tally, EPS, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// Steps towards the nearest place.
 const MOST_STEPS: usize = 12;
@@ -32,18 +24,10 @@ const MOST_STEPS: usize = 12;
 /// Setpoints that one thread looks at in a row.
 const BLOCK: usize = 256;
 
-/// A setpoint.
-#[derive(Clone, Copy, Debug)]
-struct Row<const M: usize> {
-    t: f64,
-    position: [f64; M],
-    velocity: Option<[f64; M]>,
-}
-
 /// Where a setpoint is on the path.
 #[derive(Clone, Copy)]
-struct Nearest<const M: usize> {
-    row: Row<M>,
+struct Nearest<'r, const M: usize> {
+    row: &'r Row<M>,
     is_finite: bool,
     piece: usize,
     u: f64,
@@ -84,13 +68,8 @@ pub struct JointSetpoints<const M: usize> {
 impl<const M: usize> JointSetpoints<M> {
     pub(crate) fn new(audit: &JointAudit<M>) -> Self {
         let (phases, path) = (&audit.phases, &audit.path.path);
-        let runs = phases.runs;
-        let is_usable = !phases.is_empty()
-            && runs.len() == path.runs.len()
-            && runs.first() == Some(&0)
-            && runs.last() == Some(&(phases.len() as i64))
-            && runs.windows(2).all(|pair| pair[0] < pair[1])
-            && (0..phases.len()).all(|phase| phases.has_good_numbers(phase, audit.path.joints))
+        let is_usable = phases.fits(path, audit.path.joints)
+            && phases.runs.windows(2).all(|pair| pair[0] < pair[1])
             && (0..phases.len()).all(|phase| phases.u1[phase] > phases.u0[phase])
             && phases.piece.windows(2).all(|pair| pair[0] <= pair[1]);
         let mut tally = Tally::default();
@@ -105,15 +84,7 @@ impl<const M: usize> JointSetpoints<M> {
         if !self.is_usable || chunk.t.is_empty() {
             return;
         }
-        let of = |flat: &[f64], i: usize| -> [f64; M] {
-            let row = &flat[i * chunk.axes..][..chunk.axes];
-            std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0))
-        };
-        let own = (0..chunk.t.len()).map(|i| Row {
-            t: chunk.t[i],
-            position: of(chunk.position, i),
-            velocity: chunk.velocity.map(|flat| of(flat, i)),
-        });
+        let own = (0..chunk.t.len()).map(|i| chunk.row(i));
         let rows: Vec<Row<M>> = self.held.take().into_iter().chain(own).collect();
         self.take(audit, &rows, rows.len() - 1, false);
         self.held = rows.last().copied();
@@ -130,7 +101,7 @@ impl<const M: usize> JointSetpoints<M> {
         self.take(audit, &[row], 1, true);
         let piece = audit.path.piece::<M>(audit.path.path.len() - 1);
         let end = piece.at(piece.width, &mut audit.path.work());
-        let away = off(&piece, &row.position, &end);
+        let away = off(&piece, &row.q, &end);
         self.tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, piece.line);
         self.settle_chord(audit, None);
         self.tally
@@ -141,18 +112,23 @@ impl<const M: usize> JointSetpoints<M> {
         if !self.begun {
             self.begun = true;
             let piece = audit.path.piece::<M>(0);
-            let away = off(&piece, &rows[0].position, &piece.at(0.0, &mut work));
+            let away = off(&piece, &rows[0].q, &piece.at(0.0, &mut work));
             let t = rows[0].t;
             self.tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, t, piece.line);
-            self.tally.offer(Check::Grid, 0, t.abs(), UNEVEN * audit.limits.period, t, piece.line);
+            self.tally.offer(Check::Grid, 0, t.abs(), PASS_EXCESS * audit.limits.period, t, piece.line);
         }
-        self.extend_clock(audit, rows, last, &mut work);
-        let (clock, last) = (&self.clock, self.last);
+        let path = &audit.path.path;
+        let away = |run: usize, row: &Row<M>| {
+            let piece = audit.path.piece::<M>(path.runs[run] as usize);
+            off(&piece, &row.q, &piece.at(0.0, &mut work))
+        };
+        audit.clock(&[]).extend(path, audit.limits.period, rows, away, last, &mut self.clock);
+        let (clock, last) = (audit.clock(&self.clock), self.last.as_ref());
         let judged: Vec<(Tally<M>, Vec<Chord>)> = (0..count.div_ceil(BLOCK))
             .into_par_iter()
             .map(|block| {
                 let start = block * BLOCK;
-                let before = start.checked_sub(1).map_or(last, |before| Some(rows[before]));
+                let before = start.checked_sub(1).map_or(last, |before| Some(&rows[before]));
                 Judge::new(audit, clock).judge(before, &rows[start..count.min(start + BLOCK)])
             })
             .collect();
@@ -163,38 +139,7 @@ impl<const M: usize> JointSetpoints<M> {
                 self.chord = Some((chord, before));
             }
         }
-        self.last = count.checked_sub(1).map(|last| rows[last]).or(last);
-    }
-
-    /// Adds the starts of the runs that the rows reach: at the next row where they stand on the stop.
-    fn extend_clock(&mut self, audit: &JointAudit<M>, rows: &[Row<M>], last: bool, work: &mut Work) {
-        let (phases, path, period) = (&audit.phases, &audit.path.path, audit.limits.period);
-        while self.clock.len() < phases.runs.len() - 1 {
-            let run = self.clock.len();
-            let due = if run == 0 {
-                path.start_dwell
-            } else {
-                let (first, end) = (phases.runs[run - 1] as usize, phases.runs[run] as usize);
-                let motion_time = audit.starts[end - 1] + phases.duration[end - 1] - audit.starts[first];
-                self.clock[run - 1] + motion_time + path.dwell[run - 1]
-            };
-            let slack = UNEVEN * period + 2.0 * ROUNDINGS * EPS * due;
-            let n = rows.partition_point(|row| row.t < due - slack);
-            let left = rows.len() - n;
-            if left == 0 {
-                break;
-            }
-            let piece = audit.path.piece::<M>(path.runs[run] as usize);
-            let stop = piece.at(0.0, work);
-            let stands = |row: usize| off(&piece, &rows[row].position, &stop) <= STANDING;
-            let on_time = rows[n].t <= due + slack;
-            if left == 1 && on_time && !last {
-                break;
-            }
-            let row = if left > 1 && on_time && stands(n + 1) { n + 1 } else { n };
-            let begin = if row > n || stands(n) { rows[row].t } else { due };
-            self.clock.push(begin);
-        }
+        self.last = rows[..count].last().copied().or(self.last);
     }
 
     /// Judges the chord error that waits, now that the length of the step after it is known or that there is none; the
@@ -228,7 +173,7 @@ enum Motion<const M: usize> {
 /// Judges setpoints that follow each other.
 struct Judge<'a, const M: usize> {
     audit: &'a JointAudit<'a, M>,
-    clock: &'a [f64],
+    clock: ProfileClock<'a>,
     work: Work,
     /// The piece before the one of the last setpoint.
     earlier: Option<Piece<'a, M>>,
@@ -238,16 +183,16 @@ struct Judge<'a, const M: usize> {
 }
 
 impl<'a, const M: usize> Judge<'a, M> {
-    fn new(audit: &'a JointAudit<'a, M>, clock: &'a [f64]) -> Self {
+    fn new(audit: &'a JointAudit<'a, M>, clock: ProfileClock<'a>) -> Self {
         let work = audit.path.work();
         Self { audit, clock, work, earlier: None, known: None, tally: Tally::default(), chords: Vec::new() }
     }
 
     /// Judges rows by themselves and against those before them, the first one against `before`.
-    fn judge(mut self, before: Option<Row<M>>, rows: &[Row<M>]) -> (Tally<M>, Vec<Chord>) {
+    fn judge(mut self, before: Option<&Row<M>>, rows: &[Row<M>]) -> (Tally<M>, Vec<Chord>) {
         let mut last = before.map(|row| self.nearest(row));
         for row in rows {
-            let nearest = self.nearest(*row);
+            let nearest = self.nearest(row);
             self.place(last.as_ref(), &nearest);
             if let Some(before) = &last {
                 self.step(before, &nearest);
@@ -272,7 +217,7 @@ impl<'a, const M: usize> Judge<'a, M> {
         tally.offer(Check::Numbers, 0, wrong, 0.0, t, line);
         let away = if nearest.is_finite { nearest.off } else { f64::INFINITY };
         tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, t, line);
-        let earlier = last.map_or(nearest.row.position, |last| last.row.position);
+        let earlier = last.map_or(nearest.row.q, |last| last.row.q);
         let step = length(&piece.between(&earlier, &nearest.target, None));
         let allowed = if step.is_nan() { step } else { PLACE_TOLERANCE.max(STEP_SHARE * step) };
         tally.offer(Check::Place, 0, nearest.late, allowed, t, line);
@@ -280,7 +225,7 @@ impl<'a, const M: usize> Judge<'a, M> {
         let Some(recorded) = nearest.row.velocity else { return };
         let limits = &self.audit.limits;
         let at_joint = nearest.u.min(piece.width - nearest.u) <= PLACE_TOLERANCE;
-        let size = nearest.row.position.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let size = nearest.row.q.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let away = nearest.off.max(0.0) + nearest.late + ROUNDING * size;
         let good =
             nearest.off <= PLACE_TOLERANCE && nearest.velocity.iter().all(|velocity| velocity.is_finite());
@@ -347,22 +292,12 @@ impl<'a, const M: usize> Judge<'a, M> {
         self.chords.extend(chord);
     }
 
-    /// The phase that a time falls into, and the time since the phase began.
-    fn phase_at(&self, t: f64) -> (usize, f64) {
-        let (phases, starts) = (&self.audit.phases, self.audit.starts);
-        let clock = if self.clock.is_empty() { &[self.audit.path.path.start_dwell][..] } else { self.clock };
-        let run = clock.partition_point(|&begin| begin <= t).saturating_sub(1);
-        let (first, end) = (phases.runs[run] as usize, phases.runs[run + 1] as usize);
-        let own = t - (clock[run] - starts[first]);
-        let phase = starts[..phases.len()].partition_point(|&start| start <= own).saturating_sub(1);
-        let phase = phase.clamp(first, end - 1);
-        (phase, (own - starts[phase]).clamp(0.0, phases.duration[phase]))
-    }
-
-    fn nearest(&mut self, row: Row<M>) -> Nearest<M> {
+    fn nearest<'r>(&mut self, row: &'r Row<M>) -> Nearest<'r, M> {
         let (audit, phases) = (self.audit, &self.audit.phases);
         let t = if row.t.is_finite() { row.t } else { 0.0 };
-        let (phase, since) = self.phase_at(t);
+        let found = self.clock.phase_of(self.clock.run_of(t), t);
+        let (phase, since) = found.expect("every run has phases");
+        let since = since.clamp(0.0, phases.duration[phase]);
         if self.known.as_ref().is_none_or(|known| known.phase != phase) {
             let number = phases.piece[phase] as usize;
             let piece = match self.known.take() {
@@ -382,8 +317,8 @@ impl<'a, const M: usize> Judge<'a, M> {
         let Some(Known { piece, start, motion: known, .. }) = &self.known else {
             unreachable!("the phase is known")
         };
-        let is_finite = row.t.is_finite() && row.position.iter().all(|x| x.is_finite());
-        let target = if is_finite { row.position } else { [0.0; M] };
+        let is_finite = row.t.is_finite() && row.q.iter().all(|x| x.is_finite());
+        let target = if is_finite { row.q } else { [0.0; M] };
         let place = nearest(piece, phases, phase, since, &target, &mut self.work);
         let states = match known {
             Motion::ByLength(by_length) => motion_by_length(piece, by_length, &[*start, place]),
