@@ -18,9 +18,10 @@ demo: $(VENV)/built $(PAGE)
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
+# Half of the time tests wait for the services and programs that they start: two of them share a processor.
 test: native lint $(PAGE)
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
-	$(BIN)/pytest --numprocesses auto
+	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN)))
 
 # They need no Python. They come first: the module links what has been compiled for them.
 native: cargo
