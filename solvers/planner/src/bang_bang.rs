@@ -55,15 +55,15 @@
 //! | file | content |
 //! |---|---|
 //! | `run` | both passes over a run, from piece to piece |
-//! | `chord` | the chord-error limit as lines: v² linear in t |
+//! | `speed_line` | an upper limit of v², linear in t: of the chord error |
 //! | `time` | the time of a phase along the cap |
 //! | `tolerance` | every tolerance, with its reason |
 
-mod chord;
 mod curve;
 mod line;
 mod quadratic;
 mod run;
+mod speed_line;
 mod time;
 mod tolerance;
 

@@ -9,6 +9,7 @@
 //! | file | content |
 //! |---|---|
 //! | `piece` | tangents and D of a piece, free of denominators |
+//! | `chord` | the chord-error limit as lines of v² |
 //! | `cusp` | where all axes rest at once, within rounding |
 //! | `split` | the cuts of a piece |
 //! | `part` | a part between two cuts, and the same part as a pass travels it |
@@ -18,6 +19,7 @@
 //! | `check` | whether the phases keep the limits at some samples, in spite of rounding |
 
 mod check;
+mod chord;
 mod cusp;
 mod part;
 mod pass;

@@ -91,6 +91,21 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         let square = dot(&g, &g);
         square * square.sqrt() / (cross * weight * weight)
     }
+
+    /// A radius of curvature [mm] that is proven to be at most that of every place between two t.
+    pub fn least_radius(&self, [from, to]: [f64; 2]) -> f64 {
+        let g: [Polynomial<C>; M] = std::array::from_fn(|k| self.g[k].part(from, to));
+        let mut cross = 0.0_f64;
+        for j in 0..M {
+            for k in 0..j {
+                let (low, high) = g[j].wronskian(&g[k]).range();
+                cross = cross.hypot(high.max(-low));
+            }
+        }
+        let square = Polynomial::sum_of_squares(&g).range().0.max(0.0);
+        let weight = self.weight.part(from, to).range().1;
+        square * square.sqrt() * (to - from) / (cross * weight * weight)
+    }
 }
 
 /// The sum of the squares of the tangents times their factors.

@@ -4,7 +4,7 @@
 use super::cusp::{cusps, Cusps, NearCusp};
 use super::part::{Axes, Cap, End, Part, Remedy};
 use super::piece::Piece;
-use crate::bang_bang::chord::SpeedLine;
+use crate::bang_bang::speed_line::SpeedLine;
 use crate::bang_bang::tolerance::{NEAR_CUSP, SAME_CUT, SAME_TURN, SLOW_SQ, ZERO};
 use crate::problem::ChordLimit;
 use crate::problem::{greater, TIP_AXES};
@@ -76,10 +76,8 @@ pub fn split<const M: usize, const C: usize>(
     let most_sq = if feed.is_some() { f64::INFINITY } else { feed_sq };
     let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [most_sq; 2] }], vec![]);
     match (chord, tip) {
-        (Some(chord), Some(tip)) => chord.lines(&|t| tip.radius(t), most_sq, &mut below_chord),
-        (Some(chord), None) if piece.own_speed => {
-            chord.lines(&|t| piece.radius(t), most_sq, &mut below_chord)
-        }
+        (Some(chord), Some(tip)) => chord.lines(tip, most_sq, &mut below_chord),
+        (Some(chord), None) if piece.own_speed => chord.lines(piece, most_sq, &mut below_chord),
         _ => {}
     }
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };

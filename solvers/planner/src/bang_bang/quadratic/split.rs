@@ -5,7 +5,7 @@ use super::piece::Piece;
 use super::quotient::bernstein;
 use super::subpiece::{Axes, Cap, Orientation, SubPiece};
 use super::turns::{Mark, MonotonePart, EDGE};
-use crate::bang_bang::chord::SpeedLine;
+use crate::bang_bang::speed_line::SpeedLine;
 use crate::bang_bang::tolerance::{AT_KINK, SAME_CUT};
 use crate::problem::ChordLimit;
 use crate::AxisBits;

@@ -1,0 +1,112 @@
+//! The chord-error limit v² ≤ α ρ − 4 δ²/T², α = 8 δ/T², as lines: v² linear in t on short parts of a piece, from the
+//! radius of curvature ρ [mm], the tolerance δ [mm] and the servo period T [s].
+//!
+//! ρ = |g|³/(|g × c| ω²) is no polynomial. A part is halved until a line below the limit gives away less than a fixed
+//! fraction of it. The line is the secant, lowered by four times its greatest excess over samples of the limit. The
+//! least ρ, proven from Bernstein coefficients, says where no line is needed, and that samples miss no narrow turn.
+
+use super::piece::Piece;
+use crate::bang_bang::speed_line::SpeedLine;
+use crate::problem::ChordLimit;
+
+/// Fraction of the limit that a line may give away.
+const GIVEN_AWAY: f64 = 2e-4;
+/// Greatest number of halvings.
+const MAX_DEPTH: u32 = 14;
+/// Number of samples on a part, both ends included.
+const SAMPLES: usize = 9;
+/// Samples show a part where the proven least limit is at least this fraction of theirs.
+const SHOWN: f64 = 0.5;
+
+impl ChordLimit {
+    /// Appends the lines of a piece, at most `feed_sq`.
+    pub fn lines<const M: usize, const C: usize>(
+        &self,
+        piece: &Piece<M, C>,
+        feed_sq: f64,
+        out: &mut Vec<SpeedLine>,
+    ) {
+        self.halve(piece, feed_sq, [0.0, 1.0], 0, out);
+    }
+
+    fn halve<const M: usize, const C: usize>(
+        &self,
+        piece: &Piece<M, C>,
+        feed_sq: f64,
+        [from, to]: [f64; 2],
+        depth: u32,
+        out: &mut Vec<SpeedLine>,
+    ) {
+        let least_radius = piece.least_radius([from, to]);
+        let least = self.speed_sq(least_radius);
+        if least >= feed_sq || self.is_free(least_radius) {
+            out.push(SpeedLine { from, to, speed_sq: [feed_sq; 2] });
+            return;
+        }
+        let sample = |i: usize| from + (to - from) * (i as f64 / (SAMPLES - 1) as f64);
+        let limit: [f64; SAMPLES] = std::array::from_fn(|i| self.speed_sq(piece.radius(sample(i))));
+        let (first, last) = (limit[0], limit[SAMPLES - 1]);
+        let (mut below, mut above) = (0.0_f64, 0.0_f64);
+        for (i, &limit) in limit.iter().enumerate() {
+            let line = first + (last - first) * (i as f64 / (SAMPLES - 1) as f64);
+            below = below.max((line - limit) / limit);
+            above = above.max((limit - line) / limit);
+        }
+        let seen = 4.0 * below.max(above / 16.0);
+        let shown = least >= SHOWN * limit.into_iter().fold(f64::INFINITY, f64::min);
+        if depth == MAX_DEPTH || (depth >= 2 && shown && seen + above < GIVEN_AWAY) {
+            let speed_sq = [first, last].map(|limit| ((1.0 - seen.min(0.5)) * limit).min(feed_sq));
+            out.push(SpeedLine { from, to, speed_sq });
+            return;
+        }
+        let middle = 0.5 * (from + to);
+        self.halve(piece, feed_sq, [from, middle], depth + 1, out);
+        self.halve(piece, feed_sq, [middle, to], depth + 1, out);
+    }
+
+    /// Whether the limits of acceleration are below this one at a radius of curvature and all greater ones.
+    fn is_free(&self, radius: f64) -> bool {
+        radius > self.tolerance
+            && self.alpha > self.acceleration
+            && self.speed_sq(radius) >= self.acceleration * radius
+    }
+
+    /// The greatest v² at the radius of curvature ρ.
+    fn speed_sq(&self, radius: f64) -> f64 {
+        // Where ρ < δ, no part of the path shorter than 2 δ is farther than δ from its chord.
+        if radius > self.tolerance {
+            self.alpha * radius.min(1e300) - self.slow_sq
+        } else {
+            self.slow_sq
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_narrower_than_the_distance_of_samples_has_its_limit() {
+        // A spline G5 that all but stops near its end: over 3 % of t the radius falls from 0.1 to 0.003 mm.
+        let control = [[0.0, 0.0], [0.50544, -5.36786], [-3.034, -1.79], [-2.97309, -1.99609]];
+        let piece = Piece::<2, 8>::new(&control, &[], None);
+        let Some(chord) = ChordLimit::new(0.01, 0.004, 6000.0) else { panic!("a limit") };
+        let feed_sq = 5.858_f64.powi(2);
+        let mut lines = vec![];
+        chord.lines(&piece, feed_sq, &mut lines);
+        let ends = lines.windows(2).map(|pair| (pair[0].to, pair[1].from));
+        assert!(ends.into_iter().all(|(to, from)| to == from));
+        let mut slowest = f64::INFINITY;
+        for line in &lines {
+            for i in 0..=200 {
+                let t = line.from + (line.to - line.from) * f64::from(i) / 200.0;
+                let most = chord.speed_sq(piece.radius(t)).min(feed_sq);
+                assert!(line.at(t) <= most * (1.0 + 1e-12), "{} for {most} at {t}", line.at(t));
+                slowest = slowest.min(line.at(t));
+            }
+        }
+        assert!(slowest > 0.98 * chord.slow_sq, "{slowest}");
+        assert!(lines.len() < 100, "{}", lines.len());
+    }
+}
