@@ -171,16 +171,22 @@ fn piece_to_moves<const M: usize>(
     time: f64,
     tally: &mut Tally<M>,
 ) {
-    let curve = path.curve::<M>(piece);
-    let width = curve.width();
     let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
-    let rounding = ROUNDINGS * EPS * curve.magnitude();
     let mut near = Neighbours::default();
     near.replace(program, window(path, piece, program.len()));
+    // A piece is within the convex hull of its control points: where these lie along one move, its places change nothing.
+    let points = path.rows(piece).map(|row| path.point::<M>(row));
+    if let Some(most) = near.straight_beside(points, settled(tally) * tolerance) {
+        tally.offer(Check::Deviation, 0, most, tolerance, time, line);
+        tally.samples += path.rows(piece).len() as u64;
+        return;
+    }
+    let curve = path.curve::<M>(piece);
+    let (width, places) = (curve.width(), PLACES * curve.turns());
+    let rounding = ROUNDINGS * EPS * curve.magnitude();
     near.start_at(followers, piece);
     let mut off = |t: f64, enough: f64| near.distance(&curve.at(t * width), enough + rounding) - rounding;
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
-    let places = PLACES * curve.turns();
     for i in 0..=places {
         let t = i as f64 / places as f64;
         let value = off(t, settled(tally) * tolerance);

@@ -38,6 +38,22 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         }
     }
 
+    /// The greatest distance of points from one straight move, where that has them all within `enough`: no place of their convex
+    /// hull is farther from it.
+    pub fn straight_beside(
+        &self,
+        points: impl Iterator<Item = [f64; M]> + Clone,
+        enough: f64,
+    ) -> Option<f64> {
+        let mut straight =
+            self.moves.iter().filter(|(_, programmed)| matches!(programmed.shape, Shape::Line));
+        straight.find_map(|(_, programmed)| {
+            let away =
+                |q: [f64; M]| Some(programmed.distance(&q, &mut 0, 0.0)).filter(|away| *away <= enough);
+            points.clone().try_fold(0.0, |most: f64, q| Some(most.max(away(q)?)))
+        })
+    }
+
     /// Distance of `q` from the nearest move, or from the first that is within `enough`; a NaN if there is one.
     pub fn distance(&mut self, q: &[f64; M], enough: f64) -> f64 {
         let mut least = f64::INFINITY;
@@ -55,5 +71,43 @@ impl<'a, const M: usize> Neighbours<'a, M> {
             }
         }
         least
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Pieces;
+
+    /// Along X from 0 to 4, along Y to (4, 4), and back to the start of that by a half circle.
+    const PROGRAM: Programmed = Programmed {
+        axes: 2,
+        start: &[0.0, 0.0],
+        target: &[4.0, 0.0, 4.0, 4.0, 4.0, 0.0],
+        line: &[1, 2, 3],
+        arc_move: &[2],
+        arc_centre: &[4.0, 2.0, 0.0],
+        arc_normal: &[2],
+        arc_angle: &[std::f64::consts::PI],
+        spline_move: &[],
+        spline_pieces: &[],
+        splines: Pieces { axes: 2, stride: 2, control: &[], weights: &[], offsets: &[0], width: &[] },
+        change_move: &[],
+        change_start: &[],
+        xyz: [Some(0), Some(1), None],
+    };
+
+    #[test]
+    fn points_are_beside_a_straight_move_if_all_of_them_are_near_the_same_one() {
+        let mut near = Neighbours::<2>::default();
+        near.replace(&PROGRAM, 0..3);
+        let along = [[1.0, 0.0], [2.0, 0.3], [3.0, -0.5]];
+        assert_eq!(near.straight_beside(along.into_iter(), 0.6), Some(0.5));
+        assert_eq!(near.straight_beside(along.into_iter(), 0.4), None);
+        assert_eq!(near.straight_beside([[3.75, 1.0], [4.0, 2.0]].into_iter(), 0.3), Some(0.25));
+        // Around the corner each is near a move, and the chord between them is not.
+        assert_eq!(near.straight_beside([[2.0, 0.0], [4.0, 2.0]].into_iter(), 0.2), None);
+        assert_eq!(near.straight_beside([[2.0, 2.0]].into_iter(), 0.2), None, "an arc is not straight");
+        assert_eq!(near.straight_beside([[f64::NAN, 0.0]].into_iter(), 0.2), None);
     }
 }

@@ -90,11 +90,13 @@ impl Phases<'_> {
     /// Whether the numbers of phase `i`, taken alone, can be measured; on a path of so many axes or joints.
     pub fn has_good_numbers(&self, i: usize, axes: usize) -> bool {
         let numbers = [self.value, self.u0, self.u1, self.p0, self.p1, self.duration, self.a0, self.a1];
+        // 0 times what is not finite is no number.
+        let nothing = numbers.iter().fold(0.0, |sum, column| sum + 0.0 * column[i]);
         let needs_axis = matches!(self.kind[i], AXIS_ACCELERATION | AXIS_VELOCITY);
         (self.piece[i] as usize) < self.pieces
             && self.kind[i] <= SPEED_CUBIC
             && (!needs_axis || (self.axis[i] as usize) < axes)
-            && numbers.iter().all(|column| column[i].is_finite())
+            && nothing == 0.0
             && self.p0[i] >= 0.0
             && self.p1[i] >= 0.0
             && self.duration[i] >= 0.0
