@@ -29,7 +29,10 @@ use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// The path of the moves between two stops of the program.
+/// Runs of a section are fitted beside each other in parts of this many chords or more.
+const LEAST_PART: usize = 1000;
+
+/// A part of the path between two stops of the program.
 #[derive(Default)]
 struct Section<const M: usize> {
     chunk: Chunk<M>,
@@ -87,14 +90,16 @@ pub fn build_smooth_path<const M: usize>(
     watch: Watch,
 ) -> Result<BuiltPath<M>, MoveError> {
     let each = watch.each(moves.kind.len());
-    let sections: Vec<Section<M>> = sections(moves, tolerance::CRAWL * options.max_speed)
+    let sections: Vec<Vec<Section<M>>> = sections(moves, tolerance::CRAWL * options.max_speed)
         .into_par_iter()
-        .map(|range| Section::new(moves, options, axes, range.clone(), motion, each.part(range.len() as f64)))
+        .map(|range| {
+            Section::parts(moves, options, axes, range.clone(), motion, each.part(range.len() as f64))
+        })
         .collect::<Result<_, _>>()?;
     let (mut chunks, mut runs, mut total) = (vec![], vec![], 0);
     let (mut fit, mut offsets, mut not_smooth) =
         (FitCounts::default(), Offsets::default(), NotSmooth::default());
-    for section in sections {
+    for section in sections.into_iter().flatten() {
         runs.extend(section.runs.iter().map(|start| start + total));
         total += section.chunk.pieces.len();
         chunks.push(section.chunk);
@@ -155,14 +160,15 @@ struct Rules<'a, const M: usize> {
 }
 
 impl<const M: usize> Section<M> {
-    fn new(
+    /// The path of the moves of a section, in parts of one run or more.
+    fn parts(
         moves: &Moves<M>,
         options: &PathOptions,
         axes: &Axes<M>,
         range: Range<usize>,
         motion: Option<&Motion<M>>,
         watch: Watch,
-    ) -> Result<Self, MoveError> {
+    ) -> Result<Vec<Self>, MoveError> {
         let exact = moves.tolerance[range.start] <= 0.0;
         let has_travel = range.clone().all(|i| moves.joints[i]);
         let travel = if has_travel { axes.travel } else { [[f64::NEG_INFINITY, f64::INFINITY]; M] };
@@ -170,25 +176,33 @@ impl<const M: usize> Section<M> {
         let rules = Rules { exact, travel, long: options.max_chord, max_acceleration, motion };
         let reversal = if motion.is_some() { tolerance::FITTED_REVERSAL } else { tolerance::REVERSAL };
         let chords = moves.chords(options, range)?;
-        let mut section = Self::default();
         let count = chords.chords.len();
-        let each = watch.each(count);
+        let turns_back = |i: usize| chords.turn(i) > reversal;
+        let stops = |i: usize| turns_back(i) || exact && !chords.meet(i);
+        let mut parts = vec![];
         let mut first = 0;
         for end in 1..=count {
-            let stops = end == count || {
-                let turn = chords.turn(end);
-                if turn > reversal && !exact {
-                    section.not_smooth.reversals.push(chords.chords[end - 1].last);
-                }
-                turn > reversal || exact && !chords.meet(end)
-            };
-            if stops {
-                let watch = each.part((end - first) as f64);
-                section.append(&chords, first..end, &rules, watch);
+            if end == count || end - first >= LEAST_PART && stops(end) {
+                parts.push(first..end);
                 first = end;
             }
         }
-        Ok(section)
+        let each = watch.each(count);
+        let part = |range: Range<usize>| {
+            let mut part = Self::default();
+            let mut first = range.start;
+            for end in range.start + 1..=range.end {
+                if end < count && turns_back(end) && !exact {
+                    part.not_smooth.reversals.push(chords.chords[end - 1].last);
+                }
+                if end == range.end || stops(end) {
+                    part.append(&chords, first..end, &rules, each.part((end - first) as f64));
+                    first = end;
+                }
+            }
+            part
+        };
+        Ok(parts.into_par_iter().map(part).collect())
     }
 
     /// Appends a run.
