@@ -1,4 +1,4 @@
-//! Places of a path that are close enough to points, one point after the other.
+//! Places of a path or of programmed splines that are close enough to points, one point after the other.
 //!
 //! By Newton's method from the place of the point before, on its piece or from piece to piece. The distance of a point from any
 //! place of the path is at least its distance from the path: where it is small enough, the nearest place need not be searched.
@@ -19,6 +19,11 @@ pub struct ClosePlaces<'a, const M: usize> {
 impl<'a, const M: usize> ClosePlaces<'a, M> {
     pub fn new(pieces: Pieces<'a>) -> Self {
         Self { curves: Curves::new(pieces), place: Place { piece: 0, u: 0.0 } }
+    }
+
+    /// The next search starts on this piece.
+    pub fn start_on(&mut self, piece: usize) {
+        self.place = Place { piece, u: 0.5 * self.curves.get(piece).width() };
     }
 
     /// A place on the pieces from `least` to `most` whose distance from `q` is no more than that piece's `enough`, and the

@@ -1,24 +1,30 @@
 //! The nearest of some moves to places along a path, one place after the other.
 
+use super::close_places::ClosePlaces;
 use super::moves::{Move, Programmed, Shape};
 
 /// First and last piece that follow a move.
 pub type Followers = (usize, usize);
 
 /// Some moves that places along a path are measured against, one after the other.
-#[derive(Clone, Default)]
+#[derive(Default)]
 pub struct Neighbours<'a, const M: usize> {
     moves: Vec<(usize, Move<'a, M>)>,
     /// The one nearest to the place before: mostly nearest to the next one too.
     nearest: usize,
     /// Of each move the piece that was nearest last.
     expected: Vec<usize>,
+    /// Places on the splines, if there are any.
+    close: Option<ClosePlaces<'a, M>>,
 }
 
 impl<'a, const M: usize> Neighbours<'a, M> {
     /// Takes other moves.
     pub fn replace(&mut self, program: &Programmed<'a>, numbers: impl Iterator<Item = usize>) {
         let known = self.moves.first().zip(self.expected.first()).map(|(first, piece)| (first.0, *piece));
+        if self.close.is_none() && !program.splines.is_empty() {
+            self.close = Some(ClosePlaces::new(program.splines));
+        }
         self.moves.clear();
         self.moves.extend(numbers.map(|number| (number, program.get(number))));
         self.nearest = 0;
@@ -49,7 +55,7 @@ impl<'a, const M: usize> Neighbours<'a, M> {
             self.moves.iter().filter(|(_, programmed)| matches!(programmed.shape, Shape::Line));
         straight.find_map(|(_, programmed)| {
             let away =
-                |q: [f64; M]| Some(programmed.distance(&q, &mut 0, 0.0)).filter(|away| *away <= enough);
+                |q: [f64; M]| Some(programmed.distance(&q, &mut 0, 0.0, None)).filter(|away| *away <= enough);
             points.clone().try_fold(0.0, |most: f64, q| Some(most.max(away(q)?)))
         })
     }
@@ -59,7 +65,7 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         let mut least = f64::INFINITY;
         let first = self.nearest;
         for m in (first..self.moves.len()).chain(0..first) {
-            let away = self.moves[m].1.distance(q, &mut self.expected[m], enough);
+            let away = self.moves[m].1.distance(q, &mut self.expected[m], enough, self.close.as_mut());
             if away.is_nan() {
                 return away;
             }
