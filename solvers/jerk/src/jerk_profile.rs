@@ -127,6 +127,15 @@ impl Span {
     }
 }
 
+/// Appends a column to another one, without a copy of it where that is empty.
+fn append<T>(column: &mut Vec<T>, mut other: Vec<T>) {
+    if column.is_empty() {
+        *column = other;
+    } else {
+        column.append(&mut other);
+    }
+}
+
 struct Phase {
     kind: u8,
     value: f64,
@@ -158,20 +167,20 @@ impl JerkProfile {
     }
 
     /// Appends the phases of another profile; `runs` stays as it is.
-    pub fn append(&mut self, mut other: Self) {
-        self.piece.append(&mut other.piece);
-        self.kind.append(&mut other.kind);
-        self.value.append(&mut other.value);
-        self.u0.append(&mut other.u0);
-        self.u1.append(&mut other.u1);
-        self.p0.append(&mut other.p0);
-        self.p1.append(&mut other.p1);
-        self.duration.append(&mut other.duration);
-        self.a0.append(&mut other.a0);
-        self.a1.append(&mut other.a1);
-        self.kinks.append(&mut other.kinks);
-        self.excess.append(&mut other.excess);
-        self.lower_bound.append(&mut other.lower_bound);
+    pub fn append(&mut self, other: Self) {
+        append(&mut self.piece, other.piece);
+        append(&mut self.kind, other.kind);
+        append(&mut self.value, other.value);
+        append(&mut self.u0, other.u0);
+        append(&mut self.u1, other.u1);
+        append(&mut self.p0, other.p0);
+        append(&mut self.p1, other.p1);
+        append(&mut self.duration, other.duration);
+        append(&mut self.a0, other.a0);
+        append(&mut self.a1, other.a1);
+        append(&mut self.kinks, other.kinks);
+        append(&mut self.excess, other.excess);
+        append(&mut self.lower_bound, other.lower_bound);
         self.stopped |= other.stopped;
     }
 
