@@ -29,8 +29,8 @@ const BELOW: f64 = 0.9999;
 const ROUNDS: usize = 4;
 /// The error of the grid counts as a part of the time of the whole subrun, and falls with the square of the resolution
 /// r. Where the planned stretches are the part p of the length, their resolution is r/√(1 + FINER (1/p − 1)), and at
-/// least `LEAST`: the error is the part p + FINER (1 − p) of that of a subrun that is planned as a whole.
-const FINER: f64 = 0.25;
+/// least `LEAST`: the error grows by about `FINER` over that of a subrun that is planned as a whole.
+const FINER: f64 = 0.05;
 const LEAST: f64 = 6.0;
 /// Bisection steps for the greatest speed that an end can have.
 const TRIALS: u32 = 12;
