@@ -184,6 +184,18 @@ impl JerkProfile {
         self.stopped |= other.stopped;
     }
 
+    /// Gives back the memory that columns have reserved for more phases.
+    pub fn shrink_to_fit(&mut self) {
+        self.piece.shrink_to_fit();
+        self.kind.shrink_to_fit();
+        for column in [&mut self.value, &mut self.u0, &mut self.u1, &mut self.p0, &mut self.p1] {
+            column.shrink_to_fit();
+        }
+        for column in [&mut self.duration, &mut self.a0, &mut self.a1] {
+            column.shrink_to_fit();
+        }
+    }
+
     /// The size of the acceleration at the start or at the end, in mm/s².
     pub fn end_acceleration(&self, end: usize) -> f64 {
         let a = if end == 0 { self.a0.first() } else { self.a1.last() };

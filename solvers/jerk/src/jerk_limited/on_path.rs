@@ -285,6 +285,8 @@ impl<const M: usize> Task<'_, M> {
         let moves = moving(self.problem, path, ends);
         let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort })?;
         phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
+        // Stretches wait for all others of their subrun.
+        phases.shrink_to_fit();
         phases.stopped = !plan.converged && effort.expired();
         phases.lower_bound.push(plan.lower_bound);
         if plan.iterations > 0.0 {
