@@ -127,12 +127,12 @@ impl Span {
     }
 }
 
-/// Appends a column to another one, without a copy of it where that is empty.
-fn append<T>(column: &mut Vec<T>, mut other: Vec<T>) {
+/// Moves the rows of `other` to the end of a column, without a copy of them where the column is empty.
+fn append<T>(column: &mut Vec<T>, other: &mut Vec<T>) {
     if column.is_empty() {
-        *column = other;
+        std::mem::swap(column, other);
     } else {
-        column.append(&mut other);
+        column.append(other);
     }
 }
 
@@ -166,21 +166,22 @@ impl JerkProfile {
         self.duration.iter().sum()
     }
 
+    /// The columns of numbers.
+    fn numbers(&mut self) -> [&mut Vec<f64>; 8] {
+        let Self { value, u0, u1, p0, p1, duration, a0, a1, .. } = self;
+        [value, u0, u1, p0, p1, duration, a0, a1]
+    }
+
     /// Appends the phases of another profile; `runs` stays as it is.
-    pub fn append(&mut self, other: Self) {
-        append(&mut self.piece, other.piece);
-        append(&mut self.kind, other.kind);
-        append(&mut self.value, other.value);
-        append(&mut self.u0, other.u0);
-        append(&mut self.u1, other.u1);
-        append(&mut self.p0, other.p0);
-        append(&mut self.p1, other.p1);
-        append(&mut self.duration, other.duration);
-        append(&mut self.a0, other.a0);
-        append(&mut self.a1, other.a1);
-        append(&mut self.kinks, other.kinks);
-        append(&mut self.excess, other.excess);
-        append(&mut self.lower_bound, other.lower_bound);
+    pub fn append(&mut self, mut other: Self) {
+        append(&mut self.piece, &mut other.piece);
+        append(&mut self.kind, &mut other.kind);
+        for (column, other) in self.numbers().into_iter().zip(other.numbers()) {
+            append(column, other);
+        }
+        append(&mut self.kinks, &mut other.kinks);
+        append(&mut self.excess, &mut other.excess);
+        append(&mut self.lower_bound, &mut other.lower_bound);
         self.stopped |= other.stopped;
     }
 
@@ -188,10 +189,7 @@ impl JerkProfile {
     pub fn shrink_to_fit(&mut self) {
         self.piece.shrink_to_fit();
         self.kind.shrink_to_fit();
-        for column in [&mut self.value, &mut self.u0, &mut self.u1, &mut self.p0, &mut self.p1] {
-            column.shrink_to_fit();
-        }
-        for column in [&mut self.duration, &mut self.a0, &mut self.a1] {
+        for column in self.numbers() {
             column.shrink_to_fit();
         }
     }
@@ -234,10 +232,7 @@ impl JerkProfile {
         let last = ramp.len() - 1;
         (ramp.u0[0], ramp.p0[0], ramp.u1[last], ramp.p1[last]) =
             (self.u0[at], self.p0[at], self.u1[at], self.p1[at]);
-        for column in [&mut self.value, &mut self.u0, &mut self.u1, &mut self.p0, &mut self.p1] {
-            column.remove(at);
-        }
-        for column in [&mut self.duration, &mut self.a0, &mut self.a1] {
+        for column in self.numbers() {
             column.remove(at);
         }
         self.piece.remove(at);

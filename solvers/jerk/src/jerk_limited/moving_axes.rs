@@ -21,7 +21,7 @@ impl<const K: usize> Geometry<K> for MovingAxes<'_, K> {
     }
 }
 
-/// The plan of least time where at least the axes that are not in `moves` rest.
+/// The plan of least time. The axes that do not move by `moves` are at rest on the whole path.
 pub fn plan<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     moves: &[bool; M],

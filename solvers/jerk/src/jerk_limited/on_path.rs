@@ -285,7 +285,7 @@ impl<const M: usize> Task<'_, M> {
         let moves = moving(self.problem, path, ends);
         let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort })?;
         phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
-        // Stretches wait for all others of their subrun.
+        // The phases are kept until all stretches of the subrun are planned.
         phases.shrink_to_fit();
         phases.stopped = !plan.converged && effort.expired();
         phases.lower_bound.push(plan.lower_bound);

@@ -36,7 +36,7 @@ pub struct Prepared<'a, G, const M: usize> {
     pub x: Vec<f64>,
     /// The greatest speed that the envelope allows on each interval, in mm/s.
     pub speeds: Vec<f64>,
-    /// How much of its limits the valid plan uses on each interval, in terms of w.
+    /// The use of the limits by the valid plan on each interval; see `initial_plan::used`.
     pub used: Vec<f64>,
     pub slopes: Slopes,
     watch: Watch<'a>,
@@ -163,7 +163,8 @@ fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [[Win
         }
         End::Held { speed } => [WindowEnd::Fixed { w: speed * speed, slope: 0.0 }, WindowEnd::Free],
     });
-    // Lengths are rounded to this: it is a large part of the shortest ramps, so that a plan keeps away from their limits.
+    // Lengths are rounded by up to this, which is 1e-5 of the shortest ramps. A plan stays below the limit at the end of a ramp
+    // by the same part.
     let rounding = f64::EPSILON * total;
     let planned = both.map(|end| match end[0] {
         WindowEnd::Rest { ramp, greatest } => {

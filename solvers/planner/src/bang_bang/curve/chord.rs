@@ -15,7 +15,7 @@ const GIVEN_AWAY: f64 = 2e-4;
 const MAX_DEPTH: u32 = 14;
 /// Number of samples on a part, both ends included.
 const SAMPLES: usize = 9;
-/// Samples show a part where the proven least limit is at least this fraction of theirs.
+/// Samples are trusted on a part whose proven least limit is at least this fraction of the least sampled one.
 const SHOWN: f64 = 0.5;
 
 impl ChordLimit {

@@ -92,7 +92,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         square * square.sqrt() / (cross * weight * weight)
     }
 
-    /// A radius of curvature [mm] that is proven to be at most that of every place between two t.
+    /// A proven lower bound on the radius of curvature [mm] between two t.
     pub fn least_radius(&self, [from, to]: [f64; 2]) -> f64 {
         let g: [Polynomial<C>; M] = std::array::from_fn(|k| self.g[k].part(from, to));
         let mut cross = 0.0_f64;
