@@ -185,15 +185,18 @@ fn build_path<'py>(
             jump: rules.jump,
         };
         let motion = motion.as_ref().map(MotionArrays::motion::<M>).transpose()?;
-        let build = |watch: Watch| match corners {
-            "smooth" => followed.smooth_path(&options, &limits, motion.as_ref(), watch),
-            _ => followed.path(&options, &limits, watch),
+        let build = |watch: Watch| {
+            let path = match corners {
+                "smooth" => followed.smooth_path(&options, &limits, motion.as_ref(), watch),
+                _ => followed.path(&options, &limits, watch),
+            };
+            path.map(|path| (PieceColumns::of(&path, &splines), path))
         };
-        let path = run(py, progress.as_ref(), build)?.map_err(|error| {
+        let (pieces, path) = run(py, progress.as_ref(), build)?.map_err(|error| {
             let (line, name, sentence) = (moves.line[error.index], &rules.name, sentence(error.fault));
             ProgramError::new_err((format!("{name}, line {line}: {sentence}"), line))
         })?;
-        let columns = columns(py, &path, &splines, axes, progress.as_ref());
+        let columns = columns(py, &path, pieces, axes);
         drop(path);
         py.detach(memory::give_back);
         columns
@@ -217,25 +220,23 @@ fn sentence(fault: MoveFault) -> &'static str {
     }
 }
 
-fn columns<'py, const M: usize>(
-    py: Python<'py>,
-    path: &BuiltPath<M>,
-    splines: &CompositeCurve<M>,
-    axes: usize,
-    progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)>
-where
-    Padded: From<CompositeCurve<M>>,
-{
-    let chunks = &path.chunks;
-    let points = |chunk: &Chunk<M>, piece: &PathPiece<M>| match &piece.shape {
-        Shape::Conic(_) => 3,
-        Shape::Spline(spline) => chunk.spline(spline, splines).control.len(),
-    };
-    let one = |_: &Chunk<M>, _: &PathPiece<M>| 1;
-    let (curve, feed, moves, tolerance) = run(py, progress, |watch| {
-        // The path is built.
-        watch.advance(1);
+/// The pieces of a path as columns.
+struct PieceColumns<const M: usize> {
+    curve: CompositeCurve<M>,
+    feed: Vec<f64>,
+    /// The first and the last move of each.
+    moves: Vec<[i64; 2]>,
+    tolerance: Vec<f64>,
+}
+
+impl<const M: usize> PieceColumns<M> {
+    fn of(path: &BuiltPath<M>, splines: &CompositeCurve<M>) -> Self {
+        let chunks = &path.chunks;
+        let points = |chunk: &Chunk<M>, piece: &PathPiece<M>| match &piece.shape {
+            Shape::Conic(_) => 3,
+            Shape::Spline(spline) => chunk.spline(spline, splines).control.len(),
+        };
+        let one = |_: &Chunk<M>, _: &PathPiece<M>| 1;
         let is_rational = |chunk: &Chunk<M>, piece: &PathPiece<M>| match &piece.shape {
             Shape::Conic(conic) => conic.weight != 1.0,
             Shape::Spline(spline) => chunk.spline(spline, splines).is_rational(),
@@ -267,20 +268,31 @@ where
             offsets,
             width: gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.shape.width()),
         };
-        (
+        Self {
             curve,
-            gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.feed),
-            gather(chunks, [0; 2], one, |_, piece, out| {
+            feed: gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.feed),
+            moves: gather(chunks, [0; 2], one, |_, piece, out| {
                 out[0] = [i64::from(piece.first), i64::from(piece.last)];
             }),
-            gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.tolerance),
-        )
-    })?;
+            tolerance: gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.tolerance),
+        }
+    }
+}
+
+fn columns<'py, const M: usize>(
+    py: Python<'py>,
+    path: &BuiltPath<M>,
+    pieces: PieceColumns<M>,
+    axes: usize,
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)>
+where
+    Padded: From<CompositeCurve<M>>,
+{
     let columns = (
-        Curve::checked(curve, axes)?,
-        PyArray1::from_vec(py, feed),
-        to_array2(py, moves, 2),
-        PyArray1::from_vec(py, tolerance),
+        Curve::checked(pieces.curve, axes)?,
+        PyArray1::from_vec(py, pieces.feed),
+        to_array2(py, pieces.moves, 2),
+        PyArray1::from_vec(py, pieces.tolerance),
         PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
     let offsets = path.offsets.map(|offsets| [offsets.mean(), offsets.inside, offsets.outside]);
