@@ -10,7 +10,7 @@ use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::phase_motion::{Phase, Phases};
+use feedplan_planner::phases::{Phase, Phases};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 
 const PIECES: usize = 1000;

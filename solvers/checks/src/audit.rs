@@ -1,6 +1,6 @@
 //! An audit of a profile against all limits, from the control points and the columns of the profile alone.
 
-use feedplan_planner::profile::Profile;
+use feedplan_planner::phases::Phases;
 
 use super::cases::Case;
 
@@ -42,17 +42,17 @@ impl Audit {
 }
 
 /// Checks the profile at `samples` points of each phase; panics if the phases do not cover the path in order.
-pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) -> Audit {
+pub fn audit<const M: usize>(case: &Case<M>, phases: &Phases, samples: usize) -> Audit {
     let mut worst = Audit::default();
     let mut last: Option<(usize, f64, f64)> = None;
-    for row in 0..profile.len() {
-        let i = profile.piece[row] as usize;
-        let (u0, u1) = (profile.u0[row], profile.u1[row]);
-        assert!(u0 < u1 && profile.duration[row] >= 0.0, "arc {row}: {u0} to {u1}");
-        let arc = ArcLaw::new(case, profile, row);
+    for row in 0..phases.len() {
+        let i = phases.piece[row] as usize;
+        let (u0, u1) = (phases.u0[row], phases.u1[row]);
+        assert!(u0 < u1 && phases.duration[row] >= 0.0, "arc {row}: {u0} to {u1}");
+        let arc = ArcLaw::new(case, phases, row);
         let ends = [arc.at(u0), arc.at(u1)];
         // The phases cover every piece from 0 to its width, and v² is continuous.
-        let v_sq = [profile.p0[row], profile.p1[row]].map(|p| p.max(0.0));
+        let v_sq = [phases.p0[row], phases.p1[row]].map(|p| p.max(0.0));
         let v_sq = [v_sq[0] * ends[0].d, v_sq[1] * ends[1].d];
         match last {
             None => assert!(i == 0 && u0 == 0.0),
@@ -68,7 +68,7 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
             }
         }
         last = Some((i, u1, v_sq[1]));
-        for (end, p) in ends.iter().zip([profile.p0[row], profile.p1[row]]) {
+        for (end, p) in ends.iter().zip([phases.p0[row], phases.p1[row]]) {
             if p.is_finite() && end.p.is_finite() {
                 worst.ends = worst.ends.max((end.p - p).abs() / p.max(end.p).max(f64::MIN_POSITIVE));
             }
@@ -77,9 +77,9 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
         // figures is rounding.
         let longest = arc.left.iter().chain(&arc.right).fold(0.0, |most: f64, g| most.max(g.abs()));
         let shortest = ends[0].d.min(ends[1].d).sqrt();
-        let axis = match profile.kind[row] {
+        let axis = match phases.kind[row] {
             0 | 3 => {
-                let k = profile.axis[row] as usize;
+                let k = phases.axis[row] as usize;
                 let least = ends[0].g[k].abs().min(ends[1].g[k].abs());
                 if least > 0.0 {
                     arc.left[k].abs().max(arc.right[k].abs()) / least
@@ -121,11 +121,11 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
             }
             worst.idle = worst.idle.max(nearest - grain);
         }
-        worst.duration = worst.duration.max((arc.duration() - profile.duration[row]).abs());
+        worst.duration = worst.duration.max((arc.duration() - phases.duration[row]).abs());
     }
     let (i, u, _) = last.expect("arcs");
     assert!(i + 1 == case.pieces.len() && u == case.pieces[i].width, "the profile stops early");
-    worst.duration /= profile.time();
+    worst.duration /= phases.time();
     worst
 }
 
@@ -139,7 +139,7 @@ struct Place<const M: usize> {
 
 /// The law of one phase.
 struct ArcLaw<'a, const M: usize> {
-    profile: &'a Profile,
+    phases: &'a Phases,
     row: usize,
     width: f64,
     left: [f64; M],
@@ -151,8 +151,8 @@ struct ArcLaw<'a, const M: usize> {
 }
 
 impl<'a, const M: usize> ArcLaw<'a, M> {
-    fn new(case: &Case<M>, profile: &'a Profile, row: usize) -> Self {
-        let piece = &case.pieces[profile.piece[row] as usize];
+    fn new(case: &Case<M>, phases: &'a Phases, row: usize) -> Self {
+        let piece = &case.pieces[phases.piece[row] as usize];
         let (left, right) = piece.tangents();
         let [left, right] = [left, right].map(|tangent| tangent.map(|x| x / piece.width));
         let bend: [f64; M] = std::array::from_fn(|k| (right[k] - left[k]) / piece.width);
@@ -162,10 +162,10 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
                 twist = twist.hypot((left[j] * right[k] - left[k] * right[j]) / piece.width);
             }
         }
-        let mut law = Self { profile, row, width: piece.width, left, right, bend, twist, anchor: (0.0, 0.0) };
-        if profile.kind[row] == 0 {
-            let k = profile.axis[row] as usize;
-            let (u0, u1) = (profile.u0[row], profile.u1[row]);
+        let mut law = Self { phases, row, width: piece.width, left, right, bend, twist, anchor: (0.0, 0.0) };
+        if phases.kind[row] == 0 {
+            let k = phases.axis[row] as usize;
+            let (u0, u1) = (phases.u0[row], phases.u1[row]);
             let axis_sq = |u: f64, p: f64| {
                 let g = law.tangent(u)[k];
                 if p.is_finite() {
@@ -174,7 +174,7 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
                     f64::INFINITY
                 }
             };
-            let (start, end) = (axis_sq(u0, profile.p0[row]), axis_sq(u1, profile.p1[row]));
+            let (start, end) = (axis_sq(u0, phases.p0[row]), axis_sq(u1, phases.p1[row]));
             law.anchor = if start <= end { (u0, start) } else { (u1, end) };
         }
         law
@@ -190,11 +190,11 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
 
     fn at(&self, u: f64) -> Place<M> {
         let (g, c, row) = (self.tangent(u), &self.bend, self.row);
-        let value = self.profile.value[row];
+        let value = self.phases.value[row];
         let d: f64 = g.iter().map(|x| x * x).sum();
         let e: f64 = g.iter().zip(c).map(|(x, y)| x * y).sum();
-        let k = self.profile.axis[row] as usize;
-        let (p, s) = match self.profile.kind[row] {
+        let k = self.phases.axis[row] as usize;
+        let (p, s) = match self.phases.kind[row] {
             0 => {
                 let from = self.tangent(self.anchor.0)[k];
                 let p = (self.anchor.1 + value * (from + g[k]) * (u - self.anchor.0)) / (g[k] * g[k]);
@@ -205,20 +205,20 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
                 });
                 return Place { g, d, p, acceleration };
             }
-            1 => (self.profile.p0[row], 0.0),
+            1 => (self.phases.p0[row], 0.0),
             2 => (value / d, -value * e / (d * d)),
             3 => (value / (g[k] * g[k]), -value * c[k] / (g[k] * g[k] * g[k])),
             _ => {
-                let profile = self.profile;
-                let (u0, u1) = (profile.u0[row], profile.u1[row]);
+                let phases = self.phases;
+                let (u0, u1) = (phases.u0[row], phases.u1[row]);
                 let speed_sq = |u: f64, p: f64| self.tangent(u).iter().map(|x| x * x).sum::<f64>() * p;
-                let (start, end) = (speed_sq(u0, profile.p0[row]), speed_sq(u1, profile.p1[row]));
+                let (start, end) = (speed_sq(u0, phases.p0[row]), speed_sq(u1, phases.p1[row]));
                 let slope = (end - start) / (u1 - u0);
                 let p = (start + slope * (u - u0)) / d;
                 (p, (0.5 * slope - e * p) / d)
             }
         };
-        let acceleration = match self.profile.kind[row] {
+        let acceleration = match self.phases.kind[row] {
             2 => std::array::from_fn(|k| {
                 (0..M).map(|l| g[l] * (c[k] * g[l] - c[l] * g[k])).sum::<f64>() * p / d
             }),
@@ -231,16 +231,16 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
     /// The time by its definition: gained speed over acceleration, length over speed, or the integral of du/√p.
     fn duration(&self) -> f64 {
         let row = self.row;
-        let (u0, u1) = (self.profile.u0[row], self.profile.u1[row]);
-        if self.profile.kind[row] == 0 {
-            let k = self.profile.axis[row] as usize;
+        let (u0, u1) = (self.phases.u0[row], self.phases.u1[row]);
+        if self.phases.kind[row] == 0 {
+            let k = self.phases.axis[row] as usize;
             let speed = |u: f64| {
                 let g = self.tangent(u)[k];
                 let from = self.tangent(self.anchor.0)[k];
-                let gain = self.profile.value[row] * (from + g) * (u - self.anchor.0);
+                let gain = self.phases.value[row] * (from + g) * (u - self.anchor.0);
                 (self.anchor.1 + gain).max(0.0).sqrt()
             };
-            return (speed(u1) - speed(u0)).abs() / self.profile.value[row].abs();
+            return (speed(u1) - speed(u0)).abs() / self.phases.value[row].abs();
         }
         // Simpson's rule, refined towards both ends where a tangent may nearly vanish.
         let count = 400;

@@ -84,6 +84,6 @@ impl<const M: usize> Case<M> {
     }
 
     pub fn time(&self) -> f64 {
-        self.plan().expect("a profile").time()
+        self.plan().expect("a profile").phases.time()
     }
 }

@@ -11,11 +11,9 @@ use crate::path_problem::Geometry;
 use crate::s_curve::{Section, SegmentEnd};
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::phase_law::PhaseLaw;
+use feedplan_planner::phases::{Phase, Phases, NO_AXIS};
 use feedplan_planner::problem::{greater, lesser, Problem};
 
-const PATH_JERK: u8 = PhaseLaw::PathJerk as u8;
-pub const SPEED_CUBIC: u8 = PhaseLaw::SpeedCubic as u8;
-pub const FEED: u8 = PhaseLaw::Feed as u8;
 /// A section shorter than this part of the time in which an axis reaches its greatest speed is rounding.
 const SHORTEST: f64 = 1e-9;
 /// The error that moves states falls by this part of each phase's length, which is too little to show in the phase.
@@ -32,19 +30,9 @@ const TAKEN_UP: f64 = 2e-3;
 /// Bisection steps for the time at which a section of constant jerk passes a knot.
 const HALVINGS: usize = 200;
 
-/// Columns of phases; see `feedplan.profile.SpeedProfile`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JerkProfile {
-    pub piece: Vec<u32>,
-    pub kind: Vec<u8>,
-    pub value: Vec<f64>,
-    pub u0: Vec<f64>,
-    pub u1: Vec<f64>,
-    pub p0: Vec<f64>,
-    pub p1: Vec<f64>,
-    pub duration: Vec<f64>,
-    pub a0: Vec<f64>,
-    pub a1: Vec<f64>,
+    pub phases: Phases,
     /// Offsets of the runs in the phases.
     pub runs: Vec<i64>,
     /// Pieces at whose start a jump of curvature limits the speed.
@@ -127,76 +115,41 @@ impl Span {
     }
 }
 
-/// Moves the rows of `other` to the end of a column, without a copy of them where the column is empty.
-fn append<T>(column: &mut Vec<T>, other: &mut Vec<T>) {
-    if column.is_empty() {
-        std::mem::swap(column, other);
-    } else {
-        column.append(other);
-    }
-}
-
-struct Phase {
-    kind: u8,
+/// A motion under one law between two states.
+struct Movement {
+    law: PhaseLaw,
     value: f64,
     ends: [State; 2],
     duration: f64,
 }
 
 impl JerkProfile {
-    pub fn len(&self) -> usize {
-        self.piece.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.piece.is_empty()
-    }
-
     /// The profile of a subrun that a deadline left no time for.
     pub fn unplanned() -> Self {
-        Self { stopped: true, ..Self::default() }
+        Self { stopped: true, lower_bound: vec![f64::NAN], ..Self::default() }
     }
 
     /// Whether the profile is that of `unplanned`.
     pub fn is_unplanned(&self) -> bool {
-        self.stopped && self.is_empty()
+        self.stopped && self.phases.is_empty()
     }
 
-    pub fn time(&self) -> f64 {
-        self.duration.iter().sum()
-    }
-
-    /// The columns of numbers.
-    fn numbers(&mut self) -> [&mut Vec<f64>; 8] {
-        let Self { value, u0, u1, p0, p1, duration, a0, a1, .. } = self;
-        [value, u0, u1, p0, p1, duration, a0, a1]
-    }
-
-    /// Appends the phases of another profile; `runs` stays as it is.
-    pub fn append(&mut self, mut other: Self) {
-        append(&mut self.piece, &mut other.piece);
-        append(&mut self.kind, &mut other.kind);
-        for (column, other) in self.numbers().into_iter().zip(other.numbers()) {
-            append(column, other);
+    /// The profiles of all parts in this order, without runs.
+    pub fn joined(parts: Vec<Self>) -> Self {
+        let (mut all, mut phases) = (Self::default(), Vec::with_capacity(parts.len()));
+        for part in parts {
+            phases.push(part.phases);
+            all.kinks.extend(part.kinks);
+            all.excess.extend(part.excess);
+            all.lower_bound.extend(part.lower_bound);
+            all.stopped |= part.stopped;
         }
-        append(&mut self.kinks, &mut other.kinks);
-        append(&mut self.excess, &mut other.excess);
-        append(&mut self.lower_bound, &mut other.lower_bound);
-        self.stopped |= other.stopped;
-    }
-
-    /// Gives back the memory that columns have reserved for more phases.
-    pub fn shrink_to_fit(&mut self) {
-        self.piece.shrink_to_fit();
-        self.kind.shrink_to_fit();
-        for column in self.numbers() {
-            column.shrink_to_fit();
-        }
+        Self { phases: Phases::joined(phases), ..all }
     }
 
     /// The size of the acceleration at the start or at the end, in mm/s².
     pub fn end_acceleration(&self, end: usize) -> f64 {
-        let a = if end == 0 { self.a0.first() } else { self.a1.last() };
+        let a = if end == 0 { self.phases.a0.first() } else { self.phases.a1.last() };
         a.map_or(0.0, |a| a.abs())
     }
 
@@ -211,8 +164,10 @@ impl JerkProfile {
         end: usize,
         acceleration: f64,
     ) {
-        let at = if end == 0 { 0 } else { self.len() - 1 };
-        let (change, time) = (self.end_acceleration(end) - acceleration, self.duration[at]);
+        let change = self.end_acceleration(end) - acceleration;
+        let own = &mut self.phases;
+        let at = if end == 0 { 0 } else { own.len() - 1 };
+        let time = own.duration[at];
         let mut from = State { s: 0.0, v: 0.0, a: acceleration };
         let mut spans = vec![];
         for jerk in [5.5, -3.5, 1.0].map(|part| part * change / time) {
@@ -229,18 +184,13 @@ impl JerkProfile {
         }
         let mut ramp = Self::default();
         ramp.push_spans(problem, path, &spans);
+        let mut ramp = ramp.phases;
         let last = ramp.len() - 1;
         (ramp.u0[0], ramp.p0[0], ramp.u1[last], ramp.p1[last]) =
-            (self.u0[at], self.p0[at], self.u1[at], self.p1[at]);
-        for column in self.numbers() {
-            column.remove(at);
-        }
-        self.piece.remove(at);
-        self.kind.remove(at);
-        if end == 0 {
-            std::mem::swap(self, &mut ramp);
-        }
-        self.append(ramp);
+            (own.u0[at], own.p0[at], own.u1[at], own.p1[at]);
+        own.remove(at);
+        let rest = std::mem::take(own);
+        *own = Phases::joined(if end == 0 { vec![ramp, rest] } else { vec![rest, ramp] });
     }
 
     /// Whether another profile can go on from a turn after this one, where the acceleration may be at most `most`: the
@@ -257,47 +207,53 @@ impl JerkProfile {
 
     /// Whether one phase is the ramp of constant acceleration from or to rest.
     fn has_ramp(&self, end: usize) -> bool {
-        let is_steady = |at: usize| self.kind[at] == PATH_JERK && self.value[at] == 0.0;
-        let (at, next) = if end == 0 { (0, 1) } else { (self.len() - 1, self.len().wrapping_sub(2)) };
-        next < self.len() && is_steady(at) && !is_steady(next)
+        let Phases { kind, value, .. } = &self.phases;
+        let is_steady = |at: usize| kind[at] == PhaseLaw::PathJerk as u8 && value[at] == 0.0;
+        let (at, next) = if end == 0 { (0, 1) } else { (kind.len() - 1, kind.len().wrapping_sub(2)) };
+        next < kind.len() && is_steady(at) && !is_steady(next)
     }
 
-    /// Appends a phase between two parameters of a piece. A phase too short to show in u is merged into its neighbour.
+    /// Appends a movement between two parameters of a piece. One too short to show in u is merged into its neighbour.
     fn push<const M: usize>(
         &mut self,
         problem: &Problem<M>,
         piece: usize,
         [u0, u1]: [f64; 2],
-        phase: &Phase,
+        movement: &Movement,
     ) {
         let u0 = self.left_from.take().filter(|from| from.0 == piece).map_or(u0, |from| from.1);
-        let last = self.len().wrapping_sub(1);
-        let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
+        let phases = &mut self.phases;
+        let last = phases.len().wrapping_sub(1);
+        let goes_on = last < phases.len() && phases.piece[last] as usize == piece && phases.u1[last] == u0;
         let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
-        let turns = phase.ends.iter().any(State::turns);
-        if u1 <= u0 || !turns && phase.duration <= SHORTEST * rise_time(problem) {
+        let Movement { law, value, ends: [from, to], duration } = *movement;
+        let turns = from.turns() || to.turns();
+        if u1 <= u0 || !turns && duration <= SHORTEST * rise_time(problem) {
             let u1 = u1.max(u0);
             if goes_on {
-                self.duration[last] += phase.duration;
-                self.u1[last] = u1;
-                self.p1[last] = speed(u1, phase.ends[1].v);
-                self.a1[last] = phase.ends[1].a;
+                phases.duration[last] += duration;
+                phases.u1[last] = u1;
+                phases.p1[last] = speed(u1, to.v);
+                phases.a1[last] = to.a;
             } else {
-                self.left_out += phase.duration;
+                self.left_out += duration;
                 self.left_from = Some((piece, u0));
             }
             return;
         }
-        self.piece.push(piece as u32);
-        self.kind.push(phase.kind);
-        self.value.push(phase.value);
-        self.u0.push(u0);
-        self.u1.push(u1);
-        self.p0.push(speed(u0, phase.ends[0].v));
-        self.p1.push(speed(u1, phase.ends[1].v));
-        self.duration.push(phase.duration + std::mem::take(&mut self.left_out));
-        self.a0.push(phase.ends[0].a);
-        self.a1.push(phase.ends[1].a);
+        phases.push(&Phase {
+            piece: piece as u32,
+            law,
+            axis: NO_AXIS,
+            value,
+            u0,
+            u1,
+            p0: speed(u0, from.v),
+            p1: speed(u1, to.v),
+            duration: duration + std::mem::take(&mut self.left_out),
+            a0: from.a,
+            a1: to.a,
+        });
     }
 
     /// Appends a section of constant jerk between two states; `duration` in s.
@@ -350,8 +306,8 @@ impl JerkProfile {
             problem.watch.check_at(part);
             let u = [from, to].map(|s| path.locate(part, s));
             let duration = path.length_between(part, u[0], u[1]) / feed;
-            let phase = Phase { kind: FEED, value: feed * feed, ends: [state; 2], duration };
-            self.push(problem, path.parts[part].piece, u, &phase);
+            let movement = Movement { law: PhaseLaw::Feed, value: feed * feed, ends: [state; 2], duration };
+            self.push(problem, path.parts[part].piece, u, &movement);
             part += 1;
         }
     }
@@ -381,8 +337,9 @@ impl JerkProfile {
                 let fastest = span.ends[0].v.max(span.ends[1].v);
                 let keeps = fastest == 0.0 || span.ends.iter().any(State::turns);
                 let duration = span.duration + if keeps { 0.0 } else { moved / fastest };
-                let phase = Phase { kind: PATH_JERK, value: span.jerk, ends: span.ends, duration };
-                self.push(problem, path.parts[part].piece, u, &phase);
+                let movement =
+                    Movement { law: PhaseLaw::PathJerk, value: span.jerk, ends: span.ends, duration };
+                self.push(problem, path.parts[part].piece, u, &movement);
             }
         }
     }
@@ -421,7 +378,7 @@ impl JerkProfile {
                 problem,
                 path,
                 ramp_ways[0].as_ref(),
-                Phase { kind: PATH_JERK, value: jerk, ends, duration },
+                Movement { law: PhaseLaw::PathJerk, value: jerk, ends, duration },
             );
         }
         let to_rest = (s[last] < ends[1]).then(|| {
@@ -434,9 +391,9 @@ impl JerkProfile {
         for (n, way) in ways.iter().enumerate() {
             problem.watch.check_at(n);
             let off = if n == meeting { off } else { 0.0 };
-            let phase =
-                phase_between(path, jerk_limits, way.part, (way.length, off), [states[n], states[n + 1]]);
-            self.push(problem, path.parts[way.part].piece, way.u, &phase);
+            let ends = [states[n], states[n + 1]];
+            let movement = movement_between(path, jerk_limits, way.part, (way.length, off), ends);
+            self.push(problem, path.parts[way.part].piece, way.u, &movement);
         }
         if let Some(OnRamp { jerk, duration, ends: [from, _] }) = to_rest {
             let ends = [states[last], State { s: ends[1], v: 0.0, a: -from }];
@@ -444,7 +401,7 @@ impl JerkProfile {
                 problem,
                 path,
                 ramp_ways[1].as_ref(),
-                Phase { kind: PATH_JERK, value: jerk, ends, duration },
+                Movement { law: PhaseLaw::PathJerk, value: jerk, ends, duration },
             );
         }
     }
@@ -454,11 +411,11 @@ impl JerkProfile {
         problem: &Problem<M>,
         path: &ArcLengthPath<M>,
         way: Option<&Way>,
-        phase: Phase,
+        ramp: Movement,
     ) {
         match way {
-            Some(way) => self.push(problem, path.parts[way.part].piece, way.u, &phase),
-            None => self.push_jerk(problem, path, phase.ends, phase.value, phase.duration),
+            Some(way) => self.push(problem, path.parts[way.part].piece, way.u, &ramp),
+            None => self.push_jerk(problem, path, ramp.ends, ramp.value, ramp.duration),
         }
     }
 }
@@ -555,18 +512,18 @@ fn moved_states(profile: &Profile, ways: &[Way], ramp_ways: &[Option<Way>; 2]) -
     ((0..=last).map(state).collect(), meeting, off.abs())
 }
 
-/// The phase between two states at the distance h on a part, where h has the error `off`.
+/// The movement between two states at the distance h on a part, where h has the error `off`.
 ///
 /// v² as a cubic is known by its values at both ends. Their rounding ε v² and the error e of h change the jerk by 3 v
 /// (ε v² + 2 |a| e)/h². That is more than the limit on a phase of a nanometre. There the accelerations at both ends give
 /// a constant jerk: over so short a length it changes only by rounding.
-fn phase_between<const M: usize>(
+fn movement_between<const M: usize>(
     path: &ArcLengthPath<M>,
     jerk_limits: &[f64; M],
     part: usize,
     (h, off): (f64, f64),
     ends: [State; 2],
-) -> Phase {
+) -> Movement {
     let duration = cubic_time(h, &ends);
     let [start, end] = ends;
     let rounding = 3.0 * end.v * (f64::EPSILON * end.v * end.v + 2.0 * end.a.abs() * off) / (h * h);
@@ -577,10 +534,10 @@ fn phase_between<const M: usize>(
         let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
         if rounding > SHOWN * limit {
             let value = (end.a - start.a) / duration;
-            return Phase { kind: PATH_JERK, value, ends, duration };
+            return Movement { law: PhaseLaw::PathJerk, value, ends, duration };
         }
     }
-    Phase { kind: SPEED_CUBIC, value: 0.0, ends, duration }
+    Movement { law: PhaseLaw::SpeedCubic, value: 0.0, ends, duration }
 }
 
 /// The jerk v w''/2 at both ends of the cubic w = v² between two states at the distance h.

@@ -97,21 +97,19 @@ pub fn over_chains<const M: usize>(
     let planned: Result<Vec<Vec<JerkProfile>>, Fault> =
         chains(&subruns, &turns).into_par_iter().map(|chain| plan(chain, &limits, watch)).collect();
     let mut planned = planned?.into_iter().flatten();
-    let mut all = JerkProfile::default();
-    all.runs.push(0);
+    let (mut kept, mut runs, mut lower_bound) = (vec![], vec![0], vec![]);
     for run in subruns.chunk_by(|a, b| a.run == b.run) {
-        let own: Vec<JerkProfile> = planned.by_ref().take(run.len()).collect();
+        let mut own: Vec<JerkProfile> = planned.by_ref().take(run.len()).collect();
         if own.iter().any(JerkProfile::is_unplanned) {
-            all.stopped = true;
-            all.lower_bound.push(f64::NAN);
-        } else {
-            let first = all.lower_bound.len();
-            own.into_iter().for_each(|phases| all.append(phases));
-            let least = all.lower_bound.drain(first..).sum();
-            all.lower_bound.push(least);
+            own = vec![JerkProfile::unplanned()];
         }
-        all.runs.push(all.len() as i64);
+        let count: usize = own.iter().map(|part| part.phases.len()).sum();
+        runs.push(runs[runs.len() - 1] + count as i64);
+        lower_bound.push(own.iter().flat_map(|part| &part.lower_bound).sum());
+        kept.extend(own);
     }
+    let mut all = JerkProfile::joined(kept);
+    (all.runs, all.lower_bound) = (runs, lower_bound);
     Ok(all)
 }
 

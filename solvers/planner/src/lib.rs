@@ -5,6 +5,7 @@
 pub mod bang_bang;
 pub mod lower_bound;
 pub mod phase_law;
+pub mod phases;
 pub mod problem;
 pub mod profile;
 mod runs;
@@ -12,7 +13,7 @@ pub mod trapezoid;
 
 use feedplan_geometry::instances;
 
-use lower_bound::Hint;
+use phases::Phases;
 use problem::Fault;
 use profile::Profile;
 
@@ -24,6 +25,6 @@ instances! {
     pub trait Exact for [3, 6, 9] problem::Problem<'_, M> = {
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang::plan;
         /// A time [s] below that of every feasible profile.
-        fn lower_bound(&self, hint: &Hint) -> Result<f64, Fault> = lower_bound::lower_bound;
+        fn lower_bound(&self, hint: &Phases) -> Result<f64, Fault> = lower_bound::lower_bound;
     }
 }

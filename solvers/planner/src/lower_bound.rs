@@ -40,12 +40,11 @@ mod time;
 
 use rayon::prelude::*;
 
+use crate::phases::Phases;
 use crate::problem::{greater, Both, ChordLimit, Fault, Problem};
 use crate::runs::groups;
 use feedplan_geometry::quadratic::norm;
 use intervals::Intervals;
-
-pub use intervals::Hint;
 
 /// Factors that exceed the rounding of sixteen operations.
 const UP: f64 = 1.0 + 16.0 * f64::EPSILON;
@@ -85,16 +84,12 @@ struct Task<'a, const M: usize> {
     chord: Option<ChordLimit>,
 }
 
-/// A lower bound [s] of the time of every profile that keeps the problem's limits.
-pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Hint) -> Result<f64, Fault> {
+/// A lower bound [s] of the time of every profile that keeps the problem's limits. `hint` are the phases of a profile, by
+/// their pieces, axes, ends u1 and durations: only the first intervals and their refinement depend on it.
+pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Phases) -> Result<f64, Fault> {
     problem.check()?;
-    let phases = hint.piece.len();
-    if hint.axis.len() != phases
-        || hint.u1.len() != phases
-        || hint.duration.len() != phases
-        || phases >= u32::MAX as usize
-    {
-        let what = format!("the columns of the profile differ in length from its {phases} phases");
+    if hint.len() >= u32::MAX as usize {
+        let what = format!("the profile has {} phases: give fewer than {}", hint.len(), u32::MAX);
         return Err(Fault::Input { piece: None, what });
     }
     let share = if problem.tip.is_some() { 1.0 + STAND_IN } else { 1.0 };
@@ -136,7 +131,7 @@ fn over_run<const M: usize>(
     task: &Task<M>,
     pieces: (usize, usize),
     (start_sq, end_sq): (f64, f64),
-    hint: &Hint,
+    hint: &Phases,
     (intervals, other): &mut (Intervals, Intervals),
 ) -> f64 {
     let find_turn = |i: usize, axis: usize, part: (f64, f64)| {

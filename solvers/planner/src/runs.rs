@@ -35,7 +35,7 @@ pub fn over_runs<const M: usize, W: Default>(
                 let ends = (runs[run], runs[run + 1]);
                 let start = if run == 0 { problem.start_speed } else { 0.0 };
                 let end = if run == last_run { problem.end_speed } else { 0.0 };
-                profile.runs.push(profile.len() as i64);
+                profile.runs.push(profile.phases.len() as i64);
                 space.with_borrow_mut(|space| {
                     let planned = plan(ends, (start * start, end * end), space, &mut profile);
                     if ends.1 - ends.0 > MOST_KEPT {

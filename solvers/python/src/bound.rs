@@ -8,7 +8,6 @@ use super::problem::Problem;
 use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_planner::lower_bound::Hint;
 use feedplan_planner::problem;
 use feedplan_planner::Exact as _;
 
@@ -21,11 +20,10 @@ fn lower_bound(
     profile: Of<Profile>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<f64> {
-    let hint =
-        Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration };
+    let hint = &profile.phases;
     with_padded_axes!(problem.axes(), M, {
         let problem = problem.rows::<M>()?.problem();
-        run(py, progress.as_ref(), |watch| problem::Problem { watch, ..problem }.lower_bound(&hint))?
+        run(py, progress.as_ref(), |watch| problem::Problem { watch, ..problem }.lower_bound(hint))?
             .map_err(|fault| to_exception(&fault))
     })
 }

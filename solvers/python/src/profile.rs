@@ -9,8 +9,8 @@ use pyo3::types::PyDict;
 
 use super::views::view;
 use feedplan_jerk::jerk_profile::JerkProfile;
-use feedplan_planner::profile::{self, NO_AXIS};
-use feedplan_setpoints::phase_motion::Phases;
+use feedplan_planner::phases::Phases;
+use feedplan_planner::profile;
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
@@ -76,40 +76,15 @@ impl Deref for Profile {
 
 impl From<profile::Profile> for Profile {
     fn from(planned: profile::Profile) -> Self {
-        let count = planned.len();
-        let phases = Phases {
-            piece: planned.piece,
-            kind: planned.kind,
-            axis: planned.axis,
-            value: planned.value,
-            u0: planned.u0,
-            u1: planned.u1,
-            p0: planned.p0,
-            p1: planned.p1,
-            duration: planned.duration,
-            a0: vec![0.0; count],
-            a1: vec![0.0; count],
-        };
+        let still = || vec![0.0; planned.phases.len()];
+        let phases = Phases { a0: still(), a1: still(), ..planned.phases };
         Self { phases: phases.into(), runs: planned.runs, slowed: planned.slowed, kinked: vec![] }
     }
 }
 
 impl From<JerkProfile> for Profile {
     fn from(planned: JerkProfile) -> Self {
-        let phases = Phases {
-            axis: vec![NO_AXIS; planned.len()],
-            piece: planned.piece,
-            kind: planned.kind,
-            value: planned.value,
-            u0: planned.u0,
-            u1: planned.u1,
-            p0: planned.p0,
-            p1: planned.p1,
-            duration: planned.duration,
-            a0: planned.a0,
-            a1: planned.a1,
-        };
-        Self { phases: phases.into(), runs: planned.runs, slowed: vec![], kinked: planned.kinks }
+        Self { phases: planned.phases.into(), runs: planned.runs, slowed: vec![], kinked: planned.kinks }
     }
 }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
-use phase_motion::Phases;
+use feedplan_planner::phases::Phases;
 use sampling::{Chunk, Interpolator, Resume, Sampler};
 
 instances! {

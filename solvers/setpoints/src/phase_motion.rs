@@ -22,7 +22,7 @@
 mod axis_way;
 mod clock;
 mod lengths;
-mod phase;
+mod part;
 mod rate;
 
 use std::rc::Rc;
@@ -34,9 +34,10 @@ use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::Coefficients;
 use feedplan_planner::phase_law::PhaseLaw;
+use feedplan_planner::phases::Phase;
+use lengths::SLOW;
 pub use lengths::{Counts, PiecePath};
-use phase::{Part, SLOW};
-pub use phase::{Phase, Phases};
+use part::Part;
 pub use rate::{TipSpeed, MAX_TIP};
 
 /// A step's length is met within this part of the step. 1e-6 would do for the length; four digits more keep the second

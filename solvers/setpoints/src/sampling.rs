@@ -23,9 +23,10 @@ use self::check::check;
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
 pub use self::path_data::PathData;
-use crate::phase_motion::{Phase, PhaseMotion, Phases, PiecePath, Rates, State};
+use crate::phase_motion::{PhaseMotion, PiecePath, Rates, State};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::phases::{Phase, Phases};
 
 /// More setpoints than this are refused: their indices and arrays would serve nobody.
 pub const MAX_COUNT: f64 = 2e9;

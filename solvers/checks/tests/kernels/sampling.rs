@@ -5,7 +5,8 @@ use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_setpoints::phase_motion::{Counts, Phase, PhaseMotion, Phases, PiecePath, State};
+use feedplan_planner::phases::{Phase, Phases};
+use feedplan_setpoints::phase_motion::{Counts, PhaseMotion, PiecePath, State};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
 

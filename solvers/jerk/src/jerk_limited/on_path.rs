@@ -121,7 +121,7 @@ impl<const M: usize> Task<'_, M> {
             open.dedup();
         }
         for i in 0..count {
-            if lines[i].is_none() && !planned[i].is_empty() {
+            if lines[i].is_none() && !planned[i].phases.is_empty() {
                 let own = [0, 1].map(|end| planned[i].end_acceleration(end));
                 accelerations[i] =
                     if i > 0 && lines[i - 1].is_none() { accelerations[i].min(own[0]) } else { own[0] };
@@ -178,7 +178,6 @@ impl<const M: usize> Task<'_, M> {
 
     /// The profile of a path between two ends, after this number of cuts.
     fn plan(&self, path: &ArcLengthPath<M>, ends: [End; 2], cuts: u32) -> Result<JerkProfile, Fault> {
-        let mut phases = JerkProfile::default();
         let junctions = path.junctions(&self.limits.jerk);
         let caps = path.caps(&junctions);
         let moving = ends.iter().any(|end| matches!(end, End::Moving { .. }));
@@ -189,15 +188,11 @@ impl<const M: usize> Task<'_, M> {
                 Ok(JerkProfile::unplanned())
             }
             Ok(planned) => {
-                let (mut excess, mut least) = (0.0, 0.0);
-                for mut own in planned {
-                    excess += own.excess.drain(..).sum::<f64>();
-                    least += own.lower_bound.drain(..).sum::<f64>();
-                    phases.append(own);
+                let mut whole = JerkProfile::joined(planned);
+                for parts in [&mut whole.excess, &mut whole.lower_bound] {
+                    *parts = vec![parts.iter().sum()];
                 }
-                phases.excess.push(excess);
-                phases.lower_bound.push(least);
-                Ok(phases)
+                Ok(whole)
             }
             // A moving end has no plan before some iterations.
             Err(path_problem::Fault::NoPlan { .. }) if moving && self.effort.expired() => {
@@ -286,7 +281,7 @@ impl<const M: usize> Task<'_, M> {
         let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort })?;
         phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
         // The phases are kept until all stretches of the subrun are planned.
-        phases.shrink_to_fit();
+        phases.phases.shrink_to_fit();
         phases.stopped = !plan.converged && effort.expired();
         phases.lower_bound.push(plan.lower_bound);
         if plan.iterations > 0.0 {
@@ -359,15 +354,14 @@ impl<const M: usize> Task<'_, M> {
         if left.is_empty() {
             return Err(Fault::Stuck { piece: at.piece, u });
         }
-        let mut phases = self.between_stops(&left, cuts + 1)?;
-        let rest = self.between_stops(&right, cuts + 1)?;
-        if phases.is_unplanned() || rest.is_unplanned() {
+        let both = vec![self.between_stops(&left, cuts + 1)?, self.between_stops(&right, cuts + 1)?];
+        if both.iter().any(JerkProfile::is_unplanned) {
             return Ok(JerkProfile::unplanned());
         }
-        phases.append(rest);
+        let mut whole = JerkProfile::joined(both);
         // The bounds of both hold with the stop alone.
-        phases.lower_bound = vec![f64::NAN];
-        Ok(phases)
+        whole.lower_bound = vec![f64::NAN];
+        Ok(whole)
     }
 
     /// The profile of parts between stops.

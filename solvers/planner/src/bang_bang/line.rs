@@ -4,7 +4,8 @@
 use super::quadratic::Axes;
 use crate::bang_bang::tolerance::NEGLIGIBLE;
 use crate::phase_law::PhaseLaw;
-use crate::profile::{Profile, Row, NO_AXIS};
+use crate::phases::NO_AXIS;
+use crate::profile::{Profile, Row};
 use feedplan_geometry::quadratic::norm;
 
 /// A straight piece with its limits.

@@ -34,8 +34,9 @@ mod turns;
 
 use super::time::integral;
 use crate::phase_law::PhaseLaw;
+use crate::phases::NO_AXIS;
 use crate::problem::ChordLimit;
-use crate::profile::{Profile, Row, NO_AXIS};
+use crate::profile::{Profile, Row};
 use feedplan_geometry::quadratic::norm;
 pub use pass::Stuck;
 use phase::{Law, Phase};

@@ -59,7 +59,7 @@ pub fn plan_run<const M: usize>(
     out: &mut Profile,
 ) -> Result<(), Fault> {
     let mut remedies: Vec<Remedy> = vec![];
-    let rows = out.len();
+    let rows = out.phases.len();
     for attempt in 0..MOST_ATTEMPTS {
         space.curve.set_remedies(&remedies);
         let reached = plan_blocks(task, run, speeds_sq, space, out)?;

@@ -1,15 +1,6 @@
 //! The intervals of a run: at first the phases of a profile, then halved where their bound is loose.
 
-/// The profile whose time is to be bounded. Only the first intervals and their refinement depend on it.
-#[derive(Clone, Copy)]
-pub struct Hint<'a> {
-    /// Of each phase: its piece, its control axis, u at its end, its duration [s].
-    pub piece: &'a [u32],
-    /// Any other number stands for no axis.
-    pub axis: &'a [u8],
-    pub u1: &'a [f64],
-    pub duration: &'a [f64],
-}
+use crate::phases::Phases;
 
 /// The interval belongs to no phase.
 const NO_PHASE: u32 = u32::MAX;
@@ -41,7 +32,7 @@ impl Intervals {
     /// `find_turn` returns a turn of an axis between two t of a piece.
     pub fn divide(
         &mut self,
-        hint: &Hint,
+        hint: &Phases,
         (first, last): (usize, usize),
         width: &[f64],
         find_turn: impl Fn(usize, usize, (f64, f64)) -> Option<f64>,
@@ -92,7 +83,7 @@ impl Intervals {
     /// interval's ends; `other` is memory.
     pub fn halve(
         &mut self,
-        hint: &Hint,
+        hint: &Phases,
         part: f64,
         middle: impl Fn(usize, (f64, f64)) -> f64,
         other: &mut Self,

@@ -5,13 +5,14 @@
 //! q'_k ≥ 0. On rational pieces q'_k = h/ω² and its integral is m/ω.
 
 use super::clock::Even;
-use super::phase::{Part, Phase};
+use super::part::Part;
 use feedplan_geometry::inverse_length::Located;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::{Piece, MAX_HODOGRAPH};
 use feedplan_planner::phase_law::PhaseLaw;
+use feedplan_planner::phases::Phase;
 
 /// Coefficients of a hodograph, and one more for its integral.
 const C: usize = MAX_HODOGRAPH + 1;

@@ -2,13 +2,14 @@
 //!
 //! Parts are counted from the end of the phase that is nearer in time, so that nothing is lost next to rest.
 
-use super::lengths::{fill, PiecePath};
-use super::phase::{Part, Phase, SLOW};
+use super::lengths::{fill, PiecePath, SLOW};
+use super::part::Part;
 use super::rate::{FromRest, Line};
 use feedplan_geometry::arc_length::{quadrature, Disc, Integrand, Node, Table};
 use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_geometry::spline::speed::greatest_ratio;
 use feedplan_planner::phase_law::PhaseLaw;
+use feedplan_planner::phases::Phase;
 
 /// A speed below 0 is rounding where it is this part of what speed and acceleration at the ends make of it.
 const BACKWARDS: f64 = 1e-9;

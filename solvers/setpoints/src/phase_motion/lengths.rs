@@ -3,7 +3,6 @@
 
 use std::cell::{Cell, OnceCell};
 
-use super::phase::{Phase, SLOW};
 use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
 use feedplan_geometry::arc_length::{quadrature, tabulate, Integrand, Node, Table};
 use feedplan_geometry::inverse_length::{self, Located};
@@ -15,7 +14,10 @@ use feedplan_geometry::spline::speed::{Coefficients, Speed};
 use feedplan_geometry::spline::Piece;
 use feedplan_geometry::tolerance;
 use feedplan_planner::phase_law::PhaseLaw;
+use feedplan_planner::phases::Phase;
 
+/// C' vanishes at an end where |C'|² is below this part of that in the middle of the phase.
+pub const SLOW: f64 = 1e-8;
 /// Tables of lengths are built for this part of the phase's piece; a phase may be a small part of it.
 const ERROR: f64 = 0.125 * tolerance::TABLE;
 

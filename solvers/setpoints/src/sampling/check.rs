@@ -1,9 +1,10 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::path_data::PathData;
-use crate::phase_motion::{flaw, Phase, Phases, PiecePath, MAX_TIP};
+use crate::phase_motion::{flaw, PiecePath, MAX_TIP};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
+use feedplan_planner::phases::{Phase, Phases};
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(

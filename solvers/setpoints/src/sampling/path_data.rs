@@ -3,8 +3,9 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::phase_motion::{Counts, Phase, PhaseMotion, PiecePath, TipSpeed};
+use crate::phase_motion::{Counts, PhaseMotion, PiecePath, TipSpeed};
 use feedplan_geometry::spline::CompositeCurve;
+use feedplan_planner::phases::Phase;
 
 /// What a path gives: the curve that the axes follow; where the feed is about another one, and where laws of jerk are,
 /// the Bernstein coefficients of the squares of their speeds per parameter, with offsets; the source lines of the

@@ -5,16 +5,12 @@ use rayon::prelude::*;
 
 use feedplan_checks::{audit, random_case, seeds, Case, Elevated, Random, FEW_AXES, PADDED};
 use feedplan_geometry::quadratic::Quadratic;
-use feedplan_planner::lower_bound::Hint;
+use feedplan_planner::phases::Phases;
 use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 
-fn hint(profile: &Profile) -> Hint<'_> {
-    Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration }
-}
-
-fn bound<const M: usize>(case: &Case<M>, profile: &Profile) -> f64 {
-    Elevated::<PADDED>::new(case, 0).problem(case).lower_bound(&hint(profile)).expect("a bound")
+fn bound<const M: usize>(case: &Case<M>, phases: &Phases) -> f64 {
+    Elevated::<PADDED>::new(case, 0).problem(case).lower_bound(phases).expect("a bound")
 }
 
 #[test]
@@ -22,7 +18,7 @@ fn on_a_line_from_rest_to_rest_the_bound_is_the_time() {
     // 100 mm: at 1000 mm/s² up to 50 mm/s and down again 2.05 s; without a limit of speed 2 √0.1 s.
     for (velocity, feed, time) in [(50.0, 1e3, 2.05), (1e6, 50.0, 2.05), (1e6, 1e6, 2.0 * 0.1f64.sqrt())] {
         let case = Case::new(vec![Quadratic::line([0.0], [100.0])], feed, [velocity], [1e3]);
-        let bound = bound(&case, &case.plan().expect("a profile"));
+        let bound = bound(&case, &case.plan().expect("a profile").phases);
         assert!(bound <= time && bound > time * (1.0 - 1e-12), "{bound} of {time}");
     }
 }
@@ -32,7 +28,7 @@ fn every_limit_counts() {
     // An L of two lines, 1 mm each, at 100 mm/s²: a stop in the corner, then a passage at √20 mm/s.
     let lines = || vec![Quadratic::line([0.0, 0.0], [1.0, 0.0]), Quadratic::line([1.0, 0.0], [1.0, 1.0])];
     let by_hand = |case: &Case<2>, time: f64| {
-        let bound = bound(case, &case.plan().expect("a profile"));
+        let bound = bound(case, &case.plan().expect("a profile").phases);
         assert!(bound <= time && bound > time * (1.0 - 1e-12), "{bound} of {time}");
     };
     let mut corner = Case::new(lines(), 1e3, [1e3; 2], [100.0; 2]);
@@ -60,12 +56,12 @@ fn the_chord_error_counts() {
     // v² = (8 δ/T²)(ρ − δ/2), δ = 0.01 mm, T = 0.1 s: 8 mm/s² × 9.995 mm.
     let arc = Quadratic { control: [[-1.0, 0.05], [0.0, -0.05], [1.0, 0.05]], width: 2.0 };
     let mut case = Case::new(vec![arc], 1e3, [1e3; 2], [1e4; 2]);
-    let free = bound(&case, &case.plan().expect("a profile"));
+    let free = bound(&case, &case.plan().expect("a profile").phases);
     (case.chord_tolerance, case.period) = (0.01, 0.1);
     (case.start_speed, case.end_speed) = (8.0, 8.0);
-    let profile = case.plan().expect("a profile");
-    let bound = bound(&case, &profile);
-    assert!(bound <= profile.time() && bound > 0.998 * profile.time(), "{bound} of {}", profile.time());
+    let phases = case.plan().expect("a profile").phases;
+    let bound = bound(&case, &phases);
+    assert!(bound <= phases.time() && bound > 0.998 * phases.time(), "{bound} of {}", phases.time());
     assert!(bound > 2.0 / (8f64 * 10.2).sqrt() && bound > 3.0 * free, "{bound}, {free}");
 }
 
@@ -84,16 +80,16 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
             let count = FEW_AXES[(seed % 3) as usize];
             feedplan_checks::for_few_axes!(count, M, {
                 let case = random_case::<M>(seed);
-                let profile = case.plan().ok()?;
-                let time = profile.time();
+                let phases = case.plan().ok()?.phases;
+                let time = phases.time();
                 let bound = if with_arcs {
-                    bound(&case, &profile)
+                    bound(&case, &phases)
                 } else {
-                    bound(&case, &whole_pieces(&profile, &case))
+                    bound(&case, &whole_pieces(&phases, &case))
                 };
                 let gap = 1.0 - bound / time;
                 // Near a cusp, rounding makes the durations of single phases wrong.
-                let is_sound = gap >= -1e-10 || -gap <= 2.0 * audit(&case, &profile, 1).duration;
+                let is_sound = gap >= -1e-10 || -gap <= 2.0 * audit(&case, &phases, 1).duration;
                 Some((gap, seed, is_sound))
             })
         })
@@ -108,13 +104,13 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
 }
 
 /// One phase on each piece.
-fn whole_pieces<const M: usize>(profile: &Profile, case: &Case<M>) -> Profile {
-    let mut whole = Profile::default();
+fn whole_pieces<const M: usize>(phases: &Phases, case: &Case<M>) -> Phases {
+    let mut whole = Phases::default();
     for (i, piece) in case.pieces.iter().enumerate() {
         whole.piece.push(i as u32);
         whole.axis.push(255);
         whole.u1.push(piece.width);
-        let own = profile.piece.iter().zip(&profile.duration).filter(|arc| *arc.0 == i as u32);
+        let own = phases.piece.iter().zip(&phases.duration).filter(|arc| *arc.0 == i as u32);
         whole.duration.push(own.map(|arc| arc.1).sum());
     }
     whole
@@ -147,7 +143,7 @@ fn any_cells_give_a_bound_and_are_refined() {
 fn a_wrong_profile_makes_no_wrong_bound() {
     for seed in 0..2000 {
         let case = random_case::<3>(seed);
-        let Ok(right) = case.plan() else { continue };
+        let Ok(Profile { phases: right, .. }) = case.plan() else { continue };
         let mut random = Random(seed ^ 0x5eed);
         let mut wrong = right.clone();
         for arc in 0..wrong.len() {

@@ -15,7 +15,7 @@ fn a_cubic_that_comes_back_on_its_own_way_is_planned() {
     let profile = case.plan().expect("a profile");
     // x(t)/x₁ = 3 t − 6 t² + 4 t³ rises everywhere, with x' = 0 in the middle; X is slowest: a line of length x₁.
     let time = 2.0 * (there[0].abs() / acceleration[0]).sqrt();
-    assert!((profile.time() / time - 1.0).abs() < 1e-9, "{} {time}", profile.time());
+    assert!((profile.phases.time() / time - 1.0).abs() < 1e-9, "{} {time}", profile.phases.time());
 }
 
 /// Cases that rounding makes infeasible are reported; they are a few in ten thousand.
@@ -29,10 +29,11 @@ fn curves_made_to_break_the_planner_are_planned_in_finite_time() {
             match case.plan() {
                 Err(_) => stuck += 1,
                 Ok(profile) => {
-                    let are_times = profile.duration.iter().all(|&time| time >= 0.0 && time.is_finite());
-                    assert!(are_times, "seed {seed}: {:?}", profile.duration);
+                    let are_times =
+                        profile.phases.duration.iter().all(|&time| time >= 0.0 && time.is_finite());
+                    assert!(are_times, "seed {seed}: {:?}", profile.phases.duration);
                     slowed += usize::from(!profile.slowed.is_empty());
-                    arcs = arcs.max(profile.len() / case.pieces.len());
+                    arcs = arcs.max(profile.phases.len() / case.pieces.len());
                 }
             }
         });

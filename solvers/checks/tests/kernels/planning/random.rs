@@ -15,7 +15,7 @@ fn campaign(seeds: std::ops::Range<u64>) -> (Audit, Vec<String>) {
             match case.plan() {
                 Err(fault) => failures.push(format!("seed {seed}: {fault}")),
                 Ok(profile) => {
-                    let found = audit(&case, &profile, 20);
+                    let found = audit(&case, &profile.phases, 20);
                     if !(found.excess() < 1e-9
                         && found.idle < 1e-6
                         && found.jump < 1e-12
@@ -57,7 +57,7 @@ fn changes(seeds: std::ops::Range<u64>) -> ([f64; 6], Vec<String>) {
                 match other.plan() {
                     Err(fault) => failures.push(format!("seed {seed} {name}: {fault}")),
                     Ok(changed) => {
-                        let change = (changed.time() / profile.time() - 1.0).abs();
+                        let change = (changed.phases.time() / profile.phases.time() - 1.0).abs();
                         if change > 1e-9 {
                             failures.push(format!("seed {seed} {name}: {change:.1e}"));
                         }
@@ -115,7 +115,7 @@ fn a_level_limit_curve_is_passed() {
         });
         let case: Case<2> = Case::new(pieces.collect(), 100.0, [500.0; 2], [3000.0; 2]);
         let profile = case.plan().expect("a profile");
-        let found = audit(&case, &profile, 100);
+        let found = audit(&case, &profile.phases, 100);
         assert!(found.excess() < 1e-9 && found.jump < 1e-12, "{nudge}: {found:?}");
     }
 }

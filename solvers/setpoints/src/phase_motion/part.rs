@@ -1,0 +1,19 @@
+//! Parts of a phase.
+
+/// A share of the whole measure of a phase, counted from its start or from its end.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    pub from_start: bool,
+    pub share: f64,
+}
+
+impl Part {
+    /// The same from the end that is nearer.
+    pub fn nearer_end(self) -> Self {
+        if self.share <= 0.5 {
+            self
+        } else {
+            Self { from_start: !self.from_start, share: 1.0 - self.share }
+        }
+    }
+}
