@@ -65,6 +65,11 @@ impl Followed<'_> {
         std::array::from_fn(|feed| self.feed[FEEDS * i + feed])
     }
 
+    /// The source line of piece `i`; 0 where there is no such piece.
+    pub fn line_of(&self, i: usize) -> i32 {
+        self.line.get(i).copied().unwrap_or(0)
+    }
+
     /// Whether piece `i` begins a run whose axes mean something else than before.
     pub fn begins_elsewhere(&self, i: usize) -> bool {
         self.runs.binary_search(&(i as i64)).is_ok_and(|run| self.new_words.get(run) == Some(&true))
@@ -226,6 +231,19 @@ impl<const M: usize> Curve<M> {
             }
             Curve::General(general) => {
                 general.polygon.part(from / general.width, (to - from) / general.width).way()
+            }
+        }
+    }
+
+    /// From one place to another, where the first derivatives are known; short ways lose no digits.
+    pub fn way(&self, [from, to]: [f64; 2], slopes: [&[f64; M]; 2]) -> [f64; M] {
+        match self {
+            Curve::Quadratic(_) => vector_of(|k| 0.5 * (to - from) * (slopes[0][k] + slopes[1][k])),
+            Curve::General(_) if from == to => [0.0; M],
+            Curve::General(general) => {
+                let (least, step) = (from.min(to) / general.width, (to - from) / general.width);
+                let way = general.polygon.part(least, step.abs()).chord();
+                vector_of(|k| way[k] * step.signum())
             }
         }
     }

@@ -329,7 +329,7 @@ fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {
 mod tests {
     use super::*;
     use crate::curve::Pieces;
-    use crate::{Sided, FEEDS};
+    use crate::FEEDS;
 
     /// Two pieces of degree 2 along X, with numbers that may be none.
     fn numbers(x: f64, weights: &[f64], width: f64) -> f64 {
@@ -351,22 +351,7 @@ mod tests {
             start_dwell: 0.0,
             dwell: &[0.0],
         };
-        let of_axes = Sided { positive: [1.0], negative: [1.0] };
-        let limits = Limits {
-            axes: 1,
-            velocity: of_axes,
-            acceleration: of_axes,
-            jerk: [1.0],
-            judges_jerk: false,
-            jump: [0.0],
-            jump_beyond: [0.0],
-            travel: [[f64::NEG_INFINITY, f64::INFINITY]],
-            feed_axes: [[1.0]; FEEDS],
-            chord_tolerance: f64::INFINITY,
-            period: 1e-3,
-            end_speeds: [0.0; 2],
-        };
-        audit_path(&path, None, &limits, &|_| ()).get(Check::Numbers, 0).ratio
+        audit_path(&path, None, &Limits::<1>::none(), &|_| ()).get(Check::Numbers, 0).ratio
     }
 
     #[test]

@@ -1,14 +1,16 @@
 //! The audits for 3, 6 and 9 axes, compiled here, so that crates that call them compile nothing. Axes beyond the machine's own
 //! rest and change nothing.
 
+use crate::columns::Axes;
 use crate::curve::Followed;
 use crate::deviation::{audit_deviation, audit_path};
+use crate::joints::columns::JointColumns;
 use crate::joints::plan::JointAudit;
-use crate::joints::profile::audit_joint_profile;
 use crate::joints::setpoints::JointSetpoints;
+use crate::joints::travel::audit_travel;
 use crate::moves::Programmed;
 use crate::phases::Phases;
-use crate::profile::audit_profile;
+use crate::profile::{audit_profile, Audited};
 use crate::setpoints::{Chunk, Stream};
 use crate::tracking::Plan;
 use crate::{Limits, Seen, Tally};
@@ -63,7 +65,8 @@ macro_rules! kernels {
                 phases: &Phases,
                 seen: Seen,
             ) -> Tally<$count> {
-                audit_profile(path, junction_speed, phases, self, seen)
+                let of = Audited { junction_speed, phases, limits: self, starts: &phases.starts(path) };
+                audit_profile(&of, &|| Box::new(Axes::new(path, self)), seen)
             }
 
             fn deviation(
@@ -89,7 +92,10 @@ macro_rules! kernels {
 
         impl JointKernels<$count> for JointAudit<'_, $count> {
             fn profile(&self, seen: Seen) -> Tally<$count> {
-                audit_joint_profile(self, seen)
+                let Self { phases, limits, starts, .. } = self;
+                let of = Audited { junction_speed: self.path.junction_speed, phases, limits, starts };
+                let found = audit_profile(&of, &|| Box::new(JointColumns::new(self)), seen);
+                found.merge(audit_travel(self))
             }
 
             fn begin(&self) -> JointSetpoints<$count> {

@@ -1,23 +1,26 @@
 //! The independent audit: samples what a plan claims and measures every limit by differences of its own.
 //!
 //! Nothing here comes from a planner, a fit or a sampler: positions are evaluated from the control points, times
-//! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
+//! follow from the law of each phase or are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `station`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. The
-//! profile: `phases`, `phase_order`, `phase_motion`, `phase_time`, `phase_by_length`, `speed_by_length`, `phase_jerk`, `peak`, `chord`, `profile`.
-//! Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Joints with a kinematics: `joints`. Other crates call `kernels`.
+//! The path: `vectors`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
+//! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics). The profile: `phases`, `phase_order`, `quadrature`,
+//! `phase_motion`, `speed_by_length`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
+//! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Other crates call `kernels`.
 
 mod against_plan;
 mod arc_slope;
 mod chord;
 mod close_places;
+mod columns;
 pub mod curve;
 mod deviation;
 mod differences;
 mod hodographs;
 pub mod joints;
 pub mod kernels;
+mod motion;
 pub mod moves;
 mod nearest;
 mod neighbours;
@@ -26,12 +29,12 @@ mod phase_by_length;
 mod phase_jerk;
 mod phase_motion;
 mod phase_order;
-mod phase_time;
 pub mod phases;
 mod polygon;
 mod profile;
 pub mod profile_clock;
 mod profile_reader;
+mod quadrature;
 mod rows;
 pub mod setpoints;
 mod speed_by_length;
@@ -357,11 +360,32 @@ impl<const M: usize> Limits<M> {
         std::array::from_fn(|k| self.feed_axes[feed][k] * of[k])
     }
 
-    /// The jump of one axis velocity that means nothing: over a servo period it adds no more than the pass mark
-    /// to the acceleration.
+    /// The jump of one axis velocity that means nothing: over this time it adds no more than the pass mark to the acceleration.
     #[inline]
-    pub fn negligible_jump(&self, axis: usize) -> f64 {
-        PASS_EXCESS * self.acceleration.least(axis) * self.period
+    pub fn negligible_jump(&self, axis: usize, time: f64) -> f64 {
+        PASS_EXCESS * self.acceleration.least(axis) * time
+    }
+}
+
+#[cfg(test)]
+impl<const M: usize> Limits<M> {
+    /// Nothing is limited.
+    fn none() -> Self {
+        let anything = Sided { positive: [f64::INFINITY; M], negative: [f64::INFINITY; M] };
+        Self {
+            axes: M,
+            velocity: anything,
+            acceleration: anything,
+            jerk: [f64::INFINITY; M],
+            judges_jerk: false,
+            jump: [0.0; M],
+            jump_beyond: [0.0; M],
+            travel: [[f64::NEG_INFINITY, f64::INFINITY]; M],
+            feed_axes: [[1.0; M]; FEEDS],
+            chord_tolerance: f64::INFINITY,
+            period: 1e-3,
+            end_speeds: [0.0; 2],
+        }
     }
 }
 

@@ -6,14 +6,11 @@
 use std::sync::Arc;
 
 use super::curve::Curve;
-use super::phase_time::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
+use super::quadrature::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
 use super::speed_by_length::{Bounds, Pace, SpeedByLength};
-use super::station::{Rounded, Station};
+use super::station::Station;
 use super::vectors::{inner, length, vector_of};
 use super::{EPS, ROUNDINGS};
-
-/// Halvings until a time is known as closely as its numbers.
-const MOST_STEPS: u32 = 53;
 
 /// An interval on which the rule is good: the distance of its start from the anchor and the length up to there, and the same of
 /// its middle.
@@ -137,50 +134,14 @@ impl<const M: usize> PhaseByLength<M> {
         }
     }
 
-    /// Whether an axis moves anywhere on the piece.
-    pub fn moves(&self, axis: usize) -> bool {
-        self.curve.derivative_size()[axis] > 0.0
-    }
-
     /// Whether the speed is constant.
     pub fn is_steady(&self) -> bool {
         matches!(self.speed, SpeedByLength::Constant { .. })
     }
 
-    /// Velocity of every axis at a place.
-    pub fn velocity(&self, place: &Place) -> [f64; M] {
-        let tangent = self.curve.derivative(place.u);
-        let size = length(&tangent);
-        vector_of(|k| if size > 0.0 { tangent[k] / size * place.pace.v } else { 0.0 })
-    }
-
-    /// The place as a station of the path; none where the piece has no direction.
-    pub fn station(&self, u: f64) -> Option<Station<M>> {
-        Station::new(&self.curve, u)
-    }
-
-    /// Acceleration of every axis at a place.
-    pub fn acceleration(&self, place: &Place) -> Option<Rounded<M>> {
-        self.station(place.u).map(|station| station.acceleration(place.pace))
-    }
-
     /// Time of the whole phase by its law.
     pub fn time(&self) -> f64 {
         self.speed.time(self.whole[1])
-    }
-
-    /// u at a time since the start of the phase.
-    pub fn place_at(&self, time: f64) -> f64 {
-        let [mut low, mut high] = self.u;
-        for _ in 0..MOST_STEPS {
-            let middle = 0.5 * (low + high);
-            if self.since(&self.place(middle)) < time {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        0.5 * (low + high)
     }
 
     /// What of the velocity of each axis may be rounding, for all that moves in the direction of the path by 1: where the length
@@ -261,7 +222,6 @@ mod tests {
             assert!((time - u).abs() < 1e-14 && (v - 3.0 * u * u).abs() < 1e-13, "{u}");
         }
         assert_eq!(phase.place(0.0).pace.v, 0.0);
-        assert!((phase.place_at(0.3) - 0.3).abs() < 1e-14);
     }
 
     #[test]
@@ -277,7 +237,7 @@ mod tests {
         let mut met = 0.0_f64;
         for (speed, anchored_at_end) in speeds.into_iter().flat_map(|speed| [(speed, false), (speed, true)]) {
             let phase = PhaseByLength::new(curve.clone(), [1.0; 2], [0.0, 5.0], anchored_at_end, 2.5, speed);
-            let at = |u: f64| (phase.place(u), phase.station(u).unwrap());
+            let at = |u: f64| (phase.place(u), Station::new(&curve, u).unwrap());
             for i in 0..20 {
                 let [from, to] = [i, i + 1].map(|i| 0.25 * f64::from(i));
                 let ((first, near), (last, far)) = (at(from), at(to));

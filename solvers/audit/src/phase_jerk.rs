@@ -4,6 +4,7 @@
 //! Where the path's curvature jumps A does so too, however smooth v is. A third difference of setpoints that lies half-way
 //! over such a step shows 3/4 of it over the period as a jerk: with more than the limit of that alone, setpoints break it.
 
+use super::columns::Columns;
 use super::phases::Phases;
 use super::speed_by_length::Pace;
 use super::station::Station;
@@ -43,15 +44,8 @@ impl<const M: usize> Jerks<'_, M> {
         tally.offer(Check::AccelerationContinuity, 0, a, self.negligible(0.0), time, line);
     }
 
-    /// The step of the acceleration from phase `i` to phase `j`, the next one in its run, by the `station` at u of a piece, if that
-    /// has a direction there.
-    pub fn joint(
-        &self,
-        [i, j]: [usize; 2],
-        mut station: impl FnMut(usize, f64) -> Option<Station<M>>,
-        line: i32,
-        tally: &mut Tally<M>,
-    ) {
+    /// The step of the acceleration from phase `i` to phase `j`, the next one in its run.
+    pub fn joint(&self, [i, j]: [usize; 2], columns: &mut dyn Columns<M>, line: i32, tally: &mut Tally<M>) {
         let (phases, limits, time) = (self.phases, self.limits, self.starts[j]);
         let (Some(before), Some(after)) =
             (phases.end_acceleration(i, true), phases.end_acceleration(j, false))
@@ -67,7 +61,7 @@ impl<const M: usize> Jerks<'_, M> {
         if if rests { before == 0.0 && after == 0.0 } else { pieces[0] == pieces[1] } {
             return;
         }
-        let ends = [station(pieces[0], phases.u1[i]), station(pieces[1], phases.u0[j])];
+        let ends = [columns.station(pieces[0], phases.u1[i]), columns.station(pieces[1], phases.u0[j])];
         let [Some(from), Some(to)] = ends else {
             // Without a direction an acceleration goes anywhere.
             for k in (0..limits.axes).filter(|_| rests) {

@@ -1,336 +1,321 @@
-//! The motion on one phase of a speed profile by its law p = N/D (`law`): velocities, and how well they are known.
+//! The motion on a phase whose p = u̇² is known by the parameter u: velocities of all columns, times, and how well both are known.
 //!
-//! Distances `d` are counted from the phase's *anchor*. Where an axis accelerates that is the end where the axis is slower:
-//! from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses no digits. In the other laws
-//! it is the end where p, or the speed, is smaller.
+//! | law | what it says |
+//! |---|---|
+//! | acceleration of column k | v_k² = v_k(anchor)² + 2 a Δq_k, u̇ = v_k / q'_k |
+//! | velocity of column k | the same with a = 0 |
+//! | parameter acceleration | p = p(anchor) + 2 s Δu |
+//! | feed of shares, speed line | v² linear in u, u̇ = v over the slope of the way that counts |
+//!
+//! The anchor of a phase is its slower end: from there both terms have one sign and lose no digits. While column k has a constant
+//! acceleration a way Δq_k takes 2 Δq_k over the sum of its speeds at both ends; where p is linear in u, Δu takes 2 Δu over the sum
+//! of √p; where v² is linear in u the slope of the way is integrated over the variable in which v is linear.
 
-mod law;
+use super::columns::{Columns, Place};
+use super::phases::{Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE};
+use super::quadrature::{integral, MOST_HALVINGS};
+use super::station::Rounded;
+use super::vectors::{from_to, inner, length, vector_of};
+use super::{EPS, ROUNDINGS};
 
-pub use law::{Law, Pole};
+/// Relative rounding of a speed or time after a few operations.
+pub const ROUNDING: f64 = 2.0 * ROUNDINGS * EPS;
 
-use super::polygon::Polygon;
-use super::vectors::{from_to, inner, length};
-use super::EPS;
+/// Where a greater part of a speed is uncertain, it is taken from the recorded p at the ends of the phase.
+const HIDDEN: f64 = 1e-3;
 
-/// Slopes of tangents are taken over this part of the phase.
-const BESIDE: f64 = 1e-6;
-/// Within this part of a phase of its anchor the slope of a tangent is that at the anchor.
-const NEXT_TO: f64 = 1e-3;
+/// Parts of a phase over which an acceleration near a place is taken: inside it, of the way to a turn, and at its ends.
+const NEAR: f64 = 5e-4;
+const OF_TURN: f64 = 0.01;
+const AT_END: f64 = 1e-6;
 
-/// No rule has a node nearer to the ends of its interval than this part of it.
-pub(super) const STEPPED_OVER: f64 = 0.02;
+#[derive(Clone, Copy, Debug)]
+enum Law {
+    /// The square of the velocity of column k at the anchor with its error, and 2 a.
+    Column { k: usize, start_sq: f64, error: f64, twice: f64 },
+    /// dp/du.
+    Parameter { slope: f64 },
+    /// v² at both ends of the phase.
+    Speed { speed_sq: [f64; 2] },
+}
 
-/// One phase, ready to be evaluated at any distance from its anchor.
-#[derive(Clone, Debug)]
+/// One phase, ready to be evaluated at any u of it.
+#[derive(Clone, Copy, Debug)]
 pub struct PhaseMotion<const M: usize> {
-    /// C' at the anchor, and C'' where it is the same everywhere.
-    pub(super) tangent: [f64; M],
-    pub(super) bend: [f64; M],
-    /// Of a piece that is not of degree 2.
-    general: Option<General<M>>,
-    pub(super) law: Law,
-    /// +1 where u grows from the anchor, −1 where it falls.
-    pub(super) direction: f64,
-    /// Length of the phase in u.
-    pub width: f64,
-    /// How many times as long its piece is. One rounding of an end of the phase is this many of its length.
-    grain: f64,
-    /// Recorded √p at the anchor and at the other end.
-    pub root_anchor: f64,
-    pub root_far: f64,
-    /// The same, or 1 where both are 0: what the integration variable is made for.
-    near: f64,
-    far: f64,
-    /// The distance at y is y (first_order + second_order y), and dt/dy the integrand times `time_scale`.
-    first_order: f64,
-    second_order: f64,
-    pub(super) time_scale: f64,
-    /// Whether the anchor is the end of the phase.
+    law: Law,
+    u: [f64; 2],
+    /// Recorded p at both ends.
+    p: [f64; 2],
+    /// Width of its piece.
+    whole: f64,
     pub anchored_at_end: bool,
-    pub(super) pole: Option<Pole>,
-    pub(super) layer: Option<Layer>,
-    /// What the axes count in the speed that is constant at the feed.
+    anchor: State<M>,
+    /// What the axes of the path count in a speed that is held.
     share: [f64; M],
 }
 
-/// Next to a slow anchor √p turns from its slope there to that of the whole phase.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Layer {
-    /// About how far it reaches, in y.
-    pub thickness: f64,
-    /// Share of √p that changes in it.
-    pub strength: f64,
-}
-
-#[derive(Clone, Debug)]
-struct General<const M: usize> {
-    whole: Box<Polygon<M>>,
-    ends: [f64; 2],
-    part: Box<Polygon<M>>,
-    size: [f64; M],
-}
-
-impl<const M: usize> General<M> {
-    /// Where the axis at its limit turns next to the anchor of a phase of this width (negative: backward), if it does.
-    fn pole(&self, law: &Law, tangent: &[f64; M], p_anchor: f64, width: f64) -> Option<Pole> {
-        let Law::Axis { .. } = law else { return None };
-        let beside = self.part.local(BESIDE).slope;
-        let bend = std::array::from_fn(|k| (beside[k] / width - tangent[k]) / (BESIDE * width));
-        law.pole(tangent, &bend, p_anchor).filter(|pole| pole.at.abs() < NEXT_TO * width.abs())
-    }
-}
-
-/// The piece under a phase.
-#[derive(Clone, Debug)]
-pub enum Shape<const M: usize> {
-    /// Degree 2: C' at the anchor, and C''.
-    Quadratic { tangent: [f64; M], bend: [f64; M] },
-    /// Any other: itself, with t at the anchor and at the other end; the part of it between them, from the anchor; and
-    /// what the rounding of C' is relative to.
-    General {
-        whole: Box<Polygon<M>>,
-        ends: [f64; 2],
-        part: Box<Polygon<M>>,
-        tangent: [f64; M],
-        size: [f64; M],
-    },
-}
-
-/// The motion at one place of a phase.
+/// The motion at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct State<const M: usize> {
-    /// Integration variable, 0 at the anchor and 1 at the other end.
-    pub y: f64,
-    /// C'.
-    pub tangent: [f64; M],
-    /// √p in mm/s (of parameter).
+    pub place: Place<M>,
+    /// u̇, and its relative error.
     pub root_p: f64,
-    /// Axis velocities in mm/s.
-    pub velocity: [f64; M],
-    /// What the rounding of each axis velocity is relative to, in mm/s.
-    pub magnitude: [f64; M],
+    pub doubt: f64,
+    /// The speed that the law is about, with its error.
+    speed: [f64; 2],
+    pub velocity: Rounded<M>,
+}
+
+impl<const M: usize> State<M> {
+    /// By √p alone.
+    pub fn new(place: Place<M>, root_p: f64, doubt: f64) -> Self {
+        let value: [f64; M] = vector_of(|k| place.slope.value[k] * root_p);
+        let of = |k: usize| if value[k] == 0.0 { 0.0 } else { value[k].abs() * (doubt + ROUNDING) };
+        // At rest nothing moves, also where nothing is known of a slope.
+        let by_slope = |k: usize| if root_p == 0.0 { 0.0 } else { place.slope.rounding[k] * root_p };
+        let rounding = vector_of(|k| by_slope(k) + of(k));
+        Self { place, root_p, doubt, speed: [0.0; 2], velocity: Rounded { value, rounding } }
+    }
+
+    /// The speed of the tool that feeds limit, and its error.
+    pub fn tip(&self) -> [f64; 2] {
+        let [slope, error] = self.place.tip_slope;
+        [slope * self.root_p, (error + slope * (self.doubt + ROUNDING)) * self.root_p]
+    }
 }
 
 impl<const M: usize> PhaseMotion<M> {
-    /// `widths` are those of the phase and of its piece; `p` the recorded values at the anchor and at the other end; `share` is
-    /// what the axes count in a feed.
-    pub fn new(
-        law: Law,
-        shape: Shape<M>,
-        widths: [f64; 2],
-        p: [f64; 2],
-        anchored_at_end: bool,
-        share: &[f64; M],
-    ) -> Self {
-        let [width, whole] = widths;
-        let direction = if anchored_at_end { -1.0 } else { 1.0 };
-        let (tangent, bend, general) = match shape {
-            Shape::Quadratic { tangent, bend } => (tangent, bend, None),
-            Shape::General { whole, ends, part, tangent, size } => {
-                (tangent, [0.0; M], Some(General { whole, ends, part, size }))
-            }
+    /// Phase `i`, whose numbers must be good.
+    pub fn new(phases: &Phases, i: usize, columns: &mut dyn Columns<M>) -> Self {
+        let (piece, kind, k) = (phases.piece[i] as usize, phases.kind[i], phases.axis[i] as usize);
+        let (u, p, value) = ([phases.u0[i], phases.u1[i]], [phases.p0[i], phases.p1[i]], phases.value[i]);
+        let share = if kind == FEED { phases.counted(i) } else { [1.0; M] };
+        let ends = u.map(|u| columns.place(piece, u));
+        let by_slope = |end: usize, slope: f64| slope * slope * p[end];
+        let speed_sq: [f64; 2] = match kind {
+            AXIS_ACCELERATION | AXIS_VELOCITY => [0, 1].map(|end| by_slope(end, ends[end].slope.value[k])),
+            PARAMETER_ACCELERATION => p,
+            _ => [0, 1].map(|end| by_slope(end, columns.held_slope(piece, u[end], &share))),
         };
-        let [root_anchor, root_far] = p.map(f64::sqrt);
-        // Where both are 0 the ramps at both ends are too short to be phases, and the law alone tells the speed.
-        let rests = root_anchor + root_far == 0.0;
-        let [near, far] = if rests { [1.0; 2] } else { [root_anchor, root_far] };
-        let part = width / (near + far);
-        let share = if matches!(law, Law::Speed { .. }) { *share } else { [1.0; M] };
-        let counted = |of: &[f64; M]| std::array::from_fn(|k| share[k] * of[k]);
-        Self {
-            tangent,
-            bend,
-            law,
-            pole: match &general {
-                None => law.pole::<M>(&counted(&tangent), &counted(&bend), p[0]),
-                Some(general) => general.pole(&law, &tangent, p[0], direction * width),
-            },
-            layer: Layer::new(&law, &tangent, [near, far], width),
-            general,
-            direction,
-            width,
-            grain: whole / width,
-            root_anchor,
-            root_far,
-            near,
-            far,
-            first_order: direction * part * 2.0 * near,
-            second_order: direction * part * (far - near),
-            time_scale: 2.0 * part,
-            anchored_at_end,
-            share,
-        }
-    }
-
-    /// Distance from the anchor, with its sign, at `y`.
-    #[inline(always)]
-    pub(super) fn distance(&self, y: f64) -> f64 {
-        y * (self.first_order + self.second_order * y)
-    }
-
-    /// The `y` of a distance `from_anchor` ≥ 0.
-    pub fn y_at(&self, from_anchor: f64) -> f64 {
-        if from_anchor <= 0.0 {
-            return 0.0;
-        }
-        let change = self.far - self.near;
-        let c = (self.near + self.far) * (from_anchor / self.width).min(1.0);
-        (c / (self.near + (self.near * self.near + change * c).max(0.0).sqrt())).min(1.0)
-    }
-
-    /// √p at `y` if p were linear.
-    #[inline(always)]
-    pub(super) fn linear(&self, y: f64) -> f64 {
-        self.near + (self.far - self.near) * y
-    }
-
-    /// Whether the piece is not of degree 2.
-    #[inline(always)]
-    pub(super) fn is_general(&self) -> bool {
-        self.general.is_some()
-    }
-
-    /// What of C' counts in the speed that the law is about.
-    #[inline(always)]
-    fn counted(&self, tangent: &[f64; M]) -> [f64; M] {
-        std::array::from_fn(|k| self.share[k] * tangent[k])
-    }
-
-    /// √p at the signed distance `d` from the anchor, where C' is `tangent`, on a piece of degree 2.
-    #[inline(always)]
-    pub(super) fn root_p(&self, d: f64, tangent: &[f64; M]) -> f64 {
-        match self.law {
-            Law::Axis { axis, value, start_sq } => {
-                // 2 (q_k − q_k(anchor)) = d (q'_k(anchor) + q'_k), the trapezoid.
-                let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent[axis]);
-                speed_sq.sqrt() / tangent[axis].abs()
+        let is_free = matches!(kind, AXIS_ACCELERATION | PARAMETER_ACCELERATION | SPEED_LINE);
+        let anchored_at_end = is_free && (speed_sq[1] < speed_sq[0] || !speed_sq[0].is_finite());
+        let side = usize::from(anchored_at_end);
+        let (place, root_p) = (ends[side], p[side].sqrt());
+        let law = match kind {
+            AXIS_ACCELERATION => {
+                let (start_sq, twice) = (speed_sq[side], 2.0 * value);
+                Law::Column {
+                    k,
+                    start_sq,
+                    error: 2.0 * start_sq.sqrt() * place.slope.rounding[k] * root_p,
+                    twice,
+                }
             }
-            _ => self.root_p_by_speed(d, tangent),
-        }
-    }
-
-    /// The same of the laws that need no way.
-    #[inline(always)]
-    fn root_p_by_speed(&self, d: f64, tangent: &[f64; M]) -> f64 {
-        match self.law {
-            Law::Axis { .. } => f64::NAN,
-            Law::Parameter { start, slope } => (start + slope * d).sqrt(),
-            Law::Speed { start_sq, change_sq } => {
-                (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(&self.counted(tangent))
-            }
-        }
-    }
-
-    /// C' and √p at the signed distance `d` on a piece of any degree.
-    #[inline(never)]
-    fn on_general(&self, general: &General<M>, d: f64) -> ([f64; M], f64) {
-        let local = general.part.local((d / self.width).abs().min(1.0));
-        let scale = self.direction / self.width;
-        let tangent = local.slope.map(|slope| scale * slope);
-        let root_p = match self.law {
-            Law::Axis { axis, value, start_sq } => {
-                (start_sq + 2.0 * value * local.way[axis]).sqrt() / tangent[axis].abs()
-            }
-            _ => self.root_p_by_speed(d, &tangent),
+            AXIS_VELOCITY => Law::Column { k, start_sq: value, error: 0.0, twice: 0.0 },
+            PARAMETER_ACCELERATION => Law::Parameter { slope: 2.0 * value },
+            SPEED_LINE => Law::Speed { speed_sq },
+            _ => Law::Speed { speed_sq: [value; 2] },
         };
-        (tangent, root_p)
+        let whole = columns.path().width[piece];
+        let anchor = State::new(place, root_p, ROUNDING);
+        let mut motion = Self { law, u, p, whole, anchored_at_end, anchor, share };
+        let by_law = motion.state(place, columns);
+        // Where a column accelerates the recorded p stands for itself at the anchor, also where the column stands.
+        motion.anchor =
+            if kind == AXIS_ACCELERATION { State { speed: by_law.speed, ..anchor } } else { by_law };
+        motion
     }
 
-    /// C' and √p at the signed distance `d` from the anchor.
-    #[inline(always)]
-    fn at(&self, d: f64) -> ([f64; M], f64) {
-        match &self.general {
-            None => {
-                let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
-                (tangent, self.root_p(d, &tangent))
+    fn width(&self) -> f64 {
+        self.u[1] - self.u[0]
+    }
+
+    /// What of a time or a way from the anchor may be rounding: mostly that of the ends of the phase.
+    fn rounding(&self) -> f64 {
+        ROUNDING * (1.0 + self.whole / self.width())
+    }
+
+    /// √p at the anchor and at the other end, or 1 where both are 0.
+    fn roots(&self) -> [f64; 2] {
+        let mut roots = self.p.map(f64::sqrt);
+        if self.anchored_at_end {
+            roots.reverse();
+        }
+        if roots == [0.0; 2] {
+            [1.0; 2]
+        } else {
+            roots
+        }
+    }
+
+    /// u at the share y of a variable in which √p is linear where p is linear in u: 0 at the anchor, 1 at the other end.
+    pub fn parameter(&self, y: f64) -> f64 {
+        let [near, far] = self.roots();
+        let share = y * (2.0 * near + (far - near) * y) / (near + far);
+        match (self.anchored_at_end, y >= 1.0) {
+            (false, true) => self.u[1],
+            (true, true) => self.u[0],
+            (false, _) => self.u[0] + self.width() * share,
+            (true, _) => self.u[1] - self.width() * share,
+        }
+    }
+
+    /// The y of a share of the width, counted from the anchor.
+    pub fn variable(&self, share: f64) -> f64 {
+        let [near, far] = self.roots();
+        let c = (near + far) * share;
+        c / (near + (near * near + (far - near) * c).max(0.0).sqrt())
+    }
+
+    /// The motion at u.
+    pub fn at(&self, u: f64, columns: &mut dyn Columns<M>) -> State<M> {
+        if u == self.anchor.place.u {
+            return self.anchor;
+        }
+        let place = columns.place(self.anchor.place.piece, u);
+        self.state(place, columns)
+    }
+
+    fn state(&self, place: Place<M>, columns: &mut dyn Columns<M>) -> State<M> {
+        match self.law {
+            Law::Column { k, start_sq, error, twice } => {
+                let (mut speed_sq, mut error_sq) = (start_sq, 0.0);
+                if twice != 0.0 {
+                    let way = columns.way(&self.anchor.place, &place);
+                    let gained = twice * way.value[k];
+                    speed_sq += gained;
+                    error_sq = error + twice.abs() * way.rounding[k] + self.rounding() * gained.abs();
+                }
+                if -error_sq <= speed_sq && speed_sq < 0.0 {
+                    speed_sq = 0.0;
+                }
+                let speed = speed_sq.sqrt();
+                let hidden = if error_sq > 0.0 { error_sq / (speed + error_sq.sqrt()) } else { 0.0 };
+                let (slope, unknown) = (place.slope.value[k], hidden + ROUNDING * speed);
+                let [root_p, doubt] = self.known(
+                    place.u,
+                    [speed / slope.abs(), unknown / speed + place.slope.rounding[k] / slope.abs()],
+                );
+                let mut state = State::new(place, root_p, doubt);
+                state.speed = [speed, unknown];
+                // The law tells it better than the slope does.
+                let sign = if slope == 0.0 { 0.0 } else { slope.signum() };
+                (state.velocity.value[k], state.velocity.rounding[k]) = (sign * speed, unknown);
+                state
             }
-            Some(general) => self.on_general(general, d),
+            Law::Parameter { slope } => {
+                let start = self.anchor.root_p * self.anchor.root_p;
+                let p = start + slope * (place.u - self.anchor.place.u);
+                let gained = (1.0 - start / p).max(0.0);
+                State::new(place, p.sqrt(), ROUNDING + 0.5 * gained * self.rounding())
+            }
+            Law::Speed { .. } => {
+                let slope = columns.held_slope(place.piece, place.u, &self.share);
+                let speed = self.held(place.u);
+                let mut state = State::new(place, speed / slope, ROUNDING + place.tip_slope[1] / slope);
+                state.speed = [speed, ROUNDING * speed];
+                state
+            }
         }
     }
 
-    /// √p at the signed distance `d` from the anchor.
-    #[inline(always)]
-    pub(super) fn root_p_at(&self, d: f64) -> f64 {
-        self.at(d).1
+    /// The speed that is held at u.
+    fn held(&self, u: f64) -> f64 {
+        let Law::Speed { speed_sq: [from, to] } = self.law else { return f64::NAN };
+        let share = ((u - self.u[0]) / self.width()).clamp(0.0, 1.0);
+        (from + (to - from) * share).sqrt()
     }
 
-    /// Distance from the anchor, C' and √p at `y`.
-    #[inline(always)]
-    fn place(&self, y: f64) -> (f64, [f64; M], f64) {
-        let d = self.distance(y);
-        let (tangent, root_p) = self.at(d);
-        (d, tangent, if self.keeps_recorded(y) { self.root_anchor } else { root_p })
-    }
-
-    /// At the anchor of an accelerating phase the recorded p stands for itself, also where C'_k is 0.
-    #[inline(always)]
-    fn keeps_recorded(&self, y: f64) -> bool {
-        y == 0.0 && matches!(self.law, Law::Axis { .. })
-    }
-
-    /// Axis velocities at `y` in mm/s.
-    #[inline]
-    pub fn velocity(&self, y: f64) -> [f64; M] {
-        let (_, tangent, root_p) = self.place(y);
-        tangent.map(|g| g * root_p)
-    }
-
-    /// About how far from `y` the phase's axis turns round, or the path where the speed along it is given: p changes fast
-    /// there, on a piece that has no pole. By the tangent and its slope.
-    pub(super) fn way_to_turn(&self, y: f64) -> f64 {
-        if self.general.is_none() {
-            return f64::INFINITY;
+    /// √p and its relative error. Where rounding hides the motion of the column p is taken from its recorded ends, if it is nearly
+    /// constant.
+    fn known(&self, u: f64, by_law: [f64; 2]) -> [f64; 2] {
+        let [from, to] = self.p;
+        let other = 0.5 * (to - from).abs() / from.max(to) + ROUNDING;
+        if by_law[1] <= HIDDEN || other.is_nan() || other >= HIDDEN {
+            return by_law;
         }
-        let beside = if y < 0.5 { y + BESIDE } else { y - BESIDE };
-        let [here, there] = [y, beside].map(|y| self.distance(y));
-        let (tangent, next) = (self.at(here).0, self.at(there).0);
-        let change = from_to(&tangent, &next);
+        [(from + (to - from) * ((u - self.u[0]) / self.width())).sqrt(), other]
+    }
+
+    /// The time between two states, and its relative error.
+    pub fn time(&self, [a, b]: [&State<M>; 2], columns: &mut dyn Columns<M>) -> [f64; 2] {
+        let step = (b.place.u - a.place.u).abs();
+        if step == 0.0 {
+            return [0.0; 2];
+        }
+        let (rounding, both) = (self.rounding(), a.root_p + b.root_p);
+        match self.law {
+            Law::Column { k, twice, .. } => {
+                let way = columns.way(&a.place, &b.place);
+                let (sum, errors) = (a.speed[0] + b.speed[0], a.speed[1] + b.speed[1]);
+                let by_way = way.value[k].abs();
+                let mut found = [2.0 * by_way / sum, rounding + way.rounding[k] / by_way + errors / sum];
+                // The change of the speed over the acceleration, where that has the smaller error.
+                let change = (b.speed[0] - a.speed[0]).abs();
+                if twice != 0.0 && errors / change < found[1] {
+                    found = [2.0 * change / twice.abs(), errors / change];
+                }
+                // Where the ways are all rounding, the step of the parameter over the mean √p.
+                let uneven = rounding + (b.root_p - a.root_p).abs() / both + 0.5 * (a.doubt + b.doubt);
+                if found[1].is_nan() || (found[1] > HIDDEN && uneven < found[1]) {
+                    found = [2.0 * step / both, uneven];
+                }
+                found
+            }
+            Law::Parameter { .. } => [2.0 * step / both, rounding],
+            Law::Speed { .. } => {
+                let [near, far] = [a, b].map(|state| self.held(state.place.u));
+                let (u, way) = (a.place.u, b.place.u - a.place.u);
+                let mut slope = |y: f64| {
+                    let u = u + way * y * (2.0 * near + (far - near) * y) / (near + far);
+                    columns.held_slope(a.place.piece, u, &self.share)
+                };
+                let whole = integral(&mut slope, 0.0, 1.0, &mut { MOST_HALVINGS });
+                [2.0 * step / (near + far) * whole, rounding]
+            }
+        }
+    }
+
+    /// Time since the start of the phase, which takes `duration`, and its error in s.
+    pub fn since(&self, here: &State<M>, duration: f64, columns: &mut dyn Columns<M>) -> [f64; 2] {
+        let [time, doubt] = self.time([&self.anchor, here], columns);
+        [if self.anchored_at_end { duration - time } else { time }, time * doubt]
+    }
+
+    /// Accelerations near u as a difference quotient over a small part of the phase, less where p changes fast.
+    pub fn acceleration_near(&self, u: f64, columns: &mut dyn Columns<M>) -> Rounded<M> {
+        let beside = (u - self.u[0]).min(self.u[1] - u);
+        let half = f64::min(NEAR * self.width(), OF_TURN * self.way_to_turn(u, columns));
+        let half = half.min(beside.max(AT_END * self.width()));
+        let [from, to] = [(u - half).max(self.u[0]), (u + half).min(self.u[1])].map(|u| self.at(u, columns));
+        let [time, doubt] = self.time([&from, &to], columns);
+        let change = from_to(&from.velocity.value, &to.velocity.value);
+        Rounded {
+            value: vector_of(|k| change[k] / time),
+            rounding: vector_of(|k| {
+                (from.velocity.rounding[k] + to.velocity.rounding[k] + change[k].abs() * doubt) / time
+            }),
+        }
+    }
+
+    /// About how far from u the column of the law turns round, or the path where the speed along it is given: p changes fast there.
+    fn way_to_turn(&self, u: f64, columns: &mut dyn Columns<M>) -> f64 {
+        let inwards = if u < 0.5 * (self.u[0] + self.u[1]) { AT_END } else { -AT_END };
+        let step = inwards * self.width();
+        let [here, there] = [u, u + step].map(|u| columns.place(self.anchor.place.piece, u).slope.value);
+        let change = from_to(&here, &there);
         let share = match self.law {
-            Law::Axis { axis, .. } => tangent[axis] / change[axis],
-            _ => length(&tangent) / length(&change),
+            Law::Column { k, .. } => here[k] / change[k],
+            Law::Parameter { .. } => f64::INFINITY,
+            Law::Speed { .. } => length(&here) / length(&change),
         };
-        (share * (there - here)).abs()
+        (share * step).abs()
     }
 
-    /// The motion at `y`.
-    #[inline]
-    pub fn state(&self, y: f64) -> State<M> {
-        let (d, tangent, root_p) = self.place(y);
-        let velocity = tangent.map(|g| g * root_p);
-        let terms: [f64; M] = match &self.general {
-            None => std::array::from_fn(|k| self.tangent[k].abs() + (d * self.bend[k]).abs()),
-            Some(general) => general.size,
-        };
-        // How much the rounding of C' is enlarged in p, and that of the way in the square of a speed that grows with it.
-        let enlarged = match self.law {
-            Law::Axis { axis, start_sq, .. } if !self.keeps_recorded(y) => {
-                let gained = (1.0 - start_sq / velocity[axis].powi(2)).max(0.0);
-                terms[axis] / tangent[axis].abs() + 0.5 * gained * self.grain
-            }
-            Law::Speed { start_sq, .. } => {
-                let counted = self.counted(&velocity);
-                let gained = (1.0 - start_sq / inner(&counted, &counted)).max(0.0);
-                length(&self.counted(&terms)) / length(&self.counted(&tangent)) + 0.5 * gained * self.grain
-            }
-            Law::Parameter { start, .. } => 1.0 + 0.5 * (1.0 - start / root_p.powi(2)).max(0.0) * self.grain,
-            _ => 1.0,
-        };
-        let magnitude = std::array::from_fn(|k| {
-            terms[k] * root_p + if velocity[k] == 0.0 { 0.0 } else { velocity[k].abs() * enlarged }
-        });
-        State { y, tangent, root_p, velocity, magnitude }
-    }
-
-    /// The local parameter of the piece at `y` on a phase from `u0` to `u1`.
-    pub fn parameter(&self, y: f64, [u0, u1]: [f64; 2]) -> f64 {
-        let d = self.distance(y);
-        (if self.anchored_at_end { u1 + d } else { u0 + d }).clamp(u0, u1)
-    }
-
-    /// The axis whose acceleration the law holds constant.
-    pub fn held_axis(&self) -> Option<usize> {
+    /// The column that the law is about.
+    pub fn held_column(&self) -> Option<usize> {
         match self.law {
-            Law::Axis { axis, .. } => Some(axis),
+            Law::Column { k, .. } => Some(k),
             _ => None,
         }
     }
@@ -338,41 +323,10 @@ impl<const M: usize> PhaseMotion<M> {
     /// Whether the accelerations can have a maximum inside the phase: on slides along a velocity limit.
     pub fn is_slide(&self) -> bool {
         match self.law {
-            Law::Axis { value, .. } => value == 0.0,
+            Law::Column { twice, .. } => twice == 0.0,
             Law::Parameter { .. } => false,
             Law::Speed { .. } => true,
         }
-    }
-
-    /// Curvature of the path in 1/mm at a state; 0 where the path has no direction.
-    #[inline]
-    pub fn curvature(&self, state: &State<M>) -> f64 {
-        match &self.general {
-            None => curvature(&state.tangent, &self.bend),
-            // Of the whole piece: on a short part nothing is left of the turn from step to step.
-            Some(General { whole, ends, .. }) => {
-                let share = (self.distance(state.y) / self.width).abs().min(1.0);
-                whole.curvature((ends[0] + share * (ends[1] - ends[0])).clamp(0.0, 1.0))
-            }
-        }
-    }
-
-    /// What one rounding of an end of the phase is of its width.
-    pub fn width_rounding(&self) -> f64 {
-        EPS * self.grain
-    }
-}
-
-impl Layer {
-    /// On a phase of constant axis acceleration that the rules could step over it, with √p at both ends.
-    fn new<const M: usize>(law: &Law, tangent: &[f64; M], [near, far]: [f64; 2], width: f64) -> Option<Self> {
-        let Law::Axis { axis, value, .. } = *law else { return None };
-        if near <= 0.0 || near >= STEPPED_OVER * far {
-            return None;
-        }
-        // p' at the anchor beside its mean.
-        let steeper = 2.0 * value.abs() * width / (tangent[axis].abs() * far * far);
-        Some(Self { thickness: near / far, strength: (1.0 - 1.0 / steeper.sqrt()).abs() })
     }
 }
 
@@ -391,7 +345,151 @@ pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::Quadratic;
+    use crate::columns::Axes;
+    use crate::curve::{Followed, Pieces, Quadratic};
+    use crate::Limits;
+
+    /// One phase on one piece in X and Y, and what it is on.
+    struct Phase<'a> {
+        columns: Axes<'a, 2>,
+        motion: PhaseMotion<2>,
+        u: [f64; 2],
+    }
+
+    impl Phase<'_> {
+        /// Calls `check` with a phase of this kind, axis and value between two u with these p, on a piece.
+        fn check(
+            (kind, axis, value): (u8, u8, f64),
+            [u, p]: [[f64; 2]; 2],
+            (points, weights, width): (&[[f64; 2]], &[f64], f64),
+            check: impl FnOnce(&mut Phase),
+        ) {
+            let (control, offsets, width) = (points.concat(), [0, points.len()], [width]);
+            let pieces =
+                Pieces { axes: 2, stride: 2, control: &control, weights, offsets: &offsets, width: &width };
+            let path = Followed {
+                pieces,
+                feed: &[],
+                line: &[1],
+                moves: &[0, 0],
+                tolerance: &[0.0],
+                runs: &[0, 1],
+                new_words: &[false],
+                start_dwell: 0.0,
+                dwell: &[0.0],
+            };
+            let phases = Phases {
+                piece: &[0],
+                kind: &[kind],
+                axis: &[axis],
+                value: &[value],
+                u0: &u[..1],
+                u1: &u[1..],
+                p0: &p[..1],
+                p1: &p[1..],
+                duration: &[1.0],
+                a0: &[0.0],
+                a1: &[0.0],
+                share: &[],
+                pieces: 1,
+                runs: &[0, 1],
+            };
+            let limits = Limits::none();
+            let mut columns = Axes::new(&path, &limits);
+            let motion = PhaseMotion::new(&phases, 0, &mut columns);
+            check(&mut Phase { columns, motion, u });
+        }
+
+        fn at(&mut self, u: f64) -> State<2> {
+            self.motion.at(u, &mut self.columns)
+        }
+
+        fn time(&mut self, from: f64, to: f64) -> f64 {
+            let [a, b] = [from, to].map(|u| self.at(u));
+            self.motion.time([&a, &b], &mut self.columns)[0]
+        }
+
+        fn total(&mut self) -> f64 {
+            let [from, to] = self.u;
+            self.time(from, to)
+        }
+    }
+
+    type Piece = (&'static [[f64; 2]], &'static [f64], f64);
+
+    const LINE: Piece = (&[[0.0, 0.0], [4.0, 3.0], [8.0, 6.0]], &[], 10.0);
+
+    #[test]
+    fn from_rest_along_a_line_takes_the_schoolbook_time() {
+        // X at 8 mm/s² over 8 mm: t = √(2 · 8 / 8).
+        Phase::check((0, 0, 8.0), [[0.0, 10.0], [0.0, 200.0]], LINE, |phase| {
+            assert!((phase.total() - 2.0_f64.sqrt()).abs() < 1e-14);
+            assert!((phase.at(10.0).velocity.value[0] - 128.0_f64.sqrt()).abs() < 1e-13);
+            assert!((phase.time(0.0, 2.5) - 0.5 * 2.0_f64.sqrt()).abs() < 1e-14);
+            assert_eq!([0.0, 1.0].map(|y| phase.motion.parameter(y)), [0.0, 10.0]);
+            assert!((phase.motion.parameter(0.5) - 2.5).abs() < 1e-14);
+            assert!((phase.motion.variable(0.25) - 0.5).abs() < 1e-14);
+        });
+        Phase::check((0, 0, -8.0), [[0.0, 10.0], [200.0, 0.0]], LINE, |phase| {
+            assert!(phase.motion.anchored_at_end);
+            assert!((phase.total() - 2.0_f64.sqrt()).abs() < 1e-14);
+        });
+    }
+
+    #[test]
+    fn an_axis_at_constant_acceleration_takes_its_change_of_velocity_over_it() {
+        // A bend from 45 degrees to nearly straight up, as a parabola and as the same piece of degree 3: q'_x falls by a factor of 100.
+        const ROWS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 1.0], [1.01, 2.0]];
+        const CUBIC: [[f64; 2]; 4] =
+            [[0.0, 0.0], [2.0 / 3.0, 2.0 / 3.0], [3.01 / 3.0, 4.0 / 3.0], [1.01, 2.0]];
+        let curve = Quadratic::new(&ROWS, 2.0);
+        let (g0, g1) = (curve.derivative(0.0)[0], curve.derivative(2.0)[0]);
+        let (p0, value) = (9.0, 3.0);
+        let p1 = (g0 * g0 * p0 + 2.0 * value * 1.01) / (g1 * g1);
+        let exact = (g1 * p1.sqrt() - g0 * p0.sqrt()) / value;
+        for rows in [&ROWS[..], &CUBIC] {
+            Phase::check((0, 0, value), [[0.0, 2.0], [p0, p1]], (rows, &[], 2.0), |phase| {
+                assert!((phase.total() / exact - 1.0).abs() < 1e-13);
+                let velocity = phase.at(2.0).velocity;
+                assert!((velocity.value[0] - g1 * p1.sqrt()).abs() < 1e-13);
+                // The times of both halves are those of the whole.
+                assert!((phase.time(0.0, 1.3) + phase.time(1.3, 2.0) - exact).abs() < 1e-13);
+            });
+        }
+    }
+
+    #[test]
+    fn next_to_a_turn_of_its_axis_on_a_conic_the_acceleration_is_that_of_the_place() {
+        // Y turns 6e-4 mm before the phase begins; the acceleration of X there by exact arithmetic.
+        let points = [[3.33400833, -245.33330009], [4.66993226, -245.33369929], [5.18118385, -246.56792565]];
+        let weights = [1.0, 0.831_556_127_752_042_9, 1.0];
+        let p = [1000.311668347934, 1001.67845];
+        let conic = (&points[..], &weights[..], 2.22179155091747);
+        Phase::check((0, 1, -500.0), [[0.0, 1.47142088], p], conic, |phase| {
+            let acceleration = phase.motion.acceleration_near(0.000787988, &mut phase.columns);
+            assert!((acceleration.value[0] + 40.3678).abs() < 0.05, "{acceleration:?}");
+            assert!((acceleration.value[1] + 500.0).abs() < 1e-3, "{acceleration:?}");
+        });
+    }
+
+    #[test]
+    fn a_slide_at_constant_speed_takes_length_over_speed() {
+        // Along y = x²/2 from x = −1 to 1; from rest to 3 mm/s with v² linear in u it takes ∫ |C'| du / v.
+        let parabola: Piece = (&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], &[], 2.0);
+        let arc_length = 2.0_f64.sqrt() + 1.0_f64.asinh();
+        let p = [4.5; 2];
+        Phase::check((2, 255, 9.0), [[0.0, 2.0], p], parabola, |phase| {
+            assert!((phase.total() - arc_length / 3.0).abs() < 1e-11);
+        });
+        // u = 2 y², v = 3 y: the time is ∫ 4/3 √(1 + (2 y² − 1)²) dy.
+        Phase::check((4, 255, 0.0), [[0.0, 2.0], [0.0, 4.5]], parabola, |phase| {
+            let exact: f64 = (0..20_000)
+                .map(|i| (f64::from(i) + 0.5) / 20_000.0)
+                .map(|y| 4.0 / 3.0 * (1.0 + (2.0 * y * y - 1.0_f64).powi(2)).sqrt() / 20_000.0)
+                .sum();
+            assert!((phase.total() - exact).abs() < 1e-8, "{}", phase.total());
+        });
+    }
 
     #[test]
     fn a_parabola_is_most_curved_at_its_tip() {

@@ -27,7 +27,7 @@ impl PhaseOrder<'_> {
             || phases.runs.last().is_some_and(|&last| last != phases.len() as i64)
             || phases.runs.windows(2).any(|pair| pair[0] > pair[1])
         {
-            tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, self.line(0));
+            tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, self.path.line_of(0));
             return false;
         }
         for (runs, pieces) in phases.runs.windows(2).zip(path.runs.windows(2)) {
@@ -44,7 +44,14 @@ impl PhaseOrder<'_> {
                 }
                 let gap = if entered == next.piece { (phases.u0[i] - next.u).abs() } else { f64::INFINITY };
                 let slack = ROUNDINGS * EPS * path.width[entered];
-                tally.offer(Check::Order, 0, gap - slack, GAP_TOLERANCE, starts[i], self.line(entered));
+                tally.offer(
+                    Check::Order,
+                    0,
+                    gap - slack,
+                    GAP_TOLERANCE,
+                    starts[i],
+                    self.path.line_of(entered),
+                );
                 next.u = phases.u1[i];
             }
             let time = here.end.checked_sub(1).map_or(0.0, |i| starts[i] + phases.duration[i]);
@@ -59,13 +66,16 @@ impl PhaseOrder<'_> {
             let left = self.path.width[next.piece] - next.u;
             if !self.path.is_motionless(next.piece) {
                 let slack = ROUNDINGS * EPS * self.path.width[next.piece];
-                tally.offer(Check::Order, 0, left - slack, GAP_TOLERANCE, time, self.line(next.piece));
+                tally.offer(
+                    Check::Order,
+                    0,
+                    left - slack,
+                    GAP_TOLERANCE,
+                    time,
+                    self.path.line_of(next.piece),
+                );
             }
             *next = Next { piece: next.piece + 1, u: 0.0 };
         }
-    }
-
-    fn line(&self, piece: usize) -> i32 {
-        self.path.line.get(piece).copied().unwrap_or(0)
     }
 }

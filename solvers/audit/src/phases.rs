@@ -1,12 +1,9 @@
 //! The phases of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
-use std::sync::Arc;
-
-use super::curve::{Curve, Followed};
+use super::columns::Columns;
+use super::curve::Followed;
 use super::phase_by_length::PhaseByLength;
-use super::phase_motion::{Law, PhaseMotion, Shape};
 use super::speed_by_length::{Pace, SpeedByLength};
-use super::vectors::inner;
 use super::{EPS, ROUNDINGS};
 
 /// The profile's arrays, one entry a phase; see `feedplan.profile.SpeedProfile`.
@@ -43,11 +40,6 @@ pub const AXIS_VELOCITY: u8 = 3;
 pub const SPEED_LINE: u8 = 4;
 pub const PATH_JERK: u8 = 5;
 pub const SPEED_CUBIC: u8 = 6;
-
-/// Whether the speed follows from the length of the path.
-pub fn is_by_length(kind: u8) -> bool {
-    matches!(kind, PATH_JERK | SPEED_CUBIC)
-}
 
 impl Phases<'_> {
     /// Number of phases.
@@ -100,24 +92,31 @@ impl Phases<'_> {
             && self.p0[i] >= 0.0
             && self.p1[i] >= 0.0
             && self.duration[i] >= 0.0
-            && (is_by_length(self.kind[i]) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
+            && (matches!(self.kind[i], PATH_JERK | SPEED_CUBIC) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
     }
 
-    /// Phase `i` on its piece, where its speed is known by the length of the path, in which each axis counts by its `scale` and
-    /// which has this `slope` at a parameter; its numbers must be good.
+    /// Whether the speed on phase `i` is known by the length of the path.
+    pub fn is_by_length<const M: usize>(&self, i: usize, columns: &dyn Columns<M>) -> bool {
+        let kind = self.kind[i];
+        matches!(kind, PATH_JERK | SPEED_CUBIC)
+            || (kind == FEED && columns.are_axes() && self.counted::<M>(i) == [1.0; M])
+    }
+
+    /// Phase `i` on its piece, where its speed is known by the length of the path; its numbers must be good.
     pub fn by_length<const M: usize>(
         &self,
         i: usize,
-        curve: &Arc<Curve<M>>,
-        scale: &[f64; M],
-        mut slope: impl FnMut(f64) -> f64,
+        columns: &mut dyn Columns<M>,
     ) -> Option<PhaseByLength<M>> {
-        let kind = self.kind[i];
-        let at_feed = kind == FEED && self.counted::<M>(i) == [1.0; M];
-        if !is_by_length(kind) && !at_feed {
+        if !self.is_by_length(i, columns) {
             return None;
         }
-        let u = [self.u0[i], self.u1[i]];
+        let (kind, piece, u) = (self.kind[i], self.piece[i] as usize, [self.u0[i], self.u1[i]]);
+        let (curve, scale) = (columns.curve(piece), columns.scale());
+        let mut slope = |u: f64| match columns.station(piece, u) {
+            Some(station) => station.slope,
+            None => columns.place(piece, u).way_slope,
+        };
         let mut speeds = [slope(u[0]) * self.p0[i].sqrt(), slope(u[1]) * self.p1[i].sqrt()];
         // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
         let anchored_at_end = kind != FEED && speeds[1] < speeds[0];
@@ -132,59 +131,11 @@ impl Phases<'_> {
             PATH_JERK => SpeedByLength::Jerk { start: Pace { v: speeds[0], a: a[0], j: value }, duration },
             _ => SpeedByLength::cubic(speeds.map(|v| v * v), a, length),
         };
-        Some(PhaseByLength::new(curve.clone(), *scale, u, anchored_at_end, duration, speed))
-    }
-
-    /// Phase `i` on its piece, where its p is known by the parameter; its numbers must be good.
-    pub fn by_parameter<const M: usize>(&self, i: usize, curve: &Curve<M>) -> PhaseMotion<M> {
-        let p = [self.p0[i], self.p1[i]];
-        let ends = [curve.derivative(self.u0[i]), curve.derivative(self.u1[i])];
-        let axis = self.axis[i] as usize;
-        // From the slower end, where rounding would leave the square root of a negative number.
-        let speed_sq = |end: usize| inner(&ends[end], &ends[end]) * p[end];
-        let anchored_at_end = match self.kind[i] {
-            AXIS_ACCELERATION => ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0],
-            PARAMETER_ACCELERATION => p[1] < p[0],
-            SPEED_LINE => speed_sq(1) < speed_sq(0),
-            _ => false,
-        };
-        let (tangent, p_anchor, p_far) =
-            if anchored_at_end { (ends[1], p[1], p[0]) } else { (ends[0], p[0], p[1]) };
-        let width = self.u1[i] - self.u0[i];
-        let law = match self.kind[i] {
-            AXIS_ACCELERATION => {
-                Law::Axis { axis, value: self.value[i], start_sq: tangent[axis].powi(2) * p_anchor }
-            }
-            AXIS_VELOCITY => Law::Axis { axis, value: 0.0, start_sq: self.value[i] },
-            PARAMETER_ACCELERATION => Law::Parameter { start: p_anchor, slope: 2.0 * self.value[i] },
-            SPEED_LINE => {
-                let anchor = usize::from(anchored_at_end);
-                let start_sq = speed_sq(anchor);
-                Law::Speed { start_sq, change_sq: speed_sq(1 - anchor) - start_sq }
-            }
-            _ => Law::Speed { start_sq: self.value[i], change_sq: 0.0 },
-        };
-        let shape = match curve {
-            Curve::Quadratic(quadratic) => Shape::Quadratic { tangent, bend: quadratic.second_derivative() },
-            Curve::General(general) => {
-                let (polygon, whole) = (&general.polygon, curve.width());
-                let part = polygon.part(self.u0[i] / whole, width / whole);
-                let part = Box::new(if anchored_at_end { part.reversed() } else { part });
-                let mut ends = [self.u0[i] / whole, self.u1[i] / whole];
-                if anchored_at_end {
-                    ends.reverse();
-                }
-                let whole = Box::new(polygon.clone());
-                Shape::General { whole, ends, part, tangent, size: curve.derivative_size() }
-            }
-        };
-        let share = if self.kind[i] == FEED { self.counted(i) } else { [1.0; M] };
-        let widths = [width, curve.width()];
-        PhaseMotion::new(law, shape, widths, [p_anchor, p_far], anchored_at_end, &share)
+        Some(PhaseByLength::new(curve, scale, u, anchored_at_end, duration, speed))
     }
 
     /// What the axes count in the speed that is constant on phase `i`.
-    fn counted<const M: usize>(&self, i: usize) -> [f64; M] {
+    pub fn counted<const M: usize>(&self, i: usize) -> [f64; M] {
         let axes = self.share.len().checked_div(self.pieces).unwrap_or(0);
         let row = self.piece[i] as usize * axes;
         std::array::from_fn(|k| if k < axes { self.share[row + k] } else { 1.0 })

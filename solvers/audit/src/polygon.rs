@@ -287,6 +287,17 @@ impl<const M: usize> Polygon<M> {
         })
     }
 
+    /// From the start to the end.
+    pub fn chord(&self) -> [f64; M] {
+        let mut chord = [0.0; M];
+        for step in &self.steps[..self.degree] {
+            for k in 0..M {
+                chord[k] += step[k];
+            }
+        }
+        chord
+    }
+
     /// The length of the polygon.
     pub fn way(&self) -> f64 {
         self.steps[..self.degree].iter().map(length).sum()

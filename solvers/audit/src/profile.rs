@@ -1,23 +1,20 @@
-//! Audits a speed profile: every phase sampled in time, and the joints between the phases.
+//! Audits a speed profile: every phase at as many places as its motion needs, and the joints between the phases.
 //!
-//! On each phase the axis velocities C'√p are taken at some ten places, closer together where p changes fast and
-//! very close at both ends, where accelerations have their extremes. Between two places the acceleration is the
-//! difference of the velocities over the time that the audit integrates itself. A velocity is known to `EPS`
-//! times its magnitude; that over the time is what rounding may add to an acceleration, and it is subtracted.
-//! A profile cannot hide in it: over all phases together it allows `EPS` of the velocity per phase.
+//! On a phase whose p is known by the parameter the velocities of all columns are taken at some ten places, closer together where p
+//! changes fast and very close at both ends, where accelerations have their extremes. Between two places the acceleration is the
+//! difference of the velocities over the time, less what the errors of both can add. Phases by length: `by_length`.
 
 mod by_length;
 
 use rayon::prelude::*;
 
 use super::chord::chord_error;
-use super::curve::Followed;
+use super::columns::{Columns, Place, CHORD};
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
 use super::phase_order::PhaseOrder;
 use super::phases::Phases;
-use super::station::Stations;
-use super::vectors::length;
+use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 use by_length::{Look, Looker};
 
@@ -30,176 +27,227 @@ const SLIDE_INTERVALS: usize = 64;
 /// Share of an acceleration limit from which a slide is looked at more closely.
 const NEAR: f64 = 0.9;
 
-/// The end intervals are as short as lets rounding hide this share of the acceleration limit, but no shorter than this part
-/// of the phase: their time would have no digits.
+/// The end intervals are as short as lets rounding hide this share of the acceleration limit, but no shorter than this part of the
+/// width of the phase: their time would have no digits.
 const HIDDEN: f64 = 1e-7;
-const SHORTEST: f64 = 1e-8;
+const SHORTEST: f64 = 1e-7;
 
-/// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
-const SMOOTH: f64 = 1e-9;
+/// An interval is halved where its time is off that at constant acceleration of the parameter by more than this part; so often at
+/// most on a phase.
+const UNEVEN: f64 = 0.05;
+const MOST_HALVINGS: u32 = 200;
 
 /// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
 
-/// The whole profile: phases, joints, ends of runs. `junction_speed` has one more entry than the path has pieces.
-pub(crate) fn audit_profile<const M: usize>(
-    path: &Followed,
-    junction_speed: &[f64],
-    phases: &Phases,
-    limits: &Limits<M>,
+/// What is measured on which path.
+pub struct Audited<'a, const M: usize> {
+    /// One more entry than the path has pieces.
+    pub junction_speed: &'a [f64],
+    pub phases: &'a Phases<'a>,
+    pub limits: &'a Limits<M>,
+    /// When each phase begins, and the last one ends.
+    pub starts: &'a [f64],
+}
+
+/// The whole profile: phases, joints, ends of runs. Each thread makes columns of its own.
+pub fn audit_profile<'a, const M: usize>(
+    of: &Audited<M>,
+    columns: &(dyn Fn() -> Box<dyn Columns<M> + 'a> + Sync),
     seen: Seen,
 ) -> Tally<M> {
-    let starts = phases.starts(path);
-    let auditor = Auditor { path, junction_speed, phases, limits, starts: &starts };
+    let phases = of.phases;
     let blocks = phases.len().div_ceil(BLOCK);
     let inside = (0..blocks)
         .into_par_iter()
         .map(|block| {
-            let (mut tally, mut stations) = (Tally::default(), Stations::new(path.pieces));
+            let (mut tally, mut columns) = (Tally::default(), columns());
             for i in block * BLOCK..((block + 1) * BLOCK).min(phases.len()) {
                 tell(seen, i);
-                auditor.phase(i, &mut stations, &mut tally);
+                of.phase(i, &mut *columns, &mut tally);
                 if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
-                    auditor.joint(i - 1, i, &mut stations, &mut tally);
+                    of.joint([i - 1, i], &mut *columns, &mut tally);
                 }
             }
             tally
         })
         .reduce(Tally::default, Tally::merge);
     let mut order = Tally::default();
-    auditor.order(&mut order);
+    of.order(&mut *columns(), &mut order);
     inside.merge(order)
 }
 
-struct Auditor<'a, const M: usize> {
-    path: &'a Followed<'a>,
-    junction_speed: &'a [f64],
-    phases: &'a Phases<'a>,
-    limits: &'a Limits<M>,
-    starts: &'a [f64],
-}
-
-impl<const M: usize> Auditor<'_, M> {
-    fn phase(&self, i: usize, stations: &mut Stations<M>, tally: &mut Tally<M>) {
+impl<const M: usize> Audited<'_, M> {
+    fn phase(&self, i: usize, columns: &mut dyn Columns<M>, tally: &mut Tally<M>) {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
-        let line = self.path.line.get(piece).copied().unwrap_or(0);
-        if !phases.has_good_numbers(i, self.path.axes) {
+        let line = columns.path().line_of(piece);
+        if !phases.has_good_numbers(i, columns.count()) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return;
         }
-        let width = self.path.width[piece];
-        let (u0, u1) = (phases.u0[i], phases.u1[i]);
-        let slack = ROUNDINGS * EPS * width;
-        if u1 <= u0 || u0 < 0.0 || u1 > width + slack {
+        let width = columns.path().width[piece];
+        let u = [phases.u0[i], phases.u1[i]];
+        if u[1] <= u[0] || u[0] < 0.0 || u[1] > width * (1.0 + ROUNDINGS * EPS) {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
             return;
         }
-        let (curve, share) = (stations.curves.get(piece).clone(), (u1 - u0) / width);
-        let width_rounding = EPS * width / (u1 - u0);
-        let slope =
-            |u: f64| stations.get(piece, u).map_or_else(|| length(&curve.derivative(u)), |at| at.slope);
-        let by_length = phases.by_length(i, &curve, &[1.0; M], slope);
+        let width_rounding = EPS * width / (u[1] - u[0]);
+        let by_length = phases.by_length(i, columns);
         if self.limits.judges_jerk {
-            self.jerks().alone(i, width_rounding, by_length.is_some(), line, tally);
+            self.jerks(columns).alone(i, width_rounding, by_length.is_some(), line, tally);
         }
-        if let Some(motion) = by_length {
-            let looker = Looker {
-                motion: &motion,
-                limits: self.limits,
-                feeds: self.path.feeds(piece),
-                covered: curve.turns() as f64 * share,
-                start: time,
+        let feeds = columns.feeds(piece);
+        let elapsed = if let Some(motion) = by_length {
+            let curve = columns.curve(piece);
+            let covered = curve.turns() as f64 * ((u[1] - u[0]) / width);
+            let (limits, start, motion) = (self.limits, time, &motion);
+            let mut looker = Looker {
+                columns: &mut *columns,
+                piece,
+                motion,
+                curve: &curve,
+                limits,
+                feeds,
+                covered,
+                start,
                 line,
             };
-            let from = stations.get(piece, u0).map(|station| looker.look_at(station, tally));
-            let to = stations.get(piece, u1).map(|station| looker.look_at(station, tally));
-            let ends = [from.as_ref(), to.as_ref()];
-            looker.phase([u0, u1], ends, tally);
-            self.ends_by_length(i, ends, line, tally);
-            self.duration(i, motion.time(), width_rounding, line, tally);
-            return;
-        }
-        let motion = phases.by_parameter(i, &curve);
-        let mut probe = Probe::new(self, &motion, tally, i, line);
-        probe.run();
-        let (elapsed, near) = (probe.elapsed, probe.nearest_limit >= NEAR);
-        if near && motion.is_slide() {
-            let mut probe = Probe::new(self, &motion, tally, i, line);
-            probe.run_evenly(SLIDE_INTERVALS);
-        }
-        self.recorded_ends(i, &motion, line, tally);
+            let looks = u.map(|u| looker.look(u, tally));
+            let ends = looks.each_ref().map(Option::as_ref);
+            looker.phase(u, ends, tally);
+            self.ends_by_length(i, ends, columns, line, tally);
+            [motion.time(), 0.0]
+        } else {
+            let motion = PhaseMotion::new(phases, i, columns);
+            let (start, duration, limits) = (time, phases.duration[i], self.limits);
+            let mut probe = Probe {
+                motion: &motion,
+                columns: &mut *columns,
+                limits,
+                tally: &mut *tally,
+                feeds,
+                start,
+                duration,
+                line,
+                elapsed: [0.0; 2],
+                nearest_limit: 0.0,
+                halvings: MOST_HALVINGS,
+            };
+            let ends = probe.run();
+            let elapsed = probe.elapsed;
+            if probe.nearest_limit >= NEAR && motion.is_slide() {
+                probe.elapsed = [0.0; 2];
+                probe.run_evenly(SLIDE_INTERVALS);
+            }
+            self.recorded_ends(i, &motion, &ends, columns, line, tally);
+            elapsed
+        };
         self.duration(i, elapsed, width_rounding, line, tally);
     }
 
-    /// The recorded duration against the audit's own. A rounding of u0 or u1 changes the width by the share
-    /// `width_rounding`, and the time by at least this share; at a slow end by the time in which the motion covers the
-    /// rounding there.
-    fn duration(&self, i: usize, elapsed: f64, width_rounding: f64, line: i32, tally: &mut Tally<M>) {
+    /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share
+    /// `width_rounding`, and the time by at least this share; at a slow end by the time in which the motion covers the rounding
+    /// there.
+    fn duration(
+        &self,
+        i: usize,
+        [elapsed, doubt]: [f64; 2],
+        width_rounding: f64,
+        line: i32,
+        tally: &mut Tally<M>,
+    ) {
         let phases = self.phases;
         let slowest = phases.p0[i].min(phases.p1[i]).sqrt();
         let rounding = width_rounding * (phases.u1[i] - phases.u0[i]);
         let at_end = if slowest > 0.0 { rounding / (slowest * elapsed) } else { 0.0 };
-        let error = (phases.duration[i] - elapsed).abs() / elapsed - ROUNDINGS * width_rounding.max(at_end);
+        let known = (ROUNDINGS * width_rounding.max(at_end)).max(doubt / elapsed);
+        let error = (phases.duration[i] - elapsed).abs() / elapsed - known;
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[i], line);
     }
 
-    /// The recorded p at both ends against the speed by the length, as a jump of axis velocity. A place is known to its
-    /// rounding: over that way the axis may accelerate.
-    fn ends_by_length(&self, i: usize, ends: [Option<&Look<M>>; 2], line: i32, tally: &mut Tally<M>) {
-        let phases = self.phases;
-        let known = [(phases.p0[i], 0.0), (phases.p1[i], phases.duration[i])];
-        for (look, (p, since)) in ends.into_iter().zip(known) {
+    /// The recorded p at both ends against the speed by the length, as a jump of velocity.
+    fn ends_by_length(
+        &self,
+        i: usize,
+        ends: [Option<&Look<M>>; 2],
+        columns: &mut dyn Columns<M>,
+        line: i32,
+        tally: &mut Tally<M>,
+    ) {
+        let known = [self.phases.p0[i], self.phases.p1[i]];
+        for (side, (look, p)) in ends.into_iter().zip(known).enumerate() {
             let Some(Look { place, station, velocity, .. }) = look else { continue };
-            let recorded = station.slope * p.sqrt();
-            let way = ROUNDINGS * EPS * self.path.width[phases.piece[i] as usize] * station.slope;
-            for k in 0..self.limits.axes {
-                let cosine = station.first.value[k].abs();
-                let [slow, fast] =
-                    [place.pace.v.min(recorded), place.pace.v.max(recorded)].map(|speed| cosine * speed);
-                let gained = 2.0 * self.limits.acceleration.greatest(k) * way * cosine;
-                let reached = (slow * slow + gained).sqrt().max(slow);
-                let jump = fast - reached - velocity.rounding[k];
-                tally.offer(
-                    Check::Jump,
-                    k,
-                    jump,
-                    self.limits.negligible_jump(k),
-                    self.starts[i] + since,
-                    line,
-                );
+            let speeds = [place.pace.v, station.slope * p.sqrt()];
+            let (rates, rounding) = (&station.first.value, &velocity.rounding);
+            self.recorded_end([i, side], (speeds, rates, rounding), station.slope, columns, line, tally);
+        }
+    }
+
+    /// The recorded p at both ends against what the phase's definition gives there, as a jump of velocity.
+    fn recorded_ends(
+        &self,
+        i: usize,
+        motion: &PhaseMotion<M>,
+        ends: &[State<M>; 2],
+        columns: &mut dyn Columns<M>,
+        line: i32,
+        tally: &mut Tally<M>,
+    ) {
+        for (y, state) in ends.iter().enumerate() {
+            let side = usize::from((y == 1) != motion.anchored_at_end);
+            let speeds = [state.root_p, [self.phases.p0[i], self.phases.p1[i]][side].sqrt()];
+            // Where the column that governs the phase stands, the law tells no other one's velocity: p is the recorded one.
+            if speeds[0] != speeds[1] {
+                let (rates, rounding) = (&state.place.slope.value, &state.velocity.rounding);
+                self.recorded_end([i, side], (speeds, rates, rounding), 1.0, columns, line, tally);
+            } else {
+                for k in 0..columns.count() {
+                    tally.offer(Check::Jump, k, 0.0, self.negligible(i, k, columns), self.starts[i], line);
+                }
             }
         }
     }
 
-    fn jerks(&self) -> Jerks<'_, M> {
+    /// Two speeds at an end of a phase, of which each column has this rate, as a jump of velocity. A place is known to its rounding:
+    /// over that way, which is that of u times `slope`, the column may accelerate.
+    fn recorded_end(
+        &self,
+        [i, side]: [usize; 2],
+        (speeds, rates, rounding): ([f64; 2], &[f64; M], &[f64; M]),
+        slope: f64,
+        columns: &mut dyn Columns<M>,
+        line: i32,
+        tally: &mut Tally<M>,
+    ) {
+        let phases = self.phases;
+        let way = ROUNDINGS * EPS * columns.path().width[phases.piece[i] as usize] * slope;
+        let time = self.starts[i] + side as f64 * phases.duration[i];
+        for k in 0..columns.count() {
+            let rate = rates[k].abs();
+            let [slow, fast] = [speeds[0].min(speeds[1]), speeds[0].max(speeds[1])].map(|speed| rate * speed);
+            let gained = 2.0 * self.limits.acceleration.greatest(k) * way * rate;
+            let reached = (slow * slow + gained).sqrt().max(slow);
+            let jump = fast - reached - rounding[k];
+            tally.offer(Check::Jump, k, jump, self.negligible(i, k, columns), time, line);
+        }
+    }
+
+    /// A jump of the velocity of a column that means nothing on phase `i`.
+    fn negligible(&self, i: usize, k: usize, columns: &dyn Columns<M>) -> f64 {
+        self.limits.negligible_jump(k, columns.settling(self.phases.duration[i]))
+    }
+
+    fn jerks(&self, columns: &dyn Columns<M>) -> Jerks<'_, M> {
         let Self { phases, limits, starts, .. } = *self;
-        Jerks { phases, limits, starts, smooth: SMOOTH }
-    }
-
-    /// The recorded p at both ends against what the phase's definition gives there, as a jump of axis velocity. A place is
-    /// known to its rounding: over that way the axis may accelerate.
-    fn recorded_ends(&self, i: usize, motion: &PhaseMotion<M>, line: i32, tally: &mut Tally<M>) {
-        let way = ROUNDINGS * motion.width_rounding() * motion.width;
-        for (y, recorded) in [(0.0, motion.root_anchor), (1.0, motion.root_far)] {
-            let state = motion.state(y);
-            let at_end = (y == 1.0) != motion.anchored_at_end;
-            let time = self.starts[i] + if at_end { self.phases.duration[i] } else { 0.0 };
-            for k in 0..M {
-                let size = state.tangent[k].abs();
-                let [slow, fast] = [state.root_p.min(recorded), state.root_p.max(recorded)].map(|p| size * p);
-                let gained = 2.0 * self.limits.acceleration.greatest(k) * way * size;
-                let reached = (slow * slow + gained).sqrt().max(slow);
-                let jump = fast - reached - ROUNDINGS * EPS * state.magnitude[k];
-                tally.offer(Check::Jump, k, jump, self.limits.negligible_jump(k), time, line);
-            }
-        }
+        Jerks { phases, limits, starts, smooth: columns.smooth() }
     }
 
     /// Phases must follow each other without gap over every piece, and runs begin and end at rest.
-    fn order(&self, tally: &mut Tally<M>) {
-        let Self { path, phases, starts, .. } = *self;
-        if !(PhaseOrder { path, phases, starts, axes: path.axes }).audit(tally) {
+    fn order(&self, columns: &mut dyn Columns<M>, tally: &mut Tally<M>) {
+        let Self { phases, starts, .. } = *self;
+        let order = PhaseOrder { path: columns.path(), phases, starts, axes: columns.count() };
+        if !order.audit(tally) {
             return;
         }
         let [start_speed, end_speed] = self.limits.end_speeds;
@@ -207,141 +255,135 @@ impl<const M: usize> Auditor<'_, M> {
         for (run, ends) in runs.filter(|(_, ends)| ends[0] < ends[1]) {
             let (first, last) = (ends[0] as usize, ends[1] as usize - 1);
             let wanted = if run == 0 { start_speed } else { 0.0 };
-            self.run_end(first, phases.u0[first], phases.p0[first], wanted, starts[first], tally);
+            self.run_end([first, 0], wanted, columns, tally);
             let wanted = if run + 2 == phases.runs.len() { end_speed } else { 0.0 };
-            let time = starts[last] + phases.duration[last];
-            self.run_end(last, phases.u1[last], phases.p1[last], wanted, time, tally);
+            self.run_end([last, 1], wanted, columns, tally);
         }
     }
 
-    /// The change from one phase to the next: no jump of the speed, and of the axis velocities only at corners.
-    fn joint(&self, i: usize, j: usize, stations: &mut Stations<M>, tally: &mut Tally<M>) {
+    /// The place at an end of phase `i`, and √p there.
+    fn end(&self, [i, side]: [usize; 2], columns: &mut dyn Columns<M>) -> (Place<M>, f64) {
         let phases = self.phases;
-        if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, self.path.axes)) {
+        let (u, p) = if side == 0 { (phases.u0[i], phases.p0[i]) } else { (phases.u1[i], phases.p1[i]) };
+        (columns.place(phases.piece[i] as usize, u), p.sqrt())
+    }
+
+    /// The change from one phase to the next: no jump of the speed, and of the velocities only at corners.
+    fn joint(&self, [i, j]: [usize; 2], columns: &mut dyn Columns<M>, tally: &mut Tally<M>) {
+        let phases = self.phases;
+        if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, columns.count())) {
             return; // reported with the phase itself
         }
-        let (before, after) = (phases.piece[i] as usize, phases.piece[j] as usize);
-        let ends = [(before, phases.u1[i], phases.p1[i]), (after, phases.u0[j], phases.p0[j])];
-        let mut velocity = [[0.0; M]; 2];
-        let mut rounding = [0.0; M];
-        for (side, (piece, u, p)) in ends.into_iter().enumerate() {
-            let curve = stations.curves.get(piece);
-            let (tangent, root_p) = (curve.derivative(u), p.sqrt());
-            let scale = ROUNDINGS * EPS * root_p;
-            let size = curve.derivative_size();
+        let pieces = [i, j].map(|phase| phases.piece[phase] as usize);
+        let [before, after] = pieces;
+        let (time, line) = (self.starts[j], columns.path().line_of(after));
+        let states = [[i, 1], [j, 0]].map(|end| {
+            let (mut place, root_p) = self.end(end, columns);
             // Between two pieces the control points' own rounding turns the tangent.
-            let turned =
-                if before == after { 0.0 } else { 2.0 * curve.magnitude() * curve.derivative_scale() };
-            for k in 0..M {
-                velocity[side][k] = tangent[k] * root_p;
-                rounding[k] += scale * (size[k] + turned);
-            }
+            let turned = if before == after { 0.0 } else { columns.turned(place.piece) };
+            place.slope.rounding = vector_of(|k| place.slope.rounding[k] + turned);
+            State::new(place, root_p, 0.0)
+        });
+        if self.limits.judges_jerk && [i, j].iter().all(|&phase| phases.is_by_length(phase, columns)) {
+            self.jerks(columns).joint([i, j], columns, line, tally);
         }
-        let (time, line) = (self.starts[j], self.line(after));
-        if self.limits.judges_jerk {
-            let station = |piece: usize, u: f64| stations.get(piece, u).copied();
-            self.jerks().joint([i, j], station, line, tally);
-        }
+        let [from, to] = states.each_ref().map(|state| &state.velocity);
         let at_corner = if before == after { 0.0 } else { 1.0 };
-        for k in 0..M {
-            let jump = (velocity[1][k] - velocity[0][k]).abs() - rounding[k];
-            let limit = at_corner * self.limits.jump[k] + self.limits.negligible_jump(k);
+        for k in 0..columns.count() {
+            let jump = (to.value[k] - from.value[k]).abs() - from.rounding[k] - to.rounding[k];
+            let limit = at_corner * self.limits.jump[k] + self.negligible(j, k, columns);
             tally.offer(Check::Jump, k, jump, limit, time, line);
         }
-        if before != after {
-            let speeds = velocity.map(|v| length(&v));
-            let jump = (speeds[1] - speeds[0]).abs() - length(&rounding);
-            tally.offer(Check::Continuity, 0, jump, self.negligible_speed(), time, line);
-            // Motionless pieces in between have junctions of their own.
-            for junction in before + 1..=after {
-                let allowed = self.junction_speed[junction] + self.negligible_speed();
-                tally.offer(Check::Junction, 0, speeds[0].max(speeds[1]), allowed, time, line);
-                if !self.path.is_motionless(junction) {
-                    break;
-                }
+        if before == after {
+            return;
+        }
+        let slack = columns.negligible_speed(&states[1].place, columns.settling(phases.duration[j]));
+        let speeds = states.each_ref().map(|state| columns.speed(CHORD, &state.velocity, state.tip()));
+        // The speeds are of one kind only where the feed limits the same axes.
+        if columns.comparable(pieces) {
+            let jump = (speeds[1][0] - speeds[0][0]).abs() - speeds[0][1] - speeds[1][1];
+            tally.offer(Check::Continuity, 0, jump, slack, time, line);
+        }
+        let fastest = speeds[0][0].max(speeds[1][0]);
+        // Motionless pieces in between have junctions of their own.
+        for junction in before + 1..=after {
+            let allowed = self.junction_speed[junction] + slack;
+            tally.offer(Check::Junction, 0, fastest, allowed, time, line);
+            if !columns.path().is_motionless(junction) {
+                break;
             }
         }
     }
 
     /// The speed at the start or the end of a run.
-    fn run_end(&self, i: usize, u: f64, p: f64, wanted: f64, time: f64, tally: &mut Tally<M>) {
-        let piece = self.phases.piece[i] as usize;
-        let speed = length(&self.path.curve::<M>(piece).derivative(u)) * p.sqrt();
-        let rounding = ROUNDINGS * EPS * (speed + wanted);
-        let limit = self.negligible_speed();
-        tally.offer(Check::Junction, 0, (speed - wanted).abs() - rounding, limit, time, self.line(piece));
+    fn run_end(
+        &self,
+        [i, side]: [usize; 2],
+        wanted: f64,
+        columns: &mut dyn Columns<M>,
+        tally: &mut Tally<M>,
+    ) {
+        let (place, root_p) = self.end([i, side], columns);
+        let line = columns.path().line_of(place.piece);
+        let (state, duration) = (State::new(place, root_p, 0.0), self.phases.duration[i]);
+        let [speed, _] = columns.speed(CHORD, &state.velocity, state.tip());
+        let off = (speed - wanted).abs() - ROUNDINGS * EPS * (speed + wanted);
+        let slack = columns.negligible_speed(&state.place, columns.settling(duration));
+        let time = self.starts[i] + side as f64 * duration;
+        tally.offer(Check::Junction, 0, off, slack, time, line);
         if self.limits.judges_jerk && wanted == 0.0 {
-            self.jerks().rest(i, u > self.phases.u0[i], self.line(piece), tally);
+            self.jerks(columns).rest(i, side == 1, line, tally);
         }
-    }
-
-    /// A jump of the speed that means nothing to any axis.
-    fn negligible_speed(&self) -> f64 {
-        (0..self.path.axes).map(|k| self.limits.negligible_jump(k)).fold(f64::INFINITY, f64::min)
-    }
-
-    fn line(&self, piece: usize) -> i32 {
-        self.path.line.get(piece).copied().unwrap_or(0)
     }
 }
 
 /// Walks one phase and offers what it meets.
 struct Probe<'a, const M: usize> {
     motion: &'a PhaseMotion<M>,
+    columns: &'a mut dyn Columns<M>,
     limits: &'a Limits<M>,
     tally: &'a mut Tally<M>,
     feeds: [f64; FEEDS],
     start: f64,
     duration: f64,
     line: i32,
-    /// Time from the anchor.
-    elapsed: f64,
+    /// Time from the anchor, and its error, in s.
+    elapsed: [f64; 2],
     /// Greatest share of an acceleration limit met so far.
     nearest_limit: f64,
+    halvings: u32,
 }
 
-impl<'a, const M: usize> Probe<'a, M> {
-    fn new(
-        auditor: &'a Auditor<'a, M>,
-        motion: &'a PhaseMotion<M>,
-        tally: &'a mut Tally<M>,
-        i: usize,
-        line: i32,
-    ) -> Self {
-        Self {
-            motion,
-            limits: auditor.limits,
-            tally,
-            feeds: auditor.path.feeds(auditor.phases.piece[i] as usize),
-            start: auditor.starts[i],
-            duration: auditor.phases.duration[i],
-            line,
-            elapsed: 0.0,
-            nearest_limit: 0.0,
-        }
+impl<const M: usize> Probe<'_, M> {
+    fn state(&mut self, y: f64) -> State<M> {
+        self.motion.at(self.motion.parameter(y), self.columns)
     }
 
-    /// Even intervals with a short one at each end.
-    fn run(&mut self) {
-        let mut state = self.motion.state(0.0);
-        let last = self.motion.state(1.0);
-        self.place(&state);
-        let step = 1.0 / INTERVALS as f64;
-        let [head, tail] =
-            [&state, &last].map(|end| Some(self.short_interval(end)).filter(|y| *y > 0.0 && *y < step));
+    /// Even intervals with a short one at each end; the states at both ends.
+    fn run(&mut self) -> [State<M>; 2] {
+        let ends = [0.0, 1.0].map(|y| self.state(y));
+        self.place(&ends[0]);
+        let (step, mut state) = (1.0 / INTERVALS as f64, ends[0]);
+        let shortest = [self.motion.variable(SHORTEST), 1.0 - self.motion.variable(1.0 - SHORTEST)];
+        let short = |end: usize| {
+            let y = self.short_interval(&ends[end]).max(shortest[end]);
+            Some(y).filter(|y| *y < step)
+        };
+        let [head, tail] = [short(0), short(1)];
         let inner = (1..INTERVALS).map(|i| i as f64 * step);
         for y in head.into_iter().chain(inner).chain(tail.map(|y| 1.0 - y)) {
-            let next = self.motion.state(y);
+            let next = self.state(y);
             self.advance(&state, &next);
             state = next;
         }
-        self.advance(&state, &last);
+        self.advance(&state, &ends[1]);
+        ends
     }
 
     fn run_evenly(&mut self, intervals: usize) {
-        let mut state = self.motion.state(0.0);
+        let mut state = self.state(0.0);
         for i in 1..=intervals {
-            let next = self.motion.state(i as f64 / intervals as f64);
+            let next = self.state(i as f64 / intervals as f64);
             self.advance(&state, &next);
             state = next;
         }
@@ -351,56 +393,72 @@ impl<'a, const M: usize> Probe<'a, M> {
     fn short_interval(&self, end: &State<M>) -> f64 {
         let mut time = 0.0_f64;
         for k in 0..M {
-            let rounding = 2.0 * ROUNDINGS * EPS * end.magnitude[k];
-            time = time.max(rounding / (HIDDEN * self.limits.acceleration.least(k)));
+            time = time.max(2.0 * end.velocity.rounding[k] / (HIDDEN * self.limits.acceleration.least(k)));
         }
-        (time / self.duration).max(SHORTEST)
+        time / self.duration
     }
 
+    /// From one place to the next, halved where p changes fast between them.
     fn advance(&mut self, from: &State<M>, to: &State<M>) {
-        let motion = self.motion;
-        motion.walk(from, to, &mut |from, to, time| self.interval(from, to, time));
+        let [time, doubt] = self.motion.time([from, to], self.columns);
+        let (a, b) = (from.place.u, to.place.u);
+        let (even, middle) = (2.0 * (b - a).abs() / (from.root_p + to.root_p), 0.5 * (a + b));
+        let is_uneven = doubt < UNEVEN && (time - even).abs() > UNEVEN * even;
+        if !is_uneven || self.halvings == 0 || middle <= a.min(b) || middle >= a.max(b) {
+            return self.interval([from, to], time, doubt);
+        }
+        self.halvings -= 1;
+        let middle = self.motion.at(middle, self.columns);
+        self.advance(from, &middle);
+        self.advance(&middle, to);
     }
 
-    fn interval(&mut self, from: &State<M>, to: &State<M>, time: f64) {
-        let middle = self.clock(self.elapsed + 0.5 * time);
-        self.elapsed += time;
-        let held = self.motion.held_axis();
-        // The time is known as well as the width of the phase.
-        let in_time = ROUNDINGS * self.motion.width_rounding();
-        for k in 0..M {
-            let rounding = ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time;
-            // A phase that is anchored at its end is walked against the time.
-            let [early, late] = if self.motion.anchored_at_end { [to, from] } else { [from, to] };
-            let change = late.velocity[k] - early.velocity[k];
-            let acceleration = change.abs() / time * (1.0 - in_time) - rounding;
+    fn interval(&mut self, [from, to]: [&State<M>; 2], time: f64, doubt: f64) {
+        // Two places may be the same after rounding.
+        if from.place.u == to.place.u {
+            return;
+        }
+        let middle = self.clock(self.elapsed[0] + 0.5 * time);
+        self.elapsed = [self.elapsed[0] + time, self.elapsed[1] + time * doubt];
+        let held = self.motion.held_column();
+        // A phase that is anchored at its end is walked against the time.
+        let [early, late] = if self.motion.anchored_at_end { [to, from] } else { [from, to] };
+        let way = self.columns.way(&early.place, &late.place);
+        let certain = |rate: f64| rate - rate.abs() * doubt;
+        for k in 0..self.columns.count() {
+            let rounding = (from.velocity.rounding[k] + to.velocity.rounding[k]) / time;
+            let change = late.velocity.value[k] - early.velocity.value[k];
+            let acceleration = certain(change.abs() / time) - rounding;
             let limit = self.limits.acceleration.of(k, change);
             self.tally.offer(Check::Acceleration, k, acceleration, limit, middle, self.line);
             if held != Some(k) {
                 self.nearest_limit = self.nearest_limit.max(acceleration / limit);
             }
+            let mean = certain((way.value[k].abs() - way.rounding[k]) / time);
+            let limit = self.limits.velocity.of(k, way.value[k]);
+            self.tally.offer(Check::Velocity, k, mean, limit, middle, self.line);
         }
         self.place(to);
     }
 
     /// The velocities at one place.
     fn place(&mut self, state: &State<M>) {
-        let time = self.clock(self.elapsed);
+        let time = self.clock(self.elapsed[0]);
         self.tally.samples += 1;
-        for k in 0..M {
-            let velocity = state.velocity[k].abs() - ROUNDINGS * EPS * state.magnitude[k];
-            let limit = self.limits.velocity.of(k, state.velocity[k]);
+        for k in 0..self.columns.count() {
+            let velocity = state.velocity.value[k].abs() - state.velocity.rounding[k];
+            let limit = self.limits.velocity.of(k, state.velocity.value[k]);
             self.tally.offer(Check::Velocity, k, velocity, limit, time, self.line);
         }
+        let tip = state.tip();
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let speed = length(&self.limits.counted(feed, &state.velocity));
-            let rounding = ROUNDINGS * EPS * length(&self.limits.counted(feed, &state.magnitude));
+            let [speed, rounding] = self.columns.speed(feed, &state.velocity, tip);
             self.tally.offer(Check::Feed, 0, speed - rounding, limit, time, self.line);
         }
         if self.limits.chord_tolerance.is_finite() {
-            let speed = length(&state.velocity);
-            let rounding = ROUNDINGS * EPS * length(&state.magnitude);
-            let error = chord_error((speed - rounding) * self.limits.period, self.motion.curvature(state));
+            let [speed, rounding] = self.columns.speed(CHORD, &state.velocity, tip);
+            let curvature = self.columns.curvature(state.place.piece, state.place.u);
+            let error = chord_error((speed - rounding) * self.limits.period, curvature);
             self.tally.offer(Check::Chord, 0, error, self.limits.chord_tolerance, time, self.line);
         }
     }

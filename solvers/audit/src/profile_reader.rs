@@ -1,13 +1,10 @@
 //! Reads a speed profile along setpoints: when it is at a place, and what it does there.
 
-use std::sync::Arc;
-
-use super::curve::{Curve, Curves, Followed};
+use super::columns::Columns;
+use super::motion::{Motion, Passage};
 use super::nearest::Place;
-use super::phase_by_length::{self, PhaseByLength};
-use super::phase_motion::PhaseMotion;
-use super::phases::Phases;
 use super::profile_clock::ProfileClock;
+use super::station::Rounded;
 use super::vectors::{length, vector_of};
 use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
@@ -23,106 +20,19 @@ const MOST_SWITCHES: usize = 64;
 /// Reads a profile along the setpoints; keeps the phase it is on, since the next place is mostly on it too.
 pub struct Reader<'a, const M: usize> {
     clock: ProfileClock<'a>,
-    path: Followed<'a>,
     phase: usize,
     run: usize,
-    pub curves: Curves<'a, M>,
+    pub columns: Box<dyn Columns<M> + 'a>,
     motion: Motion<M>,
     /// Where it was last.
-    last: Option<(Place, Passage)>,
-}
-
-/// The motion on a phase.
-enum Motion<const M: usize> {
-    ByLength(PhaseByLength<M>),
-    ByParameter(PhaseMotion<M>),
-}
-
-/// A place on the reader's phase, and the time since the start of the phase.
-#[derive(Clone, Copy)]
-pub struct Passage {
-    u: f64,
-    since: f64,
-    how: How,
-}
-
-/// The place on a phase by length, or the integration variable of a phase by its parameter.
-#[derive(Clone, Copy)]
-enum How {
-    Place(phase_by_length::Place),
-    Y(f64),
-}
-
-impl<const M: usize> Motion<M> {
-    fn new(phases: &Phases, phase: usize, curve: &Arc<Curve<M>>) -> Self {
-        match phases.by_length(phase, curve, &[1.0; M], |u| length(&curve.derivative(u))) {
-            Some(motion) => Self::ByLength(motion),
-            None => Self::ByParameter(phases.by_parameter(phase, curve)),
-        }
-    }
-
-    fn passage(&self, u: f64, [u0, u1]: [f64; 2], duration: f64) -> Passage {
-        match self {
-            Self::ByLength(motion) => {
-                let place = motion.place(u);
-                Passage { u, since: motion.since(&place), how: How::Place(place) }
-            }
-            Self::ByParameter(motion) => {
-                let y = motion.y_at(if motion.anchored_at_end { u1 - u } else { u - u0 });
-                let from_anchor = motion.time_from_anchor(y);
-                let since = if motion.anchored_at_end { duration - from_anchor } else { from_anchor };
-                Passage { u, since, how: How::Y(y) }
-            }
-        }
-    }
-
-    fn velocity(&self, here: &Passage) -> [f64; M] {
-        match (self, here.how) {
-            (Self::ByLength(motion), How::Place(place)) => motion.velocity(&place),
-            (Self::ByParameter(motion), How::Y(y)) => motion.velocity(y),
-            _ => [f64::NAN; M],
-        }
-    }
-
-    /// Accelerations, and what of them may be rounding.
-    fn acceleration(&self, here: &Passage) -> ([f64; M], [f64; M]) {
-        match (self, here.how) {
-            (Self::ByLength(motion), How::Place(place)) => match motion.acceleration(&place) {
-                Some(acceleration) => (acceleration.value, acceleration.rounding),
-                None => ([0.0; M], [f64::INFINITY; M]),
-            },
-            (Self::ByParameter(motion), How::Y(y)) => motion.acceleration_near(y),
-            _ => ([f64::NAN; M], [0.0; M]),
-        }
-    }
-
-    /// The place at a time since the start of the phase.
-    fn place_at(&self, since: f64, [u0, u1]: [f64; 2], duration: f64) -> f64 {
-        match self {
-            Self::ByLength(motion) => motion.place_at(since),
-            Self::ByParameter(motion) => {
-                let wanted = if motion.anchored_at_end { duration - since } else { since };
-                let (mut low, mut high) = (0.0, 1.0);
-                for _ in 0..f64::MANTISSA_DIGITS {
-                    let middle = 0.5 * (low + high);
-                    if motion.time_from_anchor(middle) < wanted {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
-                motion.parameter(0.5 * (low + high), [u0, u1])
-            }
-        }
-    }
+    last: Option<(Place, Passage<M>)>,
 }
 
 impl<'a, const M: usize> Reader<'a, M> {
     /// On the first phase; there must be one, and a run of the path for it.
-    pub fn new(clock: &ProfileClock<'a>, path: &Followed<'a>) -> Self {
-        let mut curves = Curves::new(path.pieces);
-        let motion = Motion::new(&clock.phases, 0, curves.get(clock.phases.piece[0] as usize));
-        let mut reader = Self { clock: *clock, path: *path, phase: 0, run: 0, curves, motion, last: None };
+    pub fn new(clock: &ProfileClock<'a>, mut columns: Box<dyn Columns<M> + 'a>) -> Self {
+        let motion = Motion::new(&clock.phases, 0, &mut *columns);
+        let mut reader = Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None };
         reader.enter(0);
         reader
     }
@@ -135,8 +45,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     }
 
     fn motion_of(&mut self, phase: usize) -> Motion<M> {
-        let phases = &self.clock.phases;
-        Motion::new(phases, phase, self.curves.get(phases.piece[phase] as usize))
+        Motion::new(&self.clock.phases, phase, &mut *self.columns)
     }
 
     fn ends(&self, phase: usize) -> [f64; 2] {
@@ -145,7 +54,7 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     /// Goes to the phase that holds a place, the earlier one of two that meet there. A place on a motionless piece
     /// is the start of what comes next.
-    pub fn go_to(&mut self, place: Place) -> Passage {
+    pub fn go_to(&mut self, place: Place) -> Passage<M> {
         if let Some((_, passage)) = self.last.filter(|(last, _)| *last == place) {
             return passage;
         }
@@ -158,14 +67,15 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
         let (phases, phase) = (&self.clock.phases, self.phase);
         let u = if phases.piece[phase] as usize == place.piece { place.u } else { phases.u0[phase] };
-        let passage = self.motion.passage(u, self.ends(phase), phases.duration[phase]);
+        let passage = self.motion.passage(u, &mut *self.columns);
         self.last = Some((place, passage));
         passage
     }
 
-    /// Axis velocities of the profile at a place of the reader's phase.
-    pub fn velocity(&self, here: &Passage) -> [f64; M] {
-        self.motion.velocity(here)
+    /// When the profile is at a place, pauses of runs included, in s.
+    pub fn time_of(&mut self, place: Place) -> f64 {
+        let here = self.go_to(place);
+        self.clock.starts[self.phase] + here.since
     }
 
     fn holds(&self, phase: usize, place: Place) -> bool {
@@ -186,7 +96,7 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     /// When the profile arrives at a place of the reader's phase and when it leaves, in s: at stops it pauses, and the
     /// setpoints may wait for their next period.
-    fn times(&self, here: &Passage, period: f64) -> [f64; 2] {
+    fn times(&self, here: &Passage<M>, period: f64) -> [f64; 2] {
         let (clock, phase, run) = (&self.clock, self.phase, self.run);
         let phases = &clock.phases;
         let start = clock.starts[phase] + clock.shift(run);
@@ -199,7 +109,11 @@ impl<'a, const M: usize> Reader<'a, M> {
             };
         }
         if here.u >= phases.u1[phase] && phase + 1 == clock.phases_of(run).end {
-            until = clock.run_starts.get(run + 1).copied().unwrap_or(end + self.path.dwell[run] + period);
+            until = clock
+                .run_starts
+                .get(run + 1)
+                .copied()
+                .unwrap_or(end + self.columns.path().dwell[run] + period);
         }
         [from, until]
     }
@@ -214,7 +128,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         if wait <= rounding {
             return 0.0;
         }
-        let speed = length(&self.motion.velocity(&here));
+        let speed = length(&here.velocity.value);
         let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration.greater()));
         let most = reach(wait) - reach(rounding);
         // A profile that creeps through a turn gets nowhere near as far.
@@ -232,11 +146,11 @@ impl<'a, const M: usize> Reader<'a, M> {
         let there = Place { piece: self.clock.phases.piece[phase] as usize, u: here.u };
         let (first, last) =
             if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
-        let curve = self.curves.get(first.piece).clone();
+        let curve = self.columns.curve(first.piece);
         match last.piece - first.piece {
             0 => Some(curve.way_at_most(first.u, last.u)),
             1 => {
-                let next = self.curves.get(last.piece);
+                let next = self.columns.curve(last.piece);
                 Some(curve.way_at_most(first.u, curve.width()) + next.way_at_most(0.0, last.u))
             }
             _ => None,
@@ -244,7 +158,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     }
 
     /// The motion on the phase that `time` falls into, in the reader's run, where on it the profile is then, and the phase.
-    fn motion_at(&mut self, time: f64) -> Option<(Motion<M>, Passage, usize)> {
+    fn motion_at(&mut self, time: f64) -> Option<(Motion<M>, Passage<M>, usize)> {
         let (phase, since) = self.clock.phase_of(self.run, time)?;
         let (duration, ends) = (self.clock.phases.duration[phase], self.ends(phase));
         // Of a profile of rubbish nothing is known.
@@ -252,21 +166,23 @@ impl<'a, const M: usize> Reader<'a, M> {
             return None;
         }
         let motion = self.motion_of(phase);
-        let here = motion.passage(motion.place_at(since, ends, duration), ends, duration);
+        let u = motion.place_at(since, &mut *self.columns);
+        let here = motion.passage(u, &mut *self.columns);
         Some((motion, here, phase))
     }
 
     /// The acceleration of each axis at `time`, in the reader's run: where the tool creeps back from a turn, the place of
     /// a setpoint does not tell the ways to and from it apart.
     fn acceleration_at(&mut self, time: f64) -> Option<[f64; M]> {
-        self.motion_at(time).map(|(motion, here, _)| motion.acceleration(&here).0)
+        let (motion, here, _) = self.motion_at(time)?;
+        Some(motion.acceleration(&here, &mut *self.columns).value)
     }
 
     /// How far recorded accelerations are from those of the profile, at a place of the reader's phase or, where they are not
     /// those, at the time.
     pub fn acceleration_off(
         &mut self,
-        here: &Passage,
+        here: &Passage<M>,
         time: f64,
         recorded: &[f64; M],
         limits: &Limits<M>,
@@ -281,24 +197,23 @@ impl<'a, const M: usize> Reader<'a, M> {
     }
 
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's phase.
-    fn accelerations(&mut self, here: &Passage, time: f64, period: f64) -> [[f64; 2]; M] {
+    fn accelerations(&mut self, here: &Passage<M>, time: f64, period: f64) -> [[f64; 2]; M] {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
-        let mut include = |(value, rounding): ([f64; M], [f64; M])| {
+        let mut include = |Rounded { value, rounding }: Rounded<M>| {
             for k in 0..M {
                 range[k] = [range[k][0].min(value[k] - rounding[k]), range[k][1].max(value[k] + rounding[k])];
             }
         };
-        include(self.motion.acceleration(here));
+        include(self.motion.acceleration(here, &mut *self.columns));
         let switch = SWITCH_SHARE * period;
         let ProfileClock { phases, starts, .. } = self.clock;
         let time = time - self.clock.shift(self.run);
         let run = self.clock.phases_of(self.run);
         let mut neighbour = |phase: usize, at_end: bool| {
             let ends = [phases.u0[phase], phases.u1[phase]];
-            let motion: Motion<M> =
-                Motion::new(&phases, phase, self.curves.get(phases.piece[phase] as usize));
-            let there = motion.passage(ends[usize::from(at_end)], ends, phases.duration[phase]);
-            include(motion.acceleration(&there));
+            let motion = Motion::new(&phases, phase, &mut *self.columns);
+            let there = motion.passage(ends[usize::from(at_end)], &mut *self.columns);
+            include(motion.acceleration(&there, &mut *self.columns));
         };
         let mut first = self.phase;
         while first > run.start.max(self.phase.saturating_sub(MOST_SWITCHES)) && time - starts[first] < switch
@@ -321,7 +236,7 @@ impl<'a, const M: usize> Reader<'a, M> {
             neighbour(run.end, false);
         }
         if at_start || at_end {
-            include(([0.0; M], [0.0; M]));
+            include(Rounded { value: [0.0; M], rounding: [0.0; M] });
         }
         range
     }

@@ -3,7 +3,7 @@
 //! At constant jerk the time of a length is found by Newton's method in a bracket; where v² is a cubic polynomial of the length
 //! it is integrated.
 
-use super::phase_time::{kronrod, MOST_HALVINGS, RULES_AGREE};
+use super::quadrature::{integral, MOST_HALVINGS};
 use super::EPS;
 
 /// Halvings of a bracket of the time until it is as narrow as its numbers.
@@ -51,8 +51,8 @@ impl SpeedByLength {
             Self::Constant { speed } => way / speed,
             Self::Jerk { start, duration } => time_at_jerk(start, *duration, way),
             Self::Cubic { c, length } => {
-                let slowness = |x: f64| length / square(c, x).sqrt();
-                integral(&slowness, 0.0, way / length, &mut { MOST_HALVINGS })
+                let mut slowness = |x: f64| length / square(c, x).sqrt();
+                integral(&mut slowness, 0.0, way / length, &mut { MOST_HALVINGS })
             }
         }
     }
@@ -175,20 +175,6 @@ impl Pace {
 
 fn square(c: &[f64; 4], x: f64) -> f64 {
     c[0] + x * (c[1] + x * (c[2] + x * c[3]))
-}
-
-/// The integral from a to b, halved where the rules differ; not a number where that takes too long.
-pub fn integral(f: &impl Fn(f64) -> f64, a: f64, b: f64, halvings: &mut u32) -> f64 {
-    let [fine, doubt] = kronrod(f, a, b);
-    let middle = 0.5 * (a + b);
-    if doubt.abs() <= RULES_AGREE * fine.abs() || !(a < middle && middle < b) {
-        return fine;
-    }
-    if *halvings == 0 || !fine.is_finite() {
-        return f64::NAN;
-    }
-    *halvings -= 1;
-    integral(f, a, middle, halvings) + integral(f, middle, b, halvings)
 }
 
 #[cfg(test)]

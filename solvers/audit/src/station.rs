@@ -5,7 +5,7 @@
 //! T = C'/g and ₜ for the part along T: q_s = T, q_ss = (C'' − C''ₜ T)/g², and
 //! q_sss = (C''' − 3 C''ₜ/g (C'' − C''ₜ T) − (C'''ₜ + |C'' − C''ₜ T|²/g) T)/g³.
 
-use super::curve::{Curve, Curves, Pieces};
+use super::curve::Curve;
 use super::speed_by_length::Pace;
 use super::vectors::{inner, length, vector_of};
 use super::{EPS, ROUNDINGS};
@@ -29,6 +29,9 @@ pub struct Station<const M: usize> {
     pub first: Rounded<M>,
     pub second: Rounded<M>,
     pub third: Rounded<M>,
+    /// What the speed of the tool that feeds limit is of that along the path, and the curvature of its path in 1/mm.
+    pub tip: f64,
+    pub curvature: f64,
 }
 
 impl<const M: usize> Station<M> {
@@ -59,6 +62,8 @@ impl<const M: usize> Station<M> {
         Some(Self {
             u,
             slope: g,
+            tip: 1.0,
+            curvature: length(&across) * per2,
             first: Rounded {
                 value: direction,
                 rounding: vector_of(|k| unit1 * (size1[k] + c1[k].abs() * felt)),
@@ -84,8 +89,13 @@ impl<const M: usize> Station<M> {
     /// Of joints by their first three derivatives by u and g with its first two, each with how wrong it may be:
     /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³. Where nothing is
     /// known of a derivative its rounding is as great as any number.
-    pub fn of_joints(u: f64, joints: &[([f64; M], [f64; M]); 3], way: [(f64, f64); 3]) -> Self {
-        let [(q1, e1), (q2, e2), (q3, e3)] = joints;
+    pub fn of_joints(
+        u: f64,
+        joints: &[Rounded<M>; 3],
+        way: [(f64, f64); 3],
+        [tip, curvature]: [f64; 2],
+    ) -> Self {
+        let [(q1, e1), (q2, e2), (q3, e3)] = joints.each_ref().map(|q| (&q.value, &q.rounding));
         let [(g, _), (dg, dg_error), (ddg, ddg_error)] = way;
         let per = 1.0 / g;
         let (turn, turn_error) = (dg * per, dg_error * per);
@@ -102,6 +112,8 @@ impl<const M: usize> Station<M> {
         Self {
             u,
             slope: g,
+            tip,
+            curvature,
             first: rounded(per, &|k| q1[k], &|k| e1[k] + unit * q1[k].abs()),
             second: rounded(per * per, &|k| q2[k] - q1[k] * turn, &|k| {
                 let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
@@ -140,34 +152,6 @@ impl<const M: usize> Station<M> {
                 first.rounding[k] * j.abs() + second.rounding[k] * mixed.abs() + third.rounding[k] * cube
             }),
         }
-    }
-}
-
-/// Stations of pieces one after the other: the last two are kept, as a phase begins where the one before ends.
-pub struct Stations<'a, const M: usize> {
-    pub curves: Curves<'a, M>,
-    kept: [Option<(usize, Station<M>)>; 2],
-    older: usize,
-}
-
-impl<'a, const M: usize> Stations<'a, M> {
-    pub fn new(pieces: Pieces<'a>) -> Self {
-        Self { curves: Curves::new(pieces), kept: [None, None], older: 0 }
-    }
-
-    /// The place u of piece `i`; none where that has no direction.
-    pub fn get(&mut self, i: usize, u: f64) -> Option<&Station<M>> {
-        let is_here = |kept: &Option<(usize, Station<M>)>| matches!(kept, Some((piece, at)) if *piece == i && at.u == u);
-        let number = match self.kept.iter().position(is_here) {
-            Some(number) => number,
-            None => {
-                let (station, number) = (Station::new(self.curves.get(i), u)?, self.older);
-                self.kept[number] = Some((i, station));
-                self.older = 1 - number;
-                number
-            }
-        };
-        self.kept[number].as_ref().map(|(_, station)| station)
     }
 }
 

@@ -4,9 +4,12 @@
 //! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
 //! that is early or late is the way that the profile moves in that time.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
-use super::curve::{Curves, Followed};
+use super::columns::{Axes, Columns};
+use super::curve::{Curve, Followed};
 use super::moves::Programmed;
 use super::nearest::{Found, Place, Search};
 use super::profile_clock::ProfileClock;
@@ -105,21 +108,27 @@ struct Finder<'a, const M: usize> {
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
     /// The pieces, where there is no profile that has them.
-    curves: Curves<'a, M>,
+    columns: Axes<'a, M>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
 }
 
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
-        let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
-        let curves = Curves::new(plan.path.pieces);
+        let profile = plan
+            .profile
+            .as_ref()
+            .map(|profile| Reader::new(profile, Box::new(Axes::new(&plan.path, limits))));
+        let columns = Axes::new(&plan.path, limits);
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, curves, reach }
+        Self { plan, limits, profile, columns, reach }
     }
 
-    fn curves(&mut self) -> &mut Curves<'a, M> {
-        self.profile.as_mut().map_or(&mut self.curves, |profile| &mut profile.curves)
+    fn curve(&mut self, piece: usize) -> Arc<Curve<M>> {
+        match &mut self.profile {
+            Some(profile) => profile.columns.curve(piece),
+            None => self.columns.curve(piece),
+        }
     }
 
     fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest<M> {
@@ -138,7 +147,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
         let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
-        let most = self.curves().get(from.piece).magnitude();
+        let most = self.curve(from.piece).magnitude();
         let magnitude = row.q.iter().fold(most, |most, q| q.abs().max(most));
         let rounding = ROUNDINGS * EPS * magnitude * (path.axes as f64).sqrt();
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
@@ -162,7 +171,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         let mut nearest = Nearest { place, step, magnitude, off, late, allowed, ..Nearest::default() };
         if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
-            nearest.velocity = profile.velocity(&here);
+            nearest.velocity = here.velocity.value;
             if let Some(recorded) = row.acceleration.filter(|_| nearest.is_good()) {
                 nearest.acceleration_off = profile.acceleration_off(&here, row.t, &recorded, limits);
             }
@@ -175,15 +184,14 @@ impl<'a, const M: usize> Finder<'a, M> {
     fn guess(&mut self, from: Place, step: f64, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
         let (mut piece, mut u) = (from.piece, from.u + step);
         let pieces = self.plan.path.len();
-        let curves = self.curves();
-        let mut curve = curves.get(piece);
+        let mut curve = self.curve(piece);
         for _ in 0..MOST_GUESSES {
             if u > curve.width() {
                 piece += 1;
                 if piece > from.piece + 1 || piece == pieces {
                     return None;
                 }
-                (curve, u) = (curves.get(piece), 0.0);
+                (curve, u) = (self.curve(piece), 0.0);
             }
             let [point, tangent] = curve.place(u);
             let (away, square) = (from_to(&point, q), inner(&tangent, &tangent));

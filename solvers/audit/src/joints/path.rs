@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use super::formula::{Formula, Jet};
+use crate::columns::Place;
 use crate::curve::{Curve, Followed};
-use crate::phase_by_length::PhaseByLength;
 use crate::phase_motion::curvature;
-use crate::phases::{is_by_length, Phases};
-use crate::station::Station;
+use crate::station::{Rounded, Station};
 use crate::vectors::length;
 use crate::{EPS, ROUNDINGS};
 
@@ -70,23 +69,6 @@ pub struct Piece<'a, const M: usize> {
     start_size: f64,
 }
 
-/// A place of a piece: the tip, the joints and their derivatives by u, each with a bound of its error.
-#[derive(Clone, Copy, Debug)]
-pub struct Place<const M: usize> {
-    pub u: f64,
-    pub tip: [f64; M],
-    pub position: [f64; M],
-    pub unknown: [f64; M],
-    pub slope: [f64; M],
-    pub slope_error: [f64; M],
-    /// Derivatives by u of the way that the feed limits, and of the way in all axes.
-    pub feed_slope: f64,
-    pub way_slope: f64,
-}
-
-/// A number of each joint, and a bound of its error.
-pub type Rows<const M: usize> = ([f64; M], [f64; M]);
-
 /// Room for the results of a formula, used again at every place.
 pub struct Work {
     positions: Vec<Jet<1>>,
@@ -97,6 +79,11 @@ pub struct Work {
 impl JointPath<'_> {
     pub fn run_of(&self, piece: usize) -> usize {
         self.path.runs.partition_point(|&first| first <= piece as i64) - 1
+    }
+
+    /// What each axis of the path counts in its length.
+    pub fn scale<const M: usize>(&self) -> [f64; M] {
+        std::array::from_fn(|k| self.way_scale.get(k).copied().unwrap_or(0.0))
     }
 
     /// Room for results of all formulas.
@@ -115,7 +102,7 @@ impl JointPath<'_> {
     }
 
     /// The same where its curve is at hand.
-    pub fn piece_on<const M: usize>(&self, number: usize, curve: Arc<Curve<M>>) -> Piece<'_, M> {
+    pub(super) fn piece_on<const M: usize>(&self, number: usize, curve: Arc<Curve<M>>) -> Piece<'_, M> {
         let run = self.run_of(number);
         let words = &self.words[self.words_of[run]];
         let flag = |flags: &[bool], k: usize| flags.get(k).copied().unwrap_or(false);
@@ -135,7 +122,7 @@ impl JointPath<'_> {
             words,
             counts: std::array::from_fn(|k| number_of(k < axes && flag(self.xyz, k) == linear)),
             turns: words.directed && !linear,
-            way_scale: std::array::from_fn(|k| self.way_scale.get(k).copied().unwrap_or(0.0)),
+            way_scale: self.scale(),
             xyz: std::array::from_fn(|k| number_of(flag(self.xyz, k))),
             ijk: std::array::from_fn(|_| ijk.next().unwrap_or(0)),
             size: curve.magnitude(),
@@ -175,8 +162,11 @@ impl<const M: usize> Piece<'_, M> {
         times(&self.counts, &self.curve.derivative(u))
     }
 
-    /// Curvature of the path in the axes whose motion the feed limits.
+    /// Curvature of the path in the axes whose motion the feed limits, if X, Y, Z are among these.
     pub fn curvature(&self, u: f64) -> f64 {
+        if self.linear() == [0.0; M] {
+            return 0.0;
+        }
         let [tangent, bend, _] = self.curve.derivatives(u);
         curvature(&times(&self.counts, &tangent), &times(&self.counts, &bend))
     }
@@ -217,7 +207,7 @@ impl<const M: usize> Piece<'_, M> {
         self.words.formula.evaluate(table);
     }
 
-    fn joint_rows<const N: usize>(&self, table: &[Jet<N>], order: usize) -> Rows<M> {
+    fn joint_rows<const N: usize>(&self, table: &[Jet<N>], order: usize) -> Rounded<M> {
         let (mut value, mut error) = ([0.0; M], [0.0; M]);
         for (joint, &place) in self.words.formula.outputs.iter().enumerate() {
             let jet = &table[place];
@@ -227,13 +217,13 @@ impl<const M: usize> Piece<'_, M> {
                 (value[joint], error[joint]) = (0.0, f64::INFINITY);
             }
         }
-        (value, error)
+        Rounded { value, rounding: error }
     }
 
     /// Positions of the joints at a tip, angles as the kinematics gives them.
     pub fn joints_at(&self, tip: &[f64; M], work: &mut Work) -> [f64; M] {
         self.fill(&mut work.positions, |k| Jet { value: [tip[k]], error: [TIP_ROUNDINGS * self.size] });
-        self.joint_rows(&work.positions, 0).0
+        self.joint_rows(&work.positions, 0).value
     }
 
     /// Positions of the joints.
@@ -252,17 +242,15 @@ impl<const M: usize> Piece<'_, M> {
     }
 
     fn place_of<const N: usize>(&self, u: f64, tip: [f64; M], slope: [f64; M], table: &[Jet<N>]) -> Place<M> {
-        let (position, unknown) = self.joint_rows(table, 0);
-        let (joint_slope, slope_error) = self.joint_rows(table, 1);
+        let way_slope = length(&times(&self.way_scale, &slope));
         Place {
+            piece: self.number,
             u,
             tip,
-            position,
-            unknown,
-            slope: joint_slope,
-            slope_error,
-            feed_slope: self.feed_slope_of(&tip, &slope),
-            way_slope: length(&times(&self.way_scale, &slope)),
+            position: self.joint_rows(table, 0),
+            slope: self.joint_rows(table, 1),
+            way_slope,
+            tip_slope: [self.feed_slope_of(&tip, &slope), 0.0],
         }
     }
 
@@ -295,9 +283,11 @@ impl<const M: usize> Piece<'_, M> {
             }
         }
         let way = square.root();
-        let way = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
+        let way: [_; 3] = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
         let joints = [1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
-        (self.place_of(u, tip, slopes[0], &work.bends), Station::of_joints(u, &joints, way))
+        let place = self.place_of(u, tip, slopes[0], &work.bends);
+        let tool = [place.tip_slope[0] / way[0].0, self.curvature(u)];
+        (place, Station::of_joints(u, &joints, way, tool))
     }
 
     /// From one position to another, both of this piece, or the first of an `other` one: joints known up to whole turns on one
@@ -311,15 +301,6 @@ impl<const M: usize> Piece<'_, M> {
                 way
             }
         })
-    }
-
-    /// A phase on the piece, where its speed is known by the length of the path; its numbers must be good.
-    pub fn by_length(&self, phases: &Phases, phase: usize) -> Option<PhaseByLength<M>> {
-        if !is_by_length(phases.kind[phase]) {
-            return None;
-        }
-        let slope = |u: f64| length(&times(&self.way_scale, &self.curve.derivative(u)));
-        phases.by_length(phase, &self.curve, &self.way_scale, slope)
     }
 
     /// The greatest coordinate of the first control point.

@@ -4,16 +4,21 @@
 //! Its distance from there is one error; how far the profile moves between the time of the setpoint and its own time at u is the
 //! other. The clock starts every run anew: setpoints may wait at a stop for their next period.
 
+use std::rc::Rc;
+
 use rayon::prelude::*;
 
-use super::path::{Piece, Place, Work};
-use super::phase_motion::{motion, motion_by_length, ROUNDING};
+use super::columns::JointColumns;
+use super::path::Piece;
 use super::plan::JointAudit;
 use crate::against_plan::VELOCITY_SHARE;
-use crate::phase_by_length::PhaseByLength;
+use crate::columns::{Columns, Place};
+use crate::motion::Motion;
+use crate::phase_motion::ROUNDING;
 use crate::profile_clock::ProfileClock;
 use crate::rows::Row;
 use crate::setpoints::Chunk;
+use crate::station::Rounded;
 use crate::tracking::STEP_SHARE;
 use crate::vectors::{length, Segment};
 use crate::{Check, Tally, EPS, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
@@ -37,9 +42,8 @@ struct Nearest<'r, const M: usize> {
     /// Distance from the place, and distance of the profile from there at the time of the setpoint.
     off: f64,
     late: f64,
-    /// Velocity of the profile there, and a bound of its error.
-    velocity: [f64; M],
-    velocity_error: [f64; M],
+    /// Velocity of the profile there.
+    velocity: Rounded<M>,
 }
 
 /// The chord error of a step, and the length of its chord.
@@ -156,27 +160,18 @@ impl<const M: usize> JointSetpoints<M> {
     }
 }
 
-/// The phase of the last setpoint, its piece, the place at its start, and its motion.
+/// The phase of the last setpoint, its piece, and its motion.
 struct Known<'a, const M: usize> {
     phase: usize,
-    piece: Piece<'a, M>,
-    start: Place<M>,
+    piece: Rc<Piece<'a, M>>,
     motion: Motion<M>,
-}
-
-/// The motion on a phase: known by the length, or between its start and its end.
-enum Motion<const M: usize> {
-    ByLength(PhaseByLength<M>),
-    To(Place<M>),
 }
 
 /// Judges setpoints that follow each other.
 struct Judge<'a, const M: usize> {
     audit: &'a JointAudit<'a, M>,
     clock: ProfileClock<'a>,
-    work: Work,
-    /// The piece before the one of the last setpoint.
-    earlier: Option<Piece<'a, M>>,
+    columns: JointColumns<'a, M>,
     known: Option<Known<'a, M>>,
     tally: Tally<M>,
     chords: Vec<Chord>,
@@ -184,8 +179,8 @@ struct Judge<'a, const M: usize> {
 
 impl<'a, const M: usize> Judge<'a, M> {
     fn new(audit: &'a JointAudit<'a, M>, clock: ProfileClock<'a>) -> Self {
-        let work = audit.path.work();
-        Self { audit, clock, work, earlier: None, known: None, tally: Tally::default(), chords: Vec::new() }
+        let columns = JointColumns::new(audit);
+        Self { audit, clock, columns, known: None, tally: Tally::default(), chords: Vec::new() }
     }
 
     /// Judges rows by themselves and against those before them, the first one against `before`.
@@ -204,9 +199,9 @@ impl<'a, const M: usize> Judge<'a, M> {
     }
 
     /// The piece of the last setpoint.
-    fn piece(&self) -> &Piece<'a, M> {
+    fn piece(&self) -> Rc<Piece<'a, M>> {
         let Some(Known { piece, .. }) = &self.known else { unreachable!("a setpoint has been found") };
-        piece
+        piece.clone()
     }
 
     /// Offers what a setpoint shows.
@@ -227,12 +222,13 @@ impl<'a, const M: usize> Judge<'a, M> {
         let at_joint = nearest.u.min(piece.width - nearest.u) <= PLACE_TOLERANCE;
         let size = nearest.row.q.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let away = nearest.off.max(0.0) + nearest.late + ROUNDING * size;
-        let good =
-            nearest.off <= PLACE_TOLERANCE && nearest.velocity.iter().all(|velocity| velocity.is_finite());
+        let good = nearest.off <= PLACE_TOLERANCE
+            && nearest.velocity.value.iter().all(|velocity| velocity.is_finite());
         for k in 0..self.audit.path.joints {
             // From rest over a way of `away` the velocity reaches this.
-            let unknown = (2.0 * limits.acceleration.greatest(k) * away).sqrt() + nearest.velocity_error[k];
-            let value = if good { (recorded[k] - nearest.velocity[k]).abs() - unknown } else { 0.0 };
+            let unknown =
+                (2.0 * limits.acceleration.greatest(k) * away).sqrt() + nearest.velocity.rounding[k];
+            let value = if good { (recorded[k] - nearest.velocity.value[k]).abs() - unknown } else { 0.0 };
             let jump = if at_joint { limits.jump[k] } else { 0.0 };
             let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
             tally.offer(Check::RecordedVelocity, k, value, limit, t, line);
@@ -247,15 +243,7 @@ impl<'a, const M: usize> Judge<'a, M> {
         let follows = before.piece <= nearest.piece && nearest.piece - before.piece <= 1;
         let is_step = time > 0.0 && time <= 2.0 * limits.period && follows;
         let crosses = before.piece != nearest.piece;
-        let (made, first);
-        first = match &self.earlier {
-            _ if !crosses => piece,
-            Some(earlier) if earlier.number == before.piece => earlier,
-            _ => {
-                made = audit.path.piece(before.piece);
-                &made
-            }
-        };
+        let first = if crosses { self.columns.piece(before.piece) } else { piece.clone() };
         // To the end of the piece before, and from the start of this one: their words may have different meanings.
         let until = if crosses { first.width } else { nearest.u };
         let since = if crosses { 0.0 } else { nearest.u };
@@ -264,7 +252,7 @@ impl<'a, const M: usize> Judge<'a, M> {
         let size = before.tip.iter().chain(&nearest.tip).fold(0.0, |most: f64, x| most.max(x.abs()));
         let rounding = ROUNDING * size;
         let (mut way, mut least) = (0.0, 0.0);
-        for (piece, from, to) in [(first, &before.tip, &there), (piece, &here, &nearest.tip)] {
+        for (piece, from, to) in [(&first, &before.tip, &there), (&piece, &here, &nearest.tip)] {
             let step = (piece.feed_way(from, to) - 2.0 * rounding).max(0.0);
             way += step;
             least += step / audit.path.feed[piece.number];
@@ -279,10 +267,10 @@ impl<'a, const M: usize> Judge<'a, M> {
             let near = if stops { &here } else { &before.tip };
             let mut error = 0.0;
             if crosses {
-                error = chord_error(first, before.u, until, &before.tip, far);
+                error = chord_error(&first, before.u, until, &before.tip, far);
             }
             let start = if crosses { 0.0 } else { before.u };
-            error = chord_error(piece, start, nearest.u, near, &nearest.tip).max(error);
+            error = chord_error(&piece, start, nearest.u, near, &nearest.tip).max(error);
             let error = if is_step { error - rounding - nearest.off.max(0.0) } else { 0.0 };
             let linear = piece.linear();
             let length = length::<M>(&std::array::from_fn(|k| linear[k] * (nearest.tip[k] - near[k])));
@@ -299,35 +287,17 @@ impl<'a, const M: usize> Judge<'a, M> {
         let (phase, since) = found.expect("every run has phases");
         let since = since.clamp(0.0, phases.duration[phase]);
         if self.known.as_ref().is_none_or(|known| known.phase != phase) {
-            let number = phases.piece[phase] as usize;
-            let piece = match self.known.take() {
-                Some(Known { piece, .. }) if piece.number == number => piece,
-                other => {
-                    self.earlier = other.map(|known| known.piece);
-                    audit.path.piece(number)
-                }
-            };
-            let start = piece.place(phases.u0[phase], &mut self.work);
-            let motion = match piece.by_length(phases, phase) {
-                Some(motion) => Motion::ByLength(motion),
-                None => Motion::To(piece.place(phases.u1[phase], &mut self.work)),
-            };
-            self.known = Some(Known { phase, piece, start, motion });
+            let piece = self.columns.piece(phases.piece[phase] as usize);
+            let motion = Motion::new(phases, phase, &mut self.columns);
+            self.known = Some(Known { phase, piece, motion });
         }
-        let Some(Known { piece, start, motion: known, .. }) = &self.known else {
-            unreachable!("the phase is known")
-        };
+        let Some(Known { piece, motion, .. }) = &self.known else { unreachable!("the phase is known") };
         let is_finite = row.t.is_finite() && row.q.iter().all(|x| x.is_finite());
         let target = if is_finite { row.q } else { [0.0; M] };
-        let place = nearest(piece, phases, phase, since, &target, &mut self.work);
-        let states = match known {
-            Motion::ByLength(by_length) => motion_by_length(piece, by_length, &[*start, place]),
-            Motion::To(end) => motion(piece, phases, phase, &[*start, place, *end], 1),
-        };
-        let here = &states[1];
-        let doubt = here.time * here.time_error;
-        let doubt = if doubt.is_nan() { 0.0 } else { doubt };
-        let wait = (here.time - since).abs() - doubt - EPS * row.t.abs() * (phase as f64 + 2.0 * ROUNDINGS);
+        let place = nearest(piece, phases, phase, since, &target, &mut self.columns);
+        let here = motion.passage(place.u, &mut self.columns);
+        let doubt = if here.doubt.is_nan() { 0.0 } else { here.doubt };
+        let wait = (here.since - since).abs() - doubt - EPS * row.t.abs() * (phase as f64 + 2.0 * ROUNDINGS);
         let wait = if wait.is_nan() { wait } else { wait.max(0.0) };
         let pull = length(&audit.limits.acceleration.greater());
         Nearest {
@@ -337,10 +307,9 @@ impl<'a, const M: usize> Judge<'a, M> {
             u: place.u,
             tip: place.tip,
             target,
-            off: off(piece, &target, &place.position),
-            late: wait * (length(&here.velocity) + 0.5 * wait * pull),
+            off: off(piece, &target, &place.position.value),
+            late: wait * (length(&here.velocity.value) + 0.5 * wait * pull),
             velocity: here.velocity,
-            velocity_error: here.velocity_error,
         }
     }
 }
@@ -368,22 +337,22 @@ fn nearest<const M: usize>(
     phase: usize,
     since: f64,
     target: &[f64; M],
-    work: &mut Work,
+    columns: &mut JointColumns<M>,
 ) -> Place<M> {
     let (low, high) = (phases.u0[phase], phases.u1[phase]);
     let (near, far) = (phases.p0[phase].sqrt(), phases.p1[phase].sqrt());
     let x = (since / phases.duration[phase]).clamp(0.0, 1.0);
     let share = x * (2.0 * near + (far - near) * x) / (near + far);
     let share = if share.is_nan() { 0.5 } else { share };
-    let mut place = piece.place((low + (high - low) * share).clamp(low, high), work);
-    let mut to = piece.between(&place.position, target, None);
+    let mut place = columns.place(piece.number, (low + (high - low) * share).clamp(low, high));
+    let mut to = piece.between(&place.position.value, target, None);
     // Steps below the rounding of the place stop: next to rest they would change its time.
     let known = rounding(piece, target);
     for _ in 0..MOST_STEPS {
         let (mut along, mut slope_sq) = (0.0, 0.0);
         for k in 0..piece.joints() {
-            along += to[k] * place.slope[k];
-            slope_sq += place.slope[k] * place.slope[k];
+            along += to[k] * place.slope.value[k];
+            slope_sq += place.slope.value[k] * place.slope.value[k];
         }
         if along.abs() <= known * slope_sq.sqrt() {
             break;
@@ -393,8 +362,8 @@ fn nearest<const M: usize>(
         if u == place.u {
             break;
         }
-        let there = piece.place(u, work);
-        let onward = piece.between(&there.position, target, None);
+        let there = columns.place(piece.number, u);
+        let onward = piece.between(&there.position.value, target, None);
         let is_nearer = length(&onward) + known < length(&to);
         if !is_nearer {
             break;

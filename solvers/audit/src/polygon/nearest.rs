@@ -51,12 +51,7 @@ impl<const M: usize> Polygon<M> {
         if self.degree == 1 {
             return true;
         }
-        let mut chord = [0.0; M];
-        for step in &self.steps[..self.degree] {
-            for k in 0..M {
-                chord[k] += step[k];
-            }
-        }
+        let chord = self.chord();
         let size = NEARLY_STRAIGHT * length(&chord);
         self.steps[..self.degree].iter().all(|step| inner(step, &chord) >= size * length(step))
     }

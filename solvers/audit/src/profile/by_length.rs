@@ -7,21 +7,18 @@
 //! * elsewhere a parabola through three places tells where a rate is greatest, and it is measured there.
 
 use crate::chord::chord_error;
+use crate::columns::{Columns, CHORD};
+use crate::curve::Curve;
 use crate::peak::peak;
 use crate::phase_by_length::{PhaseByLength, Place};
+use crate::phase_motion::ROUNDING;
 use crate::station::{Rounded, Station};
-use crate::vectors::{length, vector_of};
+use crate::vectors::vector_of;
 use crate::{Check, Limits, Tally, FEEDS, PASS_EXCESS};
 
 /// The next places are this part of the distance beside a vertex, and are taken so often at most.
 const CLOSER: f64 = 0.5;
 const MOST_REFINED: u32 = 3;
-
-/// Where the bound is wide a parabola follows the rates on so many intervals of a phase that covers its whole piece, for each
-/// degree, and of one from rest; and at least.
-const PLACES: f64 = 5.0;
-const SPEEDS: f64 = 10.0;
-const LEAST: f64 = 4.0;
 
 /// Where more than this share of a limit may be used beyond what both ends use, a parabola is not trusted; an interval is halved
 /// so often at most.
@@ -57,7 +54,10 @@ enum Between {
 
 /// Where and when a phase is, and the limits that hold there.
 pub struct Looker<'a, const M: usize> {
+    pub columns: &'a mut dyn Columns<M>,
+    pub piece: usize,
     pub motion: &'a PhaseByLength<M>,
+    pub curve: &'a Curve<M>,
     pub limits: &'a Limits<M>,
     pub feeds: [f64; FEEDS],
     /// The part of its piece that the phase covers, in degrees of it.
@@ -68,7 +68,7 @@ pub struct Looker<'a, const M: usize> {
 
 impl<const M: usize> Looker<'_, M> {
     /// Looks at a phase between two parameters, at which it has been looked.
-    pub fn phase(&self, u: [f64; 2], ends: [Option<&Look<M>>; 2], tally: &mut Tally<M>) {
+    pub fn phase(&mut self, u: [f64; 2], ends: [Option<&Look<M>>; 2], tally: &mut Tally<M>) {
         // At most 1, as speeds are positive; a profile of rubbish has any numbers.
         let change = match ends {
             [Some(from), Some(to)] => {
@@ -77,12 +77,13 @@ impl<const M: usize> Looker<'_, M> {
             }
             _ => 1.0,
         };
-        self.between(ends, u, (0, PLACES * self.covered + SPEEDS * change), tally);
+        let intervals = self.columns.intervals(self.covered, change);
+        self.between(ends, u, (0, intervals), tally);
     }
 
     /// Looks between two places where a bound leaves open what lies there.
     fn between(
-        &self,
+        &mut self,
         ends: [Option<&Look<M>>; 2],
         u: [f64; 2],
         (halvings, intervals): (u32, f64),
@@ -92,7 +93,7 @@ impl<const M: usize> Looker<'_, M> {
             [Some(from), Some(to)] => self.bound(from, to, tally),
             _ => Between::Unbounded,
         };
-        let enough = f64::from(2 << halvings) >= intervals.max(LEAST);
+        let enough = f64::from(2 << halvings) >= intervals;
         let is_followed = match bound {
             Between::Certain => return,
             Between::Narrow => true,
@@ -113,7 +114,7 @@ impl<const M: usize> Looker<'_, M> {
 
     /// Looks where parabolas through three even places say that a rate is greater than any so far, and beside it: one rate
     /// after the other.
-    fn refine(&self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
+    fn refine(&mut self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
         let mut peaks = Vec::new();
         for (row, check) in RATES.into_iter().enumerate() {
             for k in 0..M {
@@ -137,12 +138,14 @@ impl<const M: usize> Looker<'_, M> {
         }
     }
 
-    fn look(&self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
-        Some(self.look_at(&self.motion.station(u)?, tally))
+    /// Looks at a place; none where the path has no direction.
+    pub fn look(&mut self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
+        let station = self.columns.station(self.piece, u)?;
+        Some(self.look_at(&station, tally))
     }
 
     /// Offers what a place shows.
-    pub fn look_at(&self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
+    fn look_at(&self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
         let (limits, line) = (self.limits, self.line);
         let place = self.motion.place(station.u);
         let pace = place.pace;
@@ -170,15 +173,16 @@ impl<const M: usize> Looker<'_, M> {
         if limits.judges_jerk {
             offer(Check::Jerk, &station.jerk(pace), limits.jerk);
         }
+        let tip = [pace.v, speed_rounding + ROUNDING * pace.v].map(|v| station.tip * v);
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let speed = length(&limits.counted(feed, &velocity.value))
-                - length(&limits.counted(feed, &velocity.rounding));
+            let [speed, rounding] = self.columns.speed(feed, &velocity, tip);
+            let speed = speed - rounding;
             used.tip[feed] = speed / limit;
             tally.offer_at(Check::Feed, 0, speed, limit, line, time);
         }
         if limits.chord_tolerance.is_finite() {
-            let speed = length(&velocity.value) - length(&velocity.rounding);
-            let error = chord_error(speed * limits.period, length(&station.second.value));
+            let [speed, rounding] = self.columns.speed(CHORD, &velocity, tip);
+            let error = chord_error((speed - rounding) * limits.period, station.curvature);
             used.tip[FEEDS] = error / limits.chord_tolerance;
             tally.offer_at(Check::Chord, 0, error, limits.chord_tolerance, line, time);
         }
@@ -188,6 +192,9 @@ impl<const M: usize> Looker<'_, M> {
     /// What a bound says of the places between two beside what has been found so far.
     fn bound(&self, from: &Look<M>, to: &Look<M>, tally: &Tally<M>) -> Between {
         let (limits, ends) = (self.limits, [&from.used, &to.used]);
+        if !self.columns.are_axes() {
+            return Between::Unbounded;
+        }
         let Some(bulge) = self.motion.bulge([&from.place, &to.place], [&from.station, &to.station]) else {
             return Between::Unbounded;
         };
@@ -197,7 +204,8 @@ impl<const M: usize> Looker<'_, M> {
             is_narrow &= more <= WIDE;
         };
         let judged = if limits.judges_jerk { 3 } else { 2 };
-        for k in (0..limits.axes).filter(|&k| self.motion.moves(k)) {
+        let moves = self.curve.derivative_size();
+        for k in (0..limits.axes).filter(|&k| moves[k] > 0.0) {
             let least = [limits.velocity.least(k), limits.acceleration.least(k), limits.jerk[k]];
             for (row, check) in RATES.into_iter().enumerate().take(judged) {
                 let [near, far] = ends.map(|used| used.rates[row][k].abs());
@@ -211,8 +219,7 @@ impl<const M: usize> Looker<'_, M> {
             weigh(Check::Feed, 0, known, (bulge.rates[0] / limit).min(bulge.most_speed / limit - known));
         }
         if limits.chord_tolerance.is_finite() {
-            let [near, far] = [from, to].map(|look| length(&look.station.second.value));
-            let curvature = near.max(far) + bulge.curvature;
+            let curvature = from.station.curvature.max(to.station.curvature) + bulge.curvature;
             let most = chord_error(bulge.most_speed * limits.period, curvature) / limits.chord_tolerance;
             let [near, far] = ends.map(|used| used.tip[FEEDS]);
             weigh(Check::Chord, 0, near.max(far), most - near.max(far));
@@ -231,42 +238,12 @@ const RATES: [Check; 3] = [Check::Velocity, Check::Acceleration, Check::Jerk];
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::Curve;
-    use crate::phases::Phases;
-    use crate::polygon::Polygon;
+    use crate::columns::Axes;
+    use crate::curve::{Followed, Pieces};
+    use crate::phases::{Phases, FEED, SPEED_CUBIC};
+    use crate::vectors::length;
     use crate::Sided;
     use proptest::prelude::*;
-    use std::sync::Arc;
-
-    /// A phase on part of a curve, with the speeds and the accelerations along the path at its ends.
-    fn phase(
-        curve: &Arc<Curve<2>>,
-        kind: u8,
-        [u0, u1]: [f64; 2],
-        speeds: [f64; 2],
-        pulls: [f64; 2],
-    ) -> PhaseByLength<2> {
-        let p: Vec<f64> =
-            (0..2).map(|i| (speeds[i] / length(&curve.derivative([u0, u1][i]))).powi(2)).collect();
-        Phases {
-            piece: &[0],
-            kind: &[kind],
-            axis: &[255],
-            value: &[speeds[0] * speeds[0]],
-            u0: &[u0],
-            u1: &[u1],
-            p0: &p[..1],
-            p1: &p[1..],
-            duration: &[1.0],
-            a0: &pulls[..1],
-            a1: &pulls[1..],
-            share: &[],
-            pieces: 1,
-            runs: &[0, 1],
-        }
-        .by_length(0, curve, &[1.0; 2], |u| length(&curve.derivative(u)))
-        .unwrap()
-    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
@@ -281,17 +258,48 @@ mod tests {
             speeds in prop::array::uniform2(1.0..1.1_f64),
             flat: bool,
         ) {
-            let points: Vec<[f64; 2]> = (0..=degree).map(|i| [i as f64, bends[i]]).collect();
-            let curve = Arc::new(Curve::general(Polygon::new(points.into_iter(), &[]), degree as f64));
-            let width = curve.width();
+            let control: Vec<f64> = (0..=degree).flat_map(|i| [i as f64, bends[i]]).collect();
+            let (offsets, width) = ([0, degree + 1], [degree as f64]);
+            let path = Followed {
+                pieces: Pieces { axes: 2, stride: 2, control: &control, weights: &[], offsets: &offsets, width: &width },
+                feed: &[f64::INFINITY; FEEDS],
+                line: &[1],
+                moves: &[0, 0],
+                tolerance: &[0.0],
+                runs: &[0, 1],
+                new_words: &[false],
+                start_dwell: 0.0,
+                dwell: &[0.0],
+            };
+            let [width] = width;
             let from = 0.8 * width * cut[0];
             let u = [from, from + 0.2 * width * (0.1 + 0.9 * cut[1])];
-            let (kind, speeds) = if flat { (crate::phases::FEED, [speeds[0]; 2]) } else { (crate::phases::SPEED_CUBIC, speeds) };
-            let motion = phase(&curve, kind, u, speeds, [0.0; 2]);
+            let (kind, speeds) = if flat { (FEED, [speeds[0]; 2]) } else { (SPEED_CUBIC, speeds) };
+            let (mut limits, free) = (Limits::none(), Limits::none());
+            let mut columns = Axes::new(&path, &free);
+            let curve = columns.curve(0);
+            let p = [0, 1].map(|i| (speeds[i] / length(&curve.derivative(u[i]))).powi(2));
+            let phases = Phases {
+                piece: &[0],
+                kind: &[kind],
+                axis: &[255],
+                value: &[speeds[0] * speeds[0]],
+                u0: &u[..1],
+                u1: &u[1..],
+                p0: &p[..1],
+                p1: &p[1..],
+                duration: &[1.0],
+                a0: &[0.0],
+                a1: &[0.0],
+                share: &[],
+                pieces: 1,
+                runs: &[0, 1],
+            };
+            let motion = phases.by_length(0, &mut columns).unwrap();
             let mut most = [[0.0_f64; 2]; 3];
             for i in 0..=2000 {
                 let at = u[0] + (u[1] - u[0]) * f64::from(i) / 2000.0;
-                let (Place { pace, .. }, station) = (motion.place(at), motion.station(at).unwrap());
+                let (Place { pace, .. }, station) = (motion.place(at), Station::new(&curve, at).unwrap());
                 let rates = [station.velocity(pace.v), station.acceleration(pace), station.jerk(pace)];
                 for (row, rate) in rates.iter().enumerate() {
                     for k in 0..2 {
@@ -302,23 +310,13 @@ mod tests {
             let below = if flat { 1.001 } else { 1.01 };
             let [velocity, acceleration, jerk] = most.map(|row| row.map(|most| most / below));
             let of = |limit: [f64; 2]| Sided { positive: limit, negative: limit };
-            let limits = Limits {
-                axes: 2,
-                velocity: of(velocity),
-                acceleration: of(acceleration),
-                jerk,
-                judges_jerk: true,
-                jump: [0.0; 2],
-                jump_beyond: [0.0; 2],
-                travel: [[f64::NEG_INFINITY, f64::INFINITY]; 2],
-                feed_axes: [[1.0; 2]; FEEDS],
-                chord_tolerance: f64::INFINITY,
-                period: 1e-3,
-                end_speeds: [0.0; 2],
-            };
+            (limits.velocity, limits.acceleration) = (of(velocity), of(acceleration));
+            (limits.jerk, limits.judges_jerk) = (jerk, true);
             let mut tally = Tally::default();
             let (feeds, covered) = ([f64::INFINITY; FEEDS], curve.turns() as f64 * (u[1] - u[0]) / width);
-            let looker = Looker { motion: &motion, limits: &limits, feeds, covered, start: 0.0, line: 1 };
+            let (columns, motion, curve, limits) = (&mut columns as &mut dyn Columns<2>, &motion, &*curve, &limits);
+            let mut looker =
+                Looker { columns, piece: 0, motion, curve, limits, feeds, covered, start: 0.0, line: 1 };
             let ends = u.map(|u| looker.look(u, &mut tally));
             looker.phase(u, ends.each_ref().map(Option::as_ref), &mut tally);
             for (row, check) in [Check::Velocity, Check::Acceleration, Check::Jerk].into_iter().enumerate() {

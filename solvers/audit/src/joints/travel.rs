@@ -1,0 +1,82 @@
+//! Audits the positions of joints that are not the path's axes against their travel, along the whole path.
+//!
+//! Some angles are known up to whole turns only. They are continuous from place to place, and a piece on which a joint's own angle
+//! is known tells its whole turns on all pieces.
+
+use std::rc::Rc;
+
+use super::columns::JointColumns;
+use super::path::{Piece, TURN};
+use super::plan::JointAudit;
+use crate::nearest::Place;
+use crate::phase_motion::ROUNDING;
+use crate::profile_reader::Reader;
+use crate::{Check, Tally, Worst};
+
+/// Even intervals of a piece for each degree.
+const INTERVALS: usize = 4;
+
+/// Least and greatest position of a joint, with their places.
+type Span = [(f64, Place); 2];
+
+/// The travel of every joint, at the times of a profile if its numbers can be used.
+pub fn audit_travel<const M: usize>(of: &JointAudit<M>) -> Tally<M> {
+    let (mut tally, mut columns) = (Tally::default(), JointColumns::new(of));
+    let (mut work, path) = (of.path.work(), &of.path.path);
+    let nowhere = (f64::NAN, Place { piece: 0, u: 0.0 });
+    let mut spans: [Span; M] = [[nowhere; 2]; M];
+    let mut turns = [f64::NAN; M];
+    // The last piece and its end, as the kinematics says and continuous.
+    let mut last: Option<(Rc<Piece<M>>, [f64; M], [f64; M])> = None;
+    for number in 0..path.len() {
+        let piece = columns.piece(number);
+        let intervals = INTERVALS * piece.curve.turns();
+        for i in 0..=intervals {
+            let u = piece.width * (i as f64 / intervals as f64);
+            let position = piece.at(u, &mut work);
+            let reached = match &last {
+                None => position,
+                Some((before, own, seen)) => {
+                    let step = piece.between(own, &position, Some(before));
+                    std::array::from_fn(|k| seen[k] + step[k])
+                }
+            };
+            for k in 0..of.path.joints {
+                if !piece.turning(k) && turns[k].is_nan() {
+                    turns[k] = TURN * ((position[k] - reached[k]) / TURN).round();
+                }
+                for (end, sign) in [(0, -1.0), (1, 1.0)] {
+                    let is_no_farther = sign * reached[k] <= sign * spans[k][end].0;
+                    if !is_no_farther && !reached[k].is_nan() {
+                        spans[k][end] = (reached[k], Place { piece: number, u });
+                    }
+                }
+            }
+            last = Some((piece.clone(), position, reached));
+        }
+    }
+    let mut reader = of
+        .phases
+        .fits(path, of.path.joints)
+        .then(|| Reader::new(&of.clock(&[]), Box::new(JointColumns::new(of))));
+    for k in 0..of.path.joints {
+        let [lower, upper] = of.limits.travel[k];
+        let [least, most] = spans[k];
+        if !((upper - lower).is_finite() && (most.0 - least.0).is_finite()) {
+            continue;
+        }
+        let (middle, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
+        // An angle that is known up to whole turns on all pieces is taken on the turn that fits its travel best.
+        let turns = match turns[k] {
+            turns if turns.is_nan() => TURN * ((middle - 0.5 * (least.0 + most.0)) / TURN).round(),
+            turns => turns,
+        };
+        let is_upper = most.0 + turns - middle > middle - (least.0 + turns);
+        let ((value, place), limit) = if is_upper { (most, upper) } else { (least, lower) };
+        let (value, line) = (value + turns, path.line_of(place.piece));
+        let ratio = ((value - middle).abs() - 2.0 * ROUNDING * value.abs()) / half;
+        let time = reader.as_mut().map_or(0.0, |reader| reader.time_of(place));
+        tally.offer_ratio(Check::Travel, k, Worst { value, limit, ratio, time, line });
+    }
+    tally
+}

@@ -1,0 +1,98 @@
+//! The motion on a phase of a profile, by the length of the path or by the parameter.
+
+use super::columns::Columns;
+use super::phase_by_length::PhaseByLength;
+use super::phase_motion::{PhaseMotion, State, ROUNDING};
+use super::phases::Phases;
+use super::speed_by_length::Pace;
+use super::station::Rounded;
+
+/// Halvings until a place is known as closely as its numbers.
+const MOST_STEPS: u32 = 53;
+
+/// A phase ready to be evaluated at any u of it.
+pub struct Motion<const M: usize> {
+    piece: usize,
+    u: [f64; 2],
+    duration: f64,
+    law: Law<M>,
+}
+
+enum Law<const M: usize> {
+    ByLength(PhaseByLength<M>),
+    ByParameter(PhaseMotion<M>),
+}
+
+/// A place of a phase.
+#[derive(Clone, Copy, Debug)]
+pub struct Passage<const M: usize> {
+    pub u: f64,
+    /// Time since the start of the phase, and its error, in s.
+    pub since: f64,
+    pub doubt: f64,
+    pub velocity: Rounded<M>,
+    /// The motion along the path where it is known by the length.
+    pace: Option<Pace>,
+}
+
+impl<const M: usize> Motion<M> {
+    /// Of phase `i`, whose numbers must be good.
+    pub fn new(phases: &Phases, i: usize, columns: &mut dyn Columns<M>) -> Self {
+        let law = match phases.by_length(i, columns) {
+            Some(motion) => Law::ByLength(motion),
+            None => Law::ByParameter(PhaseMotion::new(phases, i, columns)),
+        };
+        let u = [phases.u0[i], phases.u1[i]];
+        Self { piece: phases.piece[i] as usize, u, duration: phases.duration[i], law }
+    }
+
+    pub fn passage(&self, u: f64, columns: &mut dyn Columns<M>) -> Passage<M> {
+        match &self.law {
+            Law::ByLength(motion) => {
+                let (here, place) = (motion.place(u), columns.place(self.piece, u));
+                let since = motion.since(&here);
+                let root_p = if place.way_slope > 0.0 { here.pace.v / place.way_slope } else { 0.0 };
+                let velocity = State::new(place, root_p, ROUNDING).velocity;
+                Passage { u, since, doubt: ROUNDING * since.abs(), velocity, pace: Some(here.pace) }
+            }
+            Law::ByParameter(motion) => {
+                let here = motion.at(u, columns);
+                let [since, doubt] = motion.since(&here, self.duration, columns);
+                Passage { u, since, doubt, velocity: here.velocity, pace: None }
+            }
+        }
+    }
+
+    /// Accelerations at a place; any where the path has no direction.
+    pub fn acceleration(&self, here: &Passage<M>, columns: &mut dyn Columns<M>) -> Rounded<M> {
+        match (&self.law, here.pace) {
+            (Law::ByParameter(motion), _) => motion.acceleration_near(here.u, columns),
+            (_, Some(pace)) => match columns.station(self.piece, here.u) {
+                Some(station) => station.acceleration(pace),
+                None => Rounded { value: [0.0; M], rounding: [f64::INFINITY; M] },
+            },
+            _ => Rounded { value: [f64::NAN; M], rounding: [0.0; M] },
+        }
+    }
+
+    /// u at a time since the start of the phase.
+    pub fn place_at(&self, time: f64, columns: &mut dyn Columns<M>) -> f64 {
+        let [mut low, mut high] = self.u;
+        for _ in 0..MOST_STEPS {
+            let middle = 0.5 * (low + high);
+            let since = match &self.law {
+                Law::ByLength(motion) => motion.since(&motion.place(middle)),
+                Law::ByParameter(motion) => {
+                    let here = motion.at(middle, columns);
+                    motion.since(&here, self.duration, columns)[0]
+                }
+            };
+            if since < time {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+}
