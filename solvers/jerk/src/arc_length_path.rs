@@ -93,7 +93,7 @@ pub struct ArcLengthPath<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     pub parts: &'a [Part],
     measures: Vec<Measures<M>>,
-    tables: Vec<OnceLock<Vec<Row>>>,
+    tables: Vec<OnceLock<Box<[Row]>>>,
     knots: Vec<f64>,
 }
 
@@ -381,6 +381,19 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         Self { problem, parts, measures, tables: vec![OnceLock::new(); parts.len()], knots }
     }
 
+    /// The parts that two lengths have between them, by the same lengths, with tables of their own.
+    pub fn between(&self, [from, to]: [f64; 2]) -> Self {
+        let first = self.part(from);
+        let end = first + 1 + self.knots[first + 1..].partition_point(|&knot| knot < to);
+        Self {
+            problem: self.problem,
+            parts: &self.parts[first..end],
+            measures: self.measures[first..end].to_vec(),
+            tables: vec![OnceLock::new(); end - first],
+            knots: self.knots[first..=end].to_vec(),
+        }
+    }
+
     fn table(&self, part: usize) -> &[Row] {
         self.tables[part].get_or_init(|| {
             let mut rows = Halving::new(self.problem, &self.parts[part]).table();
@@ -389,7 +402,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
             let (length, sum) = (self.measures[part].length, rows[last].s);
             rows.iter_mut().for_each(|row| row.s *= length / sum);
             rows[last].s = length;
-            rows
+            rows.into()
         })
     }
 

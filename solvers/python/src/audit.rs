@@ -5,6 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::curve::Curve;
+use super::memory;
 use super::moves::Moves;
 use super::native::Of;
 use super::profile::Profile;
@@ -248,6 +249,7 @@ fn audit_plan(
     program: Option<Of<Moves>>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
+    py.detach(memory::give_back);
     let path = problem.followed(&feed)?;
     let junction_speed = problem.junction_speed.as_slice()?;
     let phases = profile.as_ref().map(|profile| phases(profile, &problem)).transpose()?;

@@ -4,6 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::curve::{check_places, Curve};
+use super::memory;
 use super::native::InAxes;
 use super::with_padded_axes;
 use super::work::run;
@@ -38,6 +39,7 @@ impl CurveLength {
             let pieces = curve.padded::<M>()?;
             let lengths =
                 InAxes::new(run(py, progress.as_ref(), |watch| Kernel::new(pieces, accuracy, watch))?);
+            py.detach(memory::give_back);
             Ok(Self { axes, lengths, width })
         })
     }

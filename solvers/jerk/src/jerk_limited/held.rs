@@ -38,19 +38,18 @@ pub struct Stretch {
     pub held: Option<f64>,
 }
 
-/// A stretch as a path of its own, by the arc length of its subrun.
+/// A stretch as a path of its own, by the arc length of its subrun. The tables that its plan needs go with it.
 pub struct Between<'a, const M: usize> {
-    path: &'a ArcLengthPath<'a, M>,
-    first: usize,
+    pub path: ArcLengthPath<'a, M>,
     knots: Vec<f64>,
 }
 
 impl<'a, const M: usize> Between<'a, M> {
-    pub fn new(path: &'a ArcLengthPath<'a, M>, [from, to]: [f64; 2]) -> Self {
-        let first = path.part(from);
-        let inner = path.knots()[first + 1..].iter().copied().take_while(|&knot| knot < to);
-        let knots = std::iter::once(from).chain(inner).chain([to]).collect();
-        Self { path, first, knots }
+    pub fn new(path: &ArcLengthPath<'a, M>, [from, to]: [f64; 2]) -> Self {
+        let path = path.between([from, to]);
+        let inner = &path.knots()[1..path.parts.len()];
+        let knots = [&[from], inner, &[to]].concat();
+        Self { path, knots }
     }
 }
 
@@ -60,7 +59,7 @@ impl<const M: usize> Geometry<M> for Between<'_, M> {
     }
 
     fn at(&self, piece: usize, s: f64) -> PathPoint<M> {
-        self.path.at(self.first + piece, s)
+        self.path.at(piece, s)
     }
 }
 

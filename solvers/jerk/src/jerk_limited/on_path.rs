@@ -271,15 +271,16 @@ impl<const M: usize> Task<'_, M> {
             self.kinks(path, junctions, |_| feed * feed, ends, &mut phases);
             return Ok(phases);
         }
+        let own = Between::new(path, ends);
         let problem = path_problem::Problem {
-            geometry: &Between::new(path, ends),
+            geometry: &own,
             limits: self.limits,
             caps: caps_between(caps, ends),
             ends: states,
         };
         let moves = moving(self.problem, path, ends);
         let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort })?;
-        phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
+        phases.push_profile(self.problem, &own.path, &self.limits.jerk, &plan.profile);
         // The phases are kept until all stretches of the subrun are planned.
         phases.phases.shrink_to_fit();
         phases.stopped = !plan.converged && effort.expired();
