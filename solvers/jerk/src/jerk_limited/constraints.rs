@@ -120,17 +120,28 @@ impl<const M: usize> Interval<M> {
 }
 
 impl<const M: usize> Constraints<M> {
-    /// The constraints between `stations`. Interval n lies on `pieces[n]`, with limits of jerk tightened by
+    /// Without intervals.
+    pub fn new(limits: &Limits<M>) -> Self {
+        Self {
+            intervals: vec![],
+            acceleration: Sides::new(&limits.acceleration),
+            per_jerk: limits.jerk.map(|j| 1.0 / j),
+        }
+    }
+
+    /// Takes the intervals between `stations`. Interval n lies on `pieces[n]`, with limits of jerk tightened by
     /// `jerk_factor[n]`; `station_cap` is the speed cap at a station, infinite without one.
     pub fn sample(
+        &mut self,
         geometry: &impl Geometry<M>,
         limits: &Limits<M>,
         stations: &[f64],
         pieces: &[u32],
         jerk_factor: &[f64],
         station_cap: impl Fn(usize) -> f64,
-    ) -> Self {
-        let mut intervals = Vec::with_capacity(pieces.len());
+    ) {
+        self.intervals.clear();
+        self.intervals.reserve(pieces.len());
         let mut last: Option<PathPoint<M>> = None;
         for n in 0..pieces.len() {
             let (start, h) = (stations[n], stations[n + 1] - stations[n]);
@@ -154,19 +165,15 @@ impl<const M: usize> Constraints<M> {
                     Lanes::new(points.map(|point| point.third[k])),
                 ]
             });
-            intervals.push(Interval { h, q, speed, acceleration: Lanes::ONE, jerk: jerk_factor[n] });
+            self.intervals.push(Interval { h, q, speed, acceleration: Lanes::ONE, jerk: jerk_factor[n] });
             last = Some(end);
-        }
-        Self {
-            intervals,
-            acceleration: Sides::new(&limits.acceleration),
-            per_jerk: limits.jerk.map(|j| 1.0 / j),
         }
     }
 
-    /// The constraints on a range of the intervals.
-    pub fn part(&self, range: Range<usize>) -> Self {
-        Self { intervals: self.intervals[range].to_vec(), ..*self }
+    /// Takes a range of the intervals of others.
+    pub fn copy(&mut self, others: &Self, range: Range<usize>) {
+        self.intervals.clear();
+        self.intervals.extend_from_slice(&others.intervals[range]);
     }
 
     /// Acceleration and jerk/√w of each axis, over A and J.

@@ -94,16 +94,17 @@ impl Grid {
         self.pieces.resize(self.stations.len() - 1, samples[0].piece);
     }
 
-    /// The constraints on a range of intervals.
-    pub fn constraints<G: Geometry<M>, const M: usize>(
+    /// Samples the constraints on a range of intervals.
+    pub fn sample<G: Geometry<M>, const M: usize>(
         &self,
         problem: &Problem<G, M>,
         range: Range<usize>,
-    ) -> Constraints<M> {
+        rows: &mut Constraints<M>,
+    ) {
         let stations = &self.stations[range.start..=range.end];
         let (pieces, jerk_factor) = (&self.pieces[range.clone()], &self.jerk_factor[range.clone()]);
         let cap = |station| self.cap(range.start + station);
-        Constraints::sample(problem.geometry, &problem.limits, stations, pieces, jerk_factor, cap)
+        rows.sample(problem.geometry, &problem.limits, stations, pieces, jerk_factor, cap);
     }
 
     /// The speed cap at a station; infinite without one.

@@ -3,7 +3,7 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::constraints::Constraints;
+use super::constraints::{Constraints, Interval};
 use super::hermite::{self, combine, local, Basis};
 use super::sides::Sides;
 use crate::path_problem::{Geometry, Limits};
@@ -57,16 +57,23 @@ pub struct IntersampleCheck<const M: usize> {
 }
 
 impl<const M: usize> IntersampleCheck<M> {
+    /// Without samples.
+    pub fn new(limits: &Limits<M>) -> Self {
+        let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::new);
+        let jerk = limits.jerk;
+        Self { velocity, acceleration, jerk, samples: vec![], at_stations: vec![], jerk_factor: vec![] }
+    }
+
     /// Samples between `stations`; speed caps at stations and factors of jerk are those of `rows`.
     pub fn sample(
+        &mut self,
         geometry: &impl Geometry<M>,
-        limits: &Limits<M>,
         stations: &[f64],
         pieces: &[u32],
         rows: &Constraints<M>,
-    ) -> Self {
-        let mut samples = Vec::with_capacity(pieces.len());
-        let mut at_stations = Vec::with_capacity(pieces.len());
+    ) {
+        self.samples.clear();
+        self.samples.reserve(pieces.len());
         for (n, interval) in rows.intervals.iter().enumerate() {
             let mut groups = [Sample { q: [[Lanes::ZERO; 3]; M], cap: Lanes::ZERO }; GROUPS];
             for i in 0..SAMPLES {
@@ -80,12 +87,13 @@ impl<const M: usize> IntersampleCheck<M> {
                 }
                 sample.cap.values_mut()[lane] = 1.0 / (point.speed_cap * point.speed_cap);
             }
-            samples.push(groups);
-            at_stations.push([0, 3].map(|lane| interval.speed.values()[lane]));
+            self.samples.push(groups);
         }
-        let jerk_factor = rows.intervals.iter().map(|interval| interval.jerk).collect();
-        let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::new);
-        Self { velocity, acceleration, jerk: limits.jerk, samples, at_stations, jerk_factor }
+        let at_stations = |interval: &Interval<M>| [0, 3].map(|lane| interval.speed.values()[lane]);
+        self.at_stations.clear();
+        self.at_stations.extend(rows.intervals.iter().map(at_stations));
+        self.jerk_factor.clear();
+        self.jerk_factor.extend(rows.intervals.iter().map(|interval| interval.jerk));
     }
 
     /// The greatest use of the limits of speed, acceleration and jerk on interval n by the spline x.

@@ -11,6 +11,7 @@ use super::lower_bound::lagrangian;
 use super::model::Model;
 use super::prepare::Prepared;
 use super::relaxed::Relaxed;
+use super::window::Window;
 use super::working_space::InteriorPoint;
 use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
 use feedplan_geometry::watch::Watch;
@@ -89,7 +90,8 @@ fn results_are_the_same_on_every_level() {
     let geometry = Winding([0.0, 60.0]);
     let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
     let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
-    let window = prepared.window(0..prepared.grid.pieces.len());
+    let mut window = Window::new(&limits);
+    prepared.fill(0..prepared.grid.pieces.len(), &mut window);
     let (rows, between) = (&window.rows, &window.check);
     let found = |level: Level| {
         let checks: Vec<f64> = dispatch!(level, simd => checked(simd, &prepared.x, rows, between));

@@ -124,15 +124,15 @@ pub fn part<const M: usize>(
     effort: &Effort,
     space: &mut InteriorPoint<Relaxed, M>,
 ) -> Part {
-    let dual = loosened(planned);
-    let tight = excess(planned.rows, &dual) <= TIGHT;
+    loosen(planned, &mut space.state.dual);
+    let tight = excess(planned.rows, &space.state.dual) <= TIGHT;
     let starts = if tight { &[NEAR, FAR][..] } else { &[FAR] };
-    let mut rows = planned.rows.clone();
-    if !tight {
+    let lowered = (!tight).then(|| {
+        let mut rows = planned.rows.clone();
         speed_limit::lower(&mut rows);
-    }
-    let planned = &Planned { rows: &rows, ..*planned };
-    space.state.dual = dual;
+        rows
+    });
+    let planned = &Planned { rows: lowered.as_ref().unwrap_or(planned.rows), ..*planned };
     space.ends = planned.solved.ends;
     let (mut x, mut ends) = (vec![], planned.ends);
     for start in starts {
@@ -272,9 +272,9 @@ fn rest<const M: usize>(h: f64, dual: &[Lanes]) -> Lanes {
     rest
 }
 
-/// The multipliers of the limits as they are that pull like those of the tightened limits.
-fn loosened<const M: usize>(planned: &Planned<M>) -> Vec<Lanes> {
-    let mut out = planned.solved.state.dual.clone();
+/// Takes the multipliers of the limits as they are that pull like those of the tightened limits.
+fn loosen<const M: usize>(planned: &Planned<M>, out: &mut Vec<Lanes>) {
+    out.clone_from(&planned.solved.state.dual);
     let scale = |dual: &mut Lanes, tight: &Lanes, own: &Lanes| {
         for (lane, dual) in dual.values_mut().iter_mut().enumerate() {
             // Limits that do not apply have a factor of 0.
@@ -284,7 +284,7 @@ fn loosened<const M: usize>(planned: &Planned<M>) -> Vec<Lanes> {
         }
     };
     for (n, (own, tight)) in planned.rows.intervals.iter().zip(&planned.tight.intervals).enumerate() {
-        let dual = RowLayout::<M>::of_mut(&mut out, n);
+        let dual = RowLayout::<M>::of_mut(out, n);
         scale(&mut dual[RowLayout::<M>::SPEED], &tight.speed, &own.speed);
         let jerk = [tight, own].map(|limits| Lanes::all(limits.jerk));
         for k in 0..M {
@@ -296,7 +296,6 @@ fn loosened<const M: usize>(planned: &Planned<M>) -> Vec<Lanes> {
         }
         dual[RowLayout::<M>::POSITIVE] = rest::<M>(own.h, dual).map(|rest| rest.max(0.0));
     }
-    out
 }
 
 /// The plan's time on interval n, and value and local slope of the Lagrangian there, its multipliers made admissible.
@@ -366,7 +365,7 @@ mod tests {
     use fearless_simd::Level;
 
     use super::super::prepare::Prepared;
-    use super::super::window::ramps;
+    use super::super::window::{ramps, Window};
     use super::*;
     use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
     use feedplan_geometry::watch::Watch;
@@ -461,7 +460,8 @@ mod tests {
         let geometry = Winding { knots: [0.0, 20.0], turn };
         let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
         let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
-        let mut window = prepared.window(0..prepared.grid.pieces.len());
+        let mut window = Window::new(&limits);
+        prepared.fill(0..prepared.grid.pieces.len(), &mut window);
         let rows = window.rows.clone();
         let mut x = prepared.x.clone();
         let watch = Watch::default();

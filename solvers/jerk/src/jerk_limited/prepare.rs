@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use super::constraints::Constraints;
 use super::grid::Grid;
 use super::initial_plan;
-use super::intersample_check::IntersampleCheck;
 use super::rest_ramp::{self, Ramp};
 use super::speed_envelope::{sample_envelope, Slopes};
 use super::window::Window;
@@ -60,7 +59,11 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         )?;
         let grid = Grid::new(&samples, slopes, problem.caps, &ends, effort.resolution);
         watch.check();
-        let whole = || grid.constraints(problem, 0..grid.pieces.len());
+        let whole = || {
+            let mut rows = Constraints::new(limits);
+            grid.sample(problem, 0..grid.pieces.len(), &mut rows);
+            rows
+        };
         let rows = (grid.pieces.len() <= effort.window).then(whole);
         let mut prepared = Self {
             problem,
@@ -114,7 +117,8 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             self.watch.check();
             let first = chunk * CHUNK;
-            let rows = self.constraints(first..first + out.len());
+            let mut rows = Constraints::new(&self.problem.limits);
+            self.take(first..first + out.len(), &mut rows);
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);
             for (n, out) in out.iter_mut().enumerate() {
                 *out = f(&rows, n, x);
@@ -123,21 +127,19 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out
     }
 
-    fn constraints(&self, range: Range<usize>) -> Constraints<M> {
+    /// Takes the constraints on a range of intervals.
+    fn take(&self, range: Range<usize>, rows: &mut Constraints<M>) {
         match &self.rows {
-            Some(rows) => rows.part(range),
-            None => self.grid.constraints(self.problem, range),
+            Some(all) => rows.copy(all, range),
+            None => self.grid.sample(self.problem, range, rows),
         }
     }
 
-    /// The window of a range of intervals.
-    pub fn window(&self, range: Range<usize>) -> Window<M> {
-        let rows = self.constraints(range.clone());
+    /// Makes the window one of a range of intervals.
+    pub fn fill(&self, range: Range<usize>, window: &mut Window<M>) {
+        self.take(range.clone(), &mut window.rows);
         let stations = &self.grid.stations[range.start..=range.end];
-        let pieces = &self.grid.pieces[range];
-        let check =
-            IntersampleCheck::sample(self.problem.geometry, &self.problem.limits, stations, pieces, &rows);
-        Window { rows, check }
+        window.check.sample(self.problem.geometry, stations, &self.grid.pieces[range], &window.rows);
     }
 }
 

@@ -8,6 +8,7 @@ use super::interior_point::{Effort, Outcome, Report};
 use super::intersample_check::IntersampleCheck;
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
+use crate::path_problem::Limits;
 
 /// Greatest use of a limit that counts as kept: rounding, and the error of peaks between samples.
 pub const HELD: f64 = 1.0 + 4e-7;
@@ -53,6 +54,11 @@ pub struct WindowReport {
 }
 
 impl<const M: usize> Window<M> {
+    /// Without intervals.
+    pub fn new(limits: &Limits<M>) -> Self {
+        Self { rows: Constraints::new(limits), check: IntersampleCheck::new(limits) }
+    }
+
     /// Improves the valid plan x in place. The limits at given ends have been dropped.
     pub fn improve(
         &mut self,

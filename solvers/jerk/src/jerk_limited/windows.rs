@@ -6,9 +6,11 @@
 //! blend keeps the limits, both windows are solved as one. Only a few windows at a time are in memory.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::constraints::Constraints;
 use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point;
@@ -16,10 +18,10 @@ use super::lower_bound::{self, Part, Planned};
 use super::prepare::{Prepared, PREPARING};
 use super::profile::{Plan, Profile};
 use super::relaxed::Relaxed;
-use super::window::{ramps, WindowReport};
+use super::window::{ramps, Window, WindowReport};
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
-use crate::path_problem::{Effort, Fault, Geometry, Problem};
+use crate::path_problem::{Effort, Fault, Geometry, Limits, Problem};
 
 /// Windows reach this many stop times and intervals beyond their cuts: the time of the first plan on the way there (the optimum
 /// takes a third of it or more) over the time to stop from the greatest speed that the envelope allows on that way.
@@ -40,7 +42,7 @@ const BLENDED: f64 = 1.0 + 5e-7;
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let prepared = Prepared::new(problem, effort)?;
     let mut x = prepared.x.clone();
-    let run = Run { prepared: &prepared, effort, stations: &prepared.grid.stations };
+    let run = Run { prepared: &prepared, effort, stations: &prepared.grid.stations, idle: Mutex::default() };
     let cuts = run.cuts();
     let windows = run.windows(&cuts);
     let mut parts = vec![];
@@ -55,8 +57,8 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
         let solved: Vec<_> = windows[batch.clone()]
             .par_iter()
             .zip(cuts[batch.start..].par_windows(2))
-            .map_init(Spaces::default, |spaces, (range, core)| {
-                let solved = run.solve(range, core[0]..core[1], spaces);
+            .map(|(range, core)| {
+                let solved = run.solve(range, core[0]..core[1]);
                 watch.advance(range.len());
                 solved
             })
@@ -67,7 +69,7 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
             let reached = if at == 0 { 0 } else { windows[at - 1].end };
             let joined = run.join(&mut x, reached, windows[at].start, &y).or_else(|| {
                 let both = windows[at - 1].start..windows[at].end;
-                let (y, verdict, _) = run.solve(&both, both.start..both.start, &mut Spaces::default());
+                let (y, verdict, _) = run.solve(&both, both.start..both.start);
                 counts.add(&verdict, both.len());
                 run.join(&mut x, reached, both.start, &y)
             });
@@ -76,7 +78,7 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
                 None => {
                     // The window starts again from the first plan, where the last one ends.
                     let rest = reached..windows[at].end;
-                    let (y, verdict, _) = run.solve(&rest, rest.start..rest.start, &mut Spaces::default());
+                    let (y, verdict, _) = run.solve(&rest, rest.start..rest.start);
                     counts.add(&verdict, rest.len());
                     counts.converged = false;
                     x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
@@ -119,17 +121,32 @@ impl Counts {
     }
 }
 
-/// Working space of a thread.
-#[derive(Default)]
-struct Spaces<const M: usize> {
+/// Working space for one window.
+struct Space<const M: usize> {
+    window: Window<M>,
+    /// Its limits as they are, for the lower bound.
+    loose: Constraints<M>,
     exact: InteriorPoint<Exact, M>,
     relaxed: InteriorPoint<Relaxed, M>,
+}
+
+impl<const M: usize> Space<M> {
+    fn new(limits: &Limits<M>) -> Self {
+        Self {
+            window: Window::new(limits),
+            loose: Constraints::new(limits),
+            exact: InteriorPoint::default(),
+            relaxed: InteriorPoint::default(),
+        }
+    }
 }
 
 struct Run<'a, G, const M: usize> {
     prepared: &'a Prepared<'a, G, M>,
     effort: &'a Effort<'a>,
     stations: &'a [f64],
+    /// Working spaces of windows that are done: the system takes long to give some MB.
+    idle: Mutex<Vec<Space<M>>>,
 }
 
 /// Some intervals: the time of the first plan in s, and the greatest speed that the envelope allows in mm/s.
@@ -201,13 +218,27 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         drive.time / self.prepared.slopes.stop_time(drive.speed)
     }
 
+    /// Does work in a working space that no other thread uses.
+    fn in_space<T>(&self, work: impl FnOnce(&mut Space<M>) -> T) -> T {
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut space = idle().pop().unwrap_or_else(|| Space::new(&self.prepared.problem.limits));
+        let done = work(&mut space);
+        idle().push(space);
+        done
+    }
+
     /// Solves a window between states of the first plan; with the lower bound of the intervals `core` in it.
-    fn solve(
+    fn solve(&self, range: &Range<usize>, core: Range<usize>) -> (Vec<f64>, WindowReport, Option<Part>) {
+        self.in_space(|space| self.solve_in(space, range, core))
+    }
+
+    fn solve_in(
         &self,
+        space: &mut Space<M>,
         range: &Range<usize>,
         core: Range<usize>,
-        spaces: &mut Spaces<M>,
     ) -> (Vec<f64>, WindowReport, Option<Part>) {
+        let Space { window, loose, exact, relaxed } = space;
         let mut y = self.prepared.x[2 * range.start..2 * range.end + 2].to_vec();
         let at_ends = [range.start == 0, range.end + 1 == self.stations.len()];
         let ends_of = |known: [WindowEnd; 2]| {
@@ -229,25 +260,19 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             warm: false,
             watch: self.effort.watch,
         };
-        let mut window = self.prepared.window(range.clone());
-        let own = self.effort.proves.then(|| {
-            let mut own = window.rows.clone();
-            own.drop_at_ends(&bound_ends);
-            own
-        });
+        self.prepared.fill(range.clone(), window);
+        let proves = self.effort.proves && !core.is_empty();
+        if proves {
+            loose.copy(&window.rows, 0..range.len());
+            loose.drop_at_ends(&bound_ends);
+        }
         window.rows.drop_at_ends(&ends);
-        let verdict = window.improve(ends, &mut y, &effort, &mut spaces.exact);
-        let part = own.filter(|_| !core.is_empty() && !self.effort.expired()).map(|rows| {
-            let planned = Planned {
-                rows: &rows,
-                tight: &window.rows,
-                ends: bound_ends,
-                at_ends,
-                x: &y,
-                solved: &spaces.exact,
-            };
+        let verdict = window.improve(ends, &mut y, &effort, exact);
+        let part = (proves && !self.effort.expired()).then(|| {
+            let planned =
+                Planned { rows: loose, tight: &window.rows, ends: bound_ends, at_ends, x: &y, solved: exact };
             let core = core.start - range.start..core.end - range.start;
-            lower_bound::part(&planned, core, &effort, &mut spaces.relaxed)
+            lower_bound::part(&planned, core, &effort, relaxed)
         });
         (y, verdict, part)
     }
@@ -290,10 +315,11 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
                 z[0] += weight * w;
                 z[1] += weight * slope + rate * w;
             }
-            self.prepared
-                .window(from..from + size)
-                .holds(&blend, BLENDED)
-                .then_some((from..from + size, blend))
+            let holds = self.in_space(|Space { window, .. }| {
+                self.prepared.fill(from..from + size, window);
+                window.holds(&blend, BLENDED)
+            });
+            holds.then_some((from..from + size, blend))
         })
     }
 
