@@ -19,7 +19,7 @@ from feedplan.program.gcode import Options
 from feedplan.program.program import Program
 
 __all__ = [
-    "Curve", "CurveLength", "JointSetpointAudit", "Moves", "PlanError", "Problem", "Profile", "Sampler",
+    "Curve", "CurveLength", "Moves", "PlanError", "Problem", "Profile", "Sampler",
     "SetpointAudit", "__version__", "audit_joints", "audit_plan", "build_path", "csv_rows", "feed_between",
     "joint_derivatives", "joint_enclosures", "joint_interpolants", "joint_path", "joint_positions",
     "look_ahead", "lower_bound", "path_segments", "plan_bang_bang", "plan_jerk_limited", "plan_s_curve",
@@ -122,14 +122,6 @@ def audit_plan(
 def audit_joints(
     problem: _Problem, limits: _Limits, profile: SpeedProfile, progress: _Progress = None
 ) -> _Findings: ...
-
-@final
-class JointSetpointAudit:
-    def __new__(cls, problem: _Problem, limits: _Limits, profile: SpeedProfile) -> JointSetpointAudit: ...
-    def push(
-        self, t: _Floats, position: _Floats, velocity: _Floats | None = None, progress: _Progress = None
-    ) -> None: ...
-    def finish(self) -> _Findings: ...
 
 @final
 class SetpointAudit:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan._solvers import JointSetpointAudit, SetpointAudit, audit_joints, audit_plan
+from feedplan._solvers import SetpointAudit, audit_joints, audit_plan
 from feedplan.arguments import callback, flag, instance, list_of_names, not_negative, number, positive
 from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.recorded import audit_recorded
@@ -179,7 +179,8 @@ def _audit_joints(
         travel=[(-math.inf, math.inf)] * axes,
         feed_axes=feed_axes(problem.path.axes),
     )
-    findings, samples = audit_plan(problem, free, feed_limits(problem, program), None, program)
+    feed = feed_limits(problem, program)
+    findings, samples = audit_plan(problem, free, feed, None, program)
     results: Results = [([found for found in findings if found[1] < 0], samples)]
     if profile is not None:
         own = replace(limits, period=float(problem.period))
@@ -187,16 +188,11 @@ def _audit_joints(
         results.append(audit_joints(problem, own, profile, part(report, 0.0, whole)))
     if setpoints is not None:
         report(PLAN_SHARE)
-        stream = SetpointAudit(limits, 0.0)
-        places = None if profile is None else JointSetpointAudit(problem, limits, profile)
+        compared = () if profile is None else (problem, feed, profile)
+        stream = SetpointAudit(limits, 0.0, *compared)
         for chunk, share in setpoints:
             _push(stream, chunk, share)
-            if places is not None:
-                t, position = _array(chunk.t, np.float64), _array(chunk.position, np.float64)
-                places.push(t, position, _array(chunk.velocity, np.float64))
         results.append(stream.finish())
-        if places is not None:
-            results.append(places.finish())
     return results
 
 

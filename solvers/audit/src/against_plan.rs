@@ -1,25 +1,23 @@
 //! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
 
-use super::curve::Curves;
+use super::columns::Columns;
 use super::deviation::{settled, window};
+use super::nearest::Place;
 use super::neighbours::Neighbours;
 use super::profile_reader::ACCELERATION_SHARE;
 use super::rows::Row;
 use super::tracking::{is_step, Plan};
-use super::vectors::{distance, from_to, inner, length, Segment};
+use super::vectors::{distance, from_to, inner, length, vector_of, Segment};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
 pub const VELOCITY_SHARE: f64 = 1e-3;
 
-/// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
-const SMOOTH: f64 = 1e-9;
-
 /// Looks at setpoints one after the other, with what belongs to their place at hand.
 pub struct Comparison<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
-    curves: Curves<'a, M>,
+    columns: Box<dyn Columns<M> + 'a>,
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
@@ -27,8 +25,8 @@ pub struct Comparison<'a, const M: usize> {
 
 impl<'a, const M: usize> Comparison<'a, M> {
     pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
-        let curves = Curves::new(plan.path.pieces);
-        Self { plan, limits, curves, near: Neighbours::default(), piece: None }
+        let columns = plan.columns(limits);
+        Self { plan, limits, columns, near: Neighbours::default(), piece: None }
     }
 
     /// What one setpoint shows: its distance from path and program, and what it records.
@@ -58,20 +56,20 @@ impl<'a, const M: usize> Comparison<'a, M> {
             return;
         }
         if let Some(recorded) = row.velocity {
-            let velocity = nearest.velocity;
+            let velocity = &nearest.velocity;
             let away = rounding + nearest.off.max(0.0) + nearest.late;
             let rest = self.plan.path.width[nearest.place.piece] - nearest.place.u;
             let at_joint = nearest.place.u.min(rest) <= PLACE_TOLERANCE;
-            for k in 0..M {
+            for k in 0..self.columns.count() {
                 // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
-                let unknown = 2.0 * (limits.acceleration.greatest(k) * away).sqrt();
-                let off = (recorded[k] - velocity[k]).abs() - unknown;
+                let unknown = 2.0 * (limits.acceleration.greatest(k) * away).sqrt() + velocity.rounding[k];
+                let off = (recorded[k] - velocity.value[k]).abs() - unknown;
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
             }
         }
-        if row.acceleration.is_some() {
+        if row.acceleration.is_some() && self.columns.are_axes() {
             for k in 0..M {
                 let limit = ACCELERATION_SHARE * limits.acceleration.least(k);
                 tally.offer(
@@ -86,48 +84,86 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
     }
 
-    /// What the step between two setpoints shows: its speed, and the path between them.
-    pub fn step(&mut self, before: &Row<M>, row: &Row<M>, step: f64, rounding: f64, tally: &mut Tally<M>) {
+    /// What the step between two setpoints shows: its speed, and the path between them; `earlier` is the setpoint before both.
+    pub fn step(
+        &mut self,
+        earlier: Option<&Row<M>>,
+        [before, row]: [&Row<M>; 2],
+        step: f64,
+        rounding: f64,
+        tally: &mut Tally<M>,
+    ) {
         let (path, limits) = (&self.plan.path, self.limits);
         if !is_step(before.t, row.t, limits.period) {
             return;
         }
+        let (time, line, has_chord) = (row.t, row.line, limits.chord_tolerance.is_finite());
         let (from, to) = (before.nearest.place, row.nearest.place);
-        let (time, line) = (row.t, row.line);
-        let chord = Segment::new(&before.q, &row.q);
+        let columns = &mut *self.columns;
+        let tips = [before, row].map(|row| columns.tip(row.nearest.place.piece, row.nearest.place.u, &row.q));
         let (mut ways, mut least_times, mut error_sq) = ([0.0; FEEDS], [0.0; FEEDS], 0.0_f64);
-        let mut last = before.q;
+        // Where the tool of joints stands still from one run to the next, each side has a chord of its own.
+        let are_axes = columns.are_axes();
+        let stops = |piece: usize| !are_axes && path.runs.binary_search(&(piece as i64)).is_ok();
+        let mut chord_start = tips[0];
         for piece in from.piece..=to.piece {
-            let curve = self.curves.get(piece);
-            let start = if piece == from.piece { from.u } else { 0.0 };
-            let end = if piece == to.piece { to.u } else { curve.width() };
-            let next = if piece == to.piece { row.q } else { curve.at(end) };
-            let part = from_to(&last, &next);
-            for (feed, limit) in path.feeds(piece).into_iter().enumerate() {
-                if limit != f64::INFINITY {
-                    let part = length(&limits.counted(feed, &part));
-                    ways[feed] += part;
-                    least_times[feed] += part / limit;
+            let (is_first, is_last) = (piece == from.piece, piece == to.piece);
+            let (feeds, axes) = (columns.feeds(piece), columns.chord_axes(piece));
+            let curve = columns.curve(piece);
+            let start = if is_first { from.u } else { 0.0 };
+            let end = if is_last { to.u } else { curve.width() };
+            let last = if is_first { tips[0] } else { curve.at(0.0) };
+            let next = if is_last { tips[1] } else { curve.at(end) };
+            if !is_first && stops(piece) {
+                chord_start = last;
+            }
+            if has_chord && end > start {
+                let chord_end = if !is_last && stops(piece + 1) { next } else { tips[1] };
+                let counted = |point: &[f64; M]| -> [f64; M] { vector_of(|k| axes[k] * point[k]) };
+                let chord = Segment::new(&counted(&chord_start), &counted(&chord_end));
+                for share in [0.25, 0.5, 0.75, 1.0] {
+                    let point = curve.at(start + share * (end - start));
+                    error_sq = error_sq.max(chord.distance_sq(&counted(&point)));
                 }
             }
-            last = next;
-            if limits.chord_tolerance.is_finite() && end > start {
-                for share in [0.25, 0.5, 0.75, 1.0] {
-                    error_sq = error_sq.max(chord.distance_sq(&curve.at(start + share * (end - start))));
-                }
+            for (feed, limit) in feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
+                let part = columns.tip_way(piece, feed, &last, &next);
+                ways[feed] += part;
+                least_times[feed] += part / limit;
             }
         }
         for (way, least_time) in ways.into_iter().zip(least_times) {
             let feed = if least_time > 0.0 { way / least_time } else { f64::INFINITY };
             tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
         }
-        if limits.chord_tolerance.is_finite() {
+        if has_chord {
             let certain = error_sq.sqrt() - rounding - before.nearest.off.max(row.nearest.off).max(0.0);
             let mut limit = limits.chord_tolerance;
             if certain > limit {
-                limit += self.chord_beyond_circle(before, row, step);
+                limit += match self.columns.are_axes() {
+                    true => self.chord_beyond_circle(before, row, step),
+                    false => self.chord_beyond_steady(earlier, before, tips) * limit,
+                };
             }
             tally.offer(Check::Chord, 0, certain, limit, time, line);
+        }
+    }
+
+    /// The part by which the chord error of the tool of joints may exceed the tolerance where it gains speed: the speed limit of the
+    /// circle is one at constant speed, and the error is greater on the faster side.
+    fn chord_beyond_steady(&mut self, earlier: Option<&Row<M>>, before: &Row<M>, tips: [[f64; M]; 2]) -> f64 {
+        let axes = self.columns.chord_axes(before.nearest.place.piece);
+        let counted = |a: &[f64; M], b: &[f64; M]| length::<M>(&vector_of(|k| axes[k] * (b[k] - a[k])));
+        let own = counted(&tips[0], &tips[1]);
+        let last = earlier.map_or(0.0, |row| {
+            let Place { piece, u } = row.nearest.place;
+            counted(&self.columns.tip(piece, u, &row.q), &tips[0])
+        });
+        let gain = (own - last).abs() / own;
+        if gain.is_nan() {
+            0.0
+        } else {
+            0.5 * gain.min(1.0)
         }
     }
 
@@ -143,7 +179,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let way_length = length(&way);
         let mut most = 0.0_f64;
         for piece in from.piece..=to.piece {
-            let curve = self.curves.get(piece);
+            let curve = self.columns.curve(piece);
             let start = if piece == from.piece { from.u } else { 0.0 };
             let end = if piece == to.piece { to.u } else { curve.width() };
             for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
@@ -166,11 +202,11 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
         let mut corners = 0.0;
         for piece in self.begun([rows[0], rows[2]]) {
-            let before = self.curves.get(piece - 1).clone();
-            let after = self.curves.get(piece);
-            let (into, out) = (before.derivative(before.width()), after.derivative(0.0));
+            let columns = &mut *self.columns;
+            let into = columns.place(piece - 1, self.plan.path.width[piece - 1]).slope.value;
+            let out = columns.place(piece, 0.0).slope.value;
             let (a, b) = (length(&into), length(&out));
-            if distance(&into.map(|x| x / a), &out.map(|x| x / b)) > SMOOTH {
+            if distance(&into.map(|x| x / a), &out.map(|x| x / b)) > columns.smooth() {
                 corners += 1.0;
             }
         }

@@ -4,15 +4,15 @@
 use std::sync::Arc;
 
 use super::curve::{Curve, Curves, Followed};
-use super::phase_motion::curvature;
 use super::station::{Rounded, Station};
-use super::vectors::{length, vector_of};
+use super::vectors::{curvature, from_to, length, vector_of};
 use super::{Limits, EPS, FEEDS, ROUNDINGS};
 
 /// The speed that chord errors are about, beside those that feeds are about.
 pub const CHORD: usize = FEEDS;
 
-/// A place of a piece: the columns and their slopes by u, each with a bound of its error.
+/// A place of a piece: the columns and their slopes by u, each with a bound of its error; of positions beside the rounding of the
+/// greatest coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<const M: usize> {
     pub piece: usize,
@@ -21,9 +21,9 @@ pub struct Place<const M: usize> {
     pub tip: [f64; M],
     pub position: Rounded<M>,
     pub slope: Rounded<M>,
-    /// Derivatives by u of the length of the path and of the way of the tool that the feed limits, the latter with its error.
+    /// Derivatives by u of the length of the path and of the way of the tool that the feed limits.
     pub way_slope: f64,
-    pub tip_slope: [f64; 2],
+    pub tip_slope: f64,
 }
 
 /// Where columns come from. What differs between axes and joints is here, and nowhere else.
@@ -35,7 +35,7 @@ pub trait Columns<const M: usize> {
     fn path(&self) -> &Followed<'_>;
 
     /// The tool's path on a piece, and what each of its axes counts in its length.
-    fn curve(&mut self, piece: usize) -> Arc<Curve<M>>;
+    fn curve(&mut self, piece: usize) -> &Arc<Curve<M>>;
     fn scale(&self) -> [f64; M];
 
     /// The place u of a piece.
@@ -47,12 +47,18 @@ pub trait Columns<const M: usize> {
     /// The way of each column from one place of a piece to another.
     fn way(&mut self, from: &Place<M>, to: &Place<M>) -> Rounded<M>;
 
+    /// From a place on one piece to a place on another: angles known up to whole turns go the shorter way.
+    fn difference(&mut self, pieces: [usize; 2], a: &[f64; M], b: &[f64; M]) -> [f64; M];
+
+    /// The way from the place u of a piece to `q`, and the slopes there.
+    fn toward(&mut self, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2];
+
     /// Whether the columns are the axes of the path, so that bounds of its derivatives are theirs, and a speed at the feed is
     /// one along the path.
     fn are_axes(&self) -> bool;
 
-    /// Derivative by u of the way whose speed a phase holds, in which axes of the path count by their `share`.
-    fn held_slope(&mut self, piece: usize, u: f64, share: &[f64; M]) -> f64;
+    /// Derivative by u of the way whose speed a phase holds, in which axes of the path count by their `share`, and its error.
+    fn held_slope(&mut self, piece: usize, u: f64, share: &[f64; M]) -> [f64; 2];
 
     /// The greatest speeds of a piece.
     fn feeds(&self, piece: usize) -> [f64; FEEDS];
@@ -61,8 +67,17 @@ pub trait Columns<const M: usize> {
     /// of the `tip`.
     fn speed(&self, feed: usize, velocity: &Rounded<M>, tip: [f64; 2]) -> [f64; 2];
 
+    /// The tool where the columns are at `q`, whose place on the path is known; the straight way of it that a feed limits between two
+    /// places of a piece; which axes of the path a chord error is measured in.
+    fn tip(&mut self, piece: usize, u: f64, q: &[f64; M]) -> [f64; M];
+    fn tip_way(&mut self, piece: usize, feed: usize, from: &[f64; M], to: &[f64; M]) -> f64;
+    fn chord_axes(&mut self, piece: usize) -> [f64; M];
+
     /// Curvature of the tool's path in 1/mm.
     fn curvature(&mut self, piece: usize, u: f64) -> f64;
+
+    /// What the rounding of positions on a piece is relative to, beside the positions: the greatest coordinate of its ends.
+    fn magnitude(&mut self, piece: usize) -> f64;
 
     /// What rounding of the control points turns the slopes of a piece against those of its neighbour.
     fn turned(&mut self, piece: usize) -> f64;
@@ -117,8 +132,8 @@ impl<const M: usize> Columns<M> for Axes<'_, M> {
         &self.path
     }
 
-    fn curve(&mut self, piece: usize) -> Arc<Curve<M>> {
-        self.curves.get(piece).clone()
+    fn curve(&mut self, piece: usize) -> &Arc<Curve<M>> {
+        self.curves.get(piece)
     }
 
     fn scale(&self) -> [f64; M] {
@@ -127,11 +142,11 @@ impl<const M: usize> Columns<M> for Axes<'_, M> {
 
     fn place(&mut self, piece: usize, u: f64) -> Place<M> {
         let curve = self.curves.get(piece);
-        let ([tip, slope], unit) = (curve.place(u), ROUNDINGS * EPS);
-        let (size, magnitude, way_slope) = (curve.derivative_size(), curve.magnitude(), length(&slope));
+        let ([tip, slope], size) = (curve.place(u), curve.derivative_size());
+        let (way_slope, unit) = (length(&slope), ROUNDINGS * EPS);
         let slope = Rounded { value: slope, rounding: vector_of(|k| unit * size[k]) };
-        let position = Rounded { value: tip, rounding: [unit * magnitude; M] };
-        Place { piece, u, tip, position, slope, way_slope, tip_slope: [way_slope, length(&slope.rounding)] }
+        let position = Rounded { value: tip, rounding: [0.0; M] };
+        Place { piece, u, tip, position, slope, way_slope, tip_slope: way_slope }
     }
 
     fn station(&mut self, piece: usize, u: f64) -> Option<Station<M>> {
@@ -154,13 +169,24 @@ impl<const M: usize> Columns<M> for Axes<'_, M> {
         Rounded { value, rounding }
     }
 
+    fn difference(&mut self, _: [usize; 2], a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+        from_to(a, b)
+    }
+
+    fn toward(&mut self, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
+        let [point, slope] = self.curves.get(piece).place(u);
+        [from_to(&point, q), slope]
+    }
+
     fn are_axes(&self) -> bool {
         true
     }
 
-    fn held_slope(&mut self, piece: usize, u: f64, share: &[f64; M]) -> f64 {
-        let slope = self.curves.get(piece).derivative(u);
-        length::<M>(&vector_of(|k| share[k] * slope[k]))
+    fn held_slope(&mut self, piece: usize, u: f64, share: &[f64; M]) -> [f64; 2] {
+        let curve = self.curves.get(piece);
+        let [slope, size] = [curve.derivative(u), curve.derivative_size()]
+            .map(|of| length::<M>(&vector_of(|k| share[k] * of[k])));
+        [slope, ROUNDINGS * EPS * size]
     }
 
     fn feeds(&self, piece: usize) -> [f64; FEEDS] {
@@ -175,11 +201,27 @@ impl<const M: usize> Columns<M> for Axes<'_, M> {
         }
     }
 
+    fn tip(&mut self, _: usize, _: f64, q: &[f64; M]) -> [f64; M] {
+        *q
+    }
+
+    fn tip_way(&mut self, _: usize, feed: usize, from: &[f64; M], to: &[f64; M]) -> f64 {
+        length(&self.limits.counted(feed, &from_to(from, to)))
+    }
+
+    fn chord_axes(&mut self, _: usize) -> [f64; M] {
+        [1.0; M]
+    }
+
     fn curvature(&mut self, piece: usize, u: f64) -> f64 {
         match &**self.curves.get(piece) {
             Curve::Quadratic(curve) => curvature(&curve.derivative(u), &curve.second_derivative()),
             Curve::General(general) => general.polygon.curvature(u / self.path.width[piece]),
         }
+    }
+
+    fn magnitude(&mut self, piece: usize) -> f64 {
+        self.curves.get(piece).magnitude()
     }
 
     fn turned(&mut self, piece: usize) -> f64 {

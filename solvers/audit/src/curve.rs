@@ -317,9 +317,13 @@ impl<const M: usize> Curve<M> {
     pub fn derivative_size(&self) -> [f64; M] {
         match self {
             Curve::Quadratic(curve) => {
-                std::array::from_fn(|k| 2.0 / curve.width * (curve.first[k].abs() + curve.second[k].abs()))
+                let scale = 2.0 / curve.width;
+                vector_of(|k| scale * (curve.first[k].abs() + curve.second[k].abs()))
             }
-            Curve::General(general) => general.hodographs.sizes()[0].map(|size| size / general.width),
+            Curve::General(general) => {
+                let [size, ..] = general.hodographs.sizes();
+                vector_of(|k| size[k] * general.per_width)
+            }
         }
     }
 

@@ -3,6 +3,4 @@
 pub(crate) mod columns;
 pub mod formula;
 pub mod path;
-pub mod plan;
-pub mod setpoints;
 pub(crate) mod travel;

@@ -5,8 +5,7 @@ use crate::columns::Axes;
 use crate::curve::Followed;
 use crate::deviation::{audit_deviation, audit_path};
 use crate::joints::columns::JointColumns;
-use crate::joints::plan::JointAudit;
-use crate::joints::setpoints::JointSetpoints;
+use crate::joints::path::JointPath;
 use crate::joints::travel::audit_travel;
 use crate::moves::Programmed;
 use crate::phases::Phases;
@@ -15,12 +14,20 @@ use crate::setpoints::{Chunk, Stream};
 use crate::tracking::Plan;
 use crate::{Limits, Seen, Tally};
 
-/// What can be asked of limits in M axes, where the joints are the path's axes.
+/// What can be asked of limits of M axes or joints.
 pub trait PlanKernels<const M: usize> {
     /// What the path shows.
     fn path(&self, path: &Followed, phases: Option<&Phases>, seen: Seen) -> Tally<M>;
     /// What the profile shows.
     fn profile(&self, path: &Followed, junction_speed: &[f64], phases: &Phases, seen: Seen) -> Tally<M>;
+    /// What the profile shows of joints that are not the path's axes.
+    fn joint_profile(
+        &self,
+        joints: &JointPath,
+        junction_speed: &[f64],
+        phases: &Phases,
+        seen: Seen,
+    ) -> Tally<M>;
     /// What path and program show.
     fn deviation(
         &self,
@@ -37,18 +44,6 @@ pub trait SetpointKernels<const M: usize> {
     fn take(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen);
     /// What they have shown.
     fn verdict(self, plan: Option<&Plan>) -> Tally<M>;
-}
-
-/// What can be asked of a plan of joints that are not the path's axes.
-pub trait JointKernels<const M: usize> {
-    /// What its profile shows.
-    fn profile(&self, seen: Seen) -> Tally<M>;
-    /// Before its first setpoint.
-    fn begin(&self) -> JointSetpoints<M>;
-    /// Looks at its next setpoints.
-    fn take(&self, stream: &mut JointSetpoints<M>, chunk: &Chunk);
-    /// What its setpoints have shown.
-    fn verdict(&self, stream: JointSetpoints<M>) -> Tally<M>;
 }
 
 macro_rules! kernels {
@@ -69,6 +64,19 @@ macro_rules! kernels {
                 audit_profile(&of, &|| Box::new(Axes::new(path, self)), seen)
             }
 
+            fn joint_profile(
+                &self,
+                joints: &JointPath,
+                junction_speed: &[f64],
+                phases: &Phases,
+                seen: Seen,
+            ) -> Tally<$count> {
+                let starts = &phases.starts(&joints.path);
+                let of = Audited { junction_speed, phases, limits: self, starts };
+                audit_profile(&of, &|| Box::new(JointColumns::new(joints, self)), seen)
+                    .merge(audit_travel(joints, *phases, starts, self))
+            }
+
             fn deviation(
                 &self,
                 path: &Followed,
@@ -87,27 +95,6 @@ macro_rules! kernels {
 
             fn verdict(self, plan: Option<&Plan>) -> Tally<$count> {
                 self.finish(plan)
-            }
-        }
-
-        impl JointKernels<$count> for JointAudit<'_, $count> {
-            fn profile(&self, seen: Seen) -> Tally<$count> {
-                let Self { phases, limits, starts, .. } = self;
-                let of = Audited { junction_speed: self.path.junction_speed, phases, limits, starts };
-                let found = audit_profile(&of, &|| Box::new(JointColumns::new(self)), seen);
-                found.merge(audit_travel(self))
-            }
-
-            fn begin(&self) -> JointSetpoints<$count> {
-                JointSetpoints::new(self)
-            }
-
-            fn take(&self, stream: &mut JointSetpoints<$count>, chunk: &Chunk) {
-                stream.push(self, chunk);
-            }
-
-            fn verdict(&self, stream: JointSetpoints<$count>) -> Tally<$count> {
-                stream.finish(self)
             }
         })+
     };

@@ -15,7 +15,7 @@ use super::columns::{Columns, Place};
 use super::phases::{Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE};
 use super::quadrature::{integral, MOST_HALVINGS};
 use super::station::Rounded;
-use super::vectors::{from_to, inner, length, vector_of};
+use super::vectors::{from_to, length, vector_of};
 use super::{EPS, ROUNDINGS};
 
 /// Relative rounding of a speed or time after a few operations.
@@ -79,8 +79,8 @@ impl<const M: usize> State<M> {
 
     /// The speed of the tool that feeds limit, and its error.
     pub fn tip(&self) -> [f64; 2] {
-        let [slope, error] = self.place.tip_slope;
-        [slope * self.root_p, (error + slope * (self.doubt + ROUNDING)) * self.root_p]
+        let speed = self.place.tip_slope * self.root_p;
+        [speed, speed * (self.doubt + ROUNDING)]
     }
 }
 
@@ -95,7 +95,7 @@ impl<const M: usize> PhaseMotion<M> {
         let speed_sq: [f64; 2] = match kind {
             AXIS_ACCELERATION | AXIS_VELOCITY => [0, 1].map(|end| by_slope(end, ends[end].slope.value[k])),
             PARAMETER_ACCELERATION => p,
-            _ => [0, 1].map(|end| by_slope(end, columns.held_slope(piece, u[end], &share))),
+            _ => [0, 1].map(|end| by_slope(end, columns.held_slope(piece, u[end], &share)[0])),
         };
         let is_free = matches!(kind, AXIS_ACCELERATION | PARAMETER_ACCELERATION | SPEED_LINE);
         let anchored_at_end = is_free && (speed_sq[1] < speed_sq[0] || !speed_sq[0].is_finite());
@@ -210,9 +210,9 @@ impl<const M: usize> PhaseMotion<M> {
                 State::new(place, p.sqrt(), ROUNDING + 0.5 * gained * self.rounding())
             }
             Law::Speed { .. } => {
-                let slope = columns.held_slope(place.piece, place.u, &self.share);
+                let [slope, error] = columns.held_slope(place.piece, place.u, &self.share);
                 let speed = self.held(place.u);
-                let mut state = State::new(place, speed / slope, ROUNDING + place.tip_slope[1] / slope);
+                let mut state = State::new(place, speed / slope, ROUNDING + error / slope);
                 state.speed = [speed, ROUNDING * speed];
                 state
             }
@@ -268,7 +268,7 @@ impl<const M: usize> PhaseMotion<M> {
                 let (u, way) = (a.place.u, b.place.u - a.place.u);
                 let mut slope = |y: f64| {
                     let u = u + way * y * (2.0 * near + (far - near) * y) / (near + far);
-                    columns.held_slope(a.place.piece, u, &self.share)
+                    columns.held_slope(a.place.piece, u, &self.share)[0]
                 };
                 let whole = integral(&mut slope, 0.0, 1.0, &mut { MOST_HALVINGS });
                 [2.0 * step / (near + far) * whole, rounding]
@@ -328,18 +328,6 @@ impl<const M: usize> PhaseMotion<M> {
             Law::Speed { .. } => true,
         }
     }
-}
-
-/// Curvature in 1/mm from C' and C'': the part of C'' across the path over |C'|².
-#[inline]
-pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
-    let square = inner(tangent, tangent);
-    if square == 0.0 {
-        return 0.0;
-    }
-    let along = inner(tangent, bend) / square;
-    let across: [f64; M] = std::array::from_fn(|k| bend[k] - along * tangent[k]);
-    length(&across) / square
 }
 
 #[cfg(test)]
@@ -489,15 +477,5 @@ mod tests {
                 .sum();
             assert!((phase.total() - exact).abs() < 1e-8, "{}", phase.total());
         });
-    }
-
-    #[test]
-    fn a_parabola_is_most_curved_at_its_tip() {
-        // y = x²/2 has curvature 1 at x = 0 and 1/√8 at x = 1.
-        let curve = Quadratic::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
-        let bend = curve.second_derivative();
-        assert!((curvature(&curve.derivative(1.0), &bend) - 1.0).abs() < 1e-15);
-        assert!((curvature(&curve.derivative(2.0), &bend) - 8.0_f64.sqrt().recip()).abs() < 1e-15);
-        assert_eq!(curvature(&[0.0, 0.0], &bend), 0.0);
     }
 }

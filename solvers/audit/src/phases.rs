@@ -112,7 +112,7 @@ impl Phases<'_> {
             return None;
         }
         let (kind, piece, u) = (self.kind[i], self.piece[i] as usize, [self.u0[i], self.u1[i]]);
-        let (curve, scale) = (columns.curve(piece), columns.scale());
+        let (curve, scale) = (columns.curve(piece).clone(), columns.scale());
         let mut slope = |u: f64| match columns.station(piece, u) {
             Some(station) => station.slope,
             None => columns.place(piece, u).way_slope,

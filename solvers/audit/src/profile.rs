@@ -99,7 +99,7 @@ impl<const M: usize> Audited<'_, M> {
         }
         let feeds = columns.feeds(piece);
         let elapsed = if let Some(motion) = by_length {
-            let curve = columns.curve(piece);
+            let curve = columns.curve(piece).clone();
             let covered = curve.turns() as f64 * ((u[1] - u[0]) / width);
             let (limits, start, motion) = (self.limits, time, &motion);
             let mut looker = Looker {

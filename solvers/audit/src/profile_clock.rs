@@ -59,14 +59,13 @@ impl ProfileClock<'_> {
 
     /// Adds the starts of the runs that setpoints reach. A run starts when the pause before it is over or, where the
     /// setpoints stand still on the stop for it, at the next of them. `away` is the distance of a setpoint from the
-    /// stop before a run, less rounding; `ends` says whether these are the last ones.
+    /// stop before a run, less rounding.
     pub fn extend<const M: usize>(
         &self,
         path: &Followed,
         period: f64,
         rows: &[Row<M>],
         mut away: impl FnMut(usize, &Row<M>) -> f64,
-        ends: bool,
         clock: &mut Vec<f64>,
     ) {
         while clock.len() + 1 < self.phases.runs.len() {
@@ -81,7 +80,7 @@ impl ProfileClock<'_> {
             clock.push(match &rows[next..] {
                 [] => break,
                 // At the end of the pause: only the next row shows whether the stream moves on or waits.
-                [row] if on_time(row) && !ends => break,
+                [row] if on_time(row) => break,
                 [row, rest @ ..] => {
                     let (here, later) = (away(run, row), rest.first().filter(|_| on_time(row)));
                     // A run may begin slowly: a stream that waits, or has not quite arrived, does not move away from the stop.

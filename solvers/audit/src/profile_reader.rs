@@ -78,6 +78,18 @@ impl<'a, const M: usize> Reader<'a, M> {
         self.clock.starts[self.phase] + here.since
     }
 
+    /// Where the profile is at a time on the clock of setpoints: piece, ends of the phase, u.
+    pub fn phase_at(&mut self, time: f64) -> (usize, [f64; 2], f64) {
+        let found = self.clock.phase_of(self.clock.run_of(time), time);
+        let (phase, since) = found.unwrap_or((self.phase, 0.0));
+        if phase != self.phase {
+            self.enter(phase);
+        }
+        let ends = self.ends(phase);
+        let u = self.motion.place_at(since, &mut *self.columns).clamp(ends[0], ends[1]);
+        (self.clock.phases.piece[phase] as usize, ends, u)
+    }
+
     fn holds(&self, phase: usize, place: Place) -> bool {
         let phases = &self.clock.phases;
         phases.piece[phase] as usize == place.piece
@@ -124,7 +136,8 @@ impl<'a, const M: usize> Reader<'a, M> {
         let [from, until] = self.times(&here, limits.period);
         let wait = (from - time).max(time - until).max(0.0);
         // Summing the durations of all phases before has rounded once for each.
-        let rounding = EPS * time.abs() * (self.phase as f64 + ROUNDINGS);
+        let doubt = if here.doubt.is_nan() { 0.0 } else { here.doubt };
+        let rounding = EPS * time.abs() * (self.phase as f64 + ROUNDINGS) + doubt;
         if wait <= rounding {
             return 0.0;
         }
@@ -132,7 +145,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration.greater()));
         let most = reach(wait) - reach(rounding);
         // A profile that creeps through a turn gets nowhere near as far.
-        if most > PLACE_TOLERANCE {
+        if most > PLACE_TOLERANCE && self.columns.are_axes() {
             most.min(self.way_from(place, time).unwrap_or(most))
         } else {
             most
@@ -146,7 +159,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         let there = Place { piece: self.clock.phases.piece[phase] as usize, u: here.u };
         let (first, last) =
             if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
-        let curve = self.columns.curve(first.piece);
+        let curve = self.columns.curve(first.piece).clone();
         match last.piece - first.piece {
             0 => Some(curve.way_at_most(first.u, last.u)),
             1 => {

@@ -1,6 +1,7 @@
 //! One setpoint of a stream, and where it is on the path of its plan.
 
 use super::nearest::Place;
+use super::station::Rounded;
 use super::PLACE_TOLERANCE;
 
 /// One setpoint.
@@ -36,7 +37,7 @@ pub struct Nearest<const M: usize> {
     /// How much of `late` is allowed, in mm.
     pub allowed: f64,
     /// Of the profile there; not a number where that is not known.
-    pub velocity: [f64; M],
+    pub velocity: Rounded<M>,
     /// How far a recorded acceleration is from the profile's.
     pub acceleration_off: [f64; M],
 }
@@ -50,7 +51,7 @@ impl<const M: usize> Default for Nearest<M> {
             off: 0.0,
             late: 0.0,
             allowed: PLACE_TOLERANCE,
-            velocity: [f64::NAN; M],
+            velocity: Rounded { value: [f64::NAN; M], rounding: [0.0; M] },
             acceleration_off: [0.0; M],
         }
     }

@@ -11,7 +11,7 @@ use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
 use super::rows::{Nearest, Row};
 use super::tracking::Plan;
-use super::vectors::{distance, length, vector};
+use super::vectors::{length, vector};
 use super::{Check, Limits, Seen, Tally, PLACE_TOLERANCE};
 
 /// Setpoints before and after the one at which an acceleration is judged.
@@ -142,7 +142,8 @@ impl<const M: usize> View<'_, M> {
     /// The first setpoint must be the start of the path, at time 0.
     fn first(&self, tally: &mut Tally<M>) {
         let (Some(plan), row) = (self.plan, &self.differences.rows[0]) else { return };
-        let away = distance(&row.q, &plan.start()) - length(&self.differences.rounding(0));
+        let columns = &mut *plan.columns(self.differences.limits);
+        let away = plan.distance_from_end(columns, (0, false), &row.q);
         tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, row.line);
         tally.offer(Check::Grid, 0, row.t.abs(), self.differences.uneven(), row.t, row.line);
     }
@@ -152,7 +153,8 @@ impl<const M: usize> View<'_, M> {
         let (Some(plan), rows) = (self.plan, self.differences.rows) else { return };
         match rows.last() {
             Some(row) => {
-                let away = distance(&row.q, &plan.end()) - length(&self.differences.rounding(rows.len() - 1));
+                let columns = &mut *plan.columns(self.differences.limits);
+                let away = plan.distance_from_end(columns, (plan.path.len() - 1, true), &row.q);
                 tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, row.line);
             }
             None => tally.offer(Check::Place, 0, f64::INFINITY, PLACE_TOLERANCE, 0.0, 0),
@@ -226,7 +228,8 @@ impl<const M: usize> View<'_, M> {
             let rounding = length(rounding);
             comparison.nearest(row, rounding, tally);
             if n > 0 {
-                comparison.step(&rows[n - 1], row, recent.steps[2], rounding, tally);
+                let earlier = n.checked_sub(2).map(|n| &rows[n]);
+                comparison.step(earlier, [&rows[n - 1], row], recent.steps[2], rounding, tally);
             }
         }
     }

@@ -4,19 +4,20 @@
 //! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
 //! that is early or late is the way that the profile moves in that time.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::columns::{Axes, Columns};
-use super::curve::{Curve, Followed};
+use super::curve::Followed;
+use super::joints::columns::JointColumns;
+use super::joints::path::JointPath;
 use super::moves::Programmed;
 use super::nearest::{Found, Place, Search};
+use super::phase_motion::ROUNDING;
 use super::profile_clock::ProfileClock;
 use super::profile_reader::Reader;
 use super::rows::{Nearest, Row};
-use super::vectors::{distance, from_to, inner, length};
-use super::{tell, Limits, Seen, EPS, PLACE_TOLERANCE, ROUNDINGS};
+use super::vectors::{inner, length};
+use super::{tell, Limits, Seen, PLACE_TOLERANCE};
 
 /// Setpoints a thread takes at a time.
 const BLOCK: usize = 4096;
@@ -30,6 +31,9 @@ const MOST_ASTRAY: u32 = 64;
 const MOST_GUESSES: usize = 6;
 const SETTLED: f64 = 1e-7;
 
+/// Steps towards the nearest place of a phase.
+const MOST_STEPS: usize = 12;
+
 /// A setpoint may lie this share of its step from its place on the path: what sampling promises.
 pub const STEP_SHARE: f64 = 1e-6;
 
@@ -40,36 +44,47 @@ pub struct Plan<'a> {
     pub path: Followed<'a>,
     pub profile: Option<ProfileClock<'a>>,
     pub program: Option<Programmed<'a>>,
+    /// On the same path, where the setpoints are those of joints that are not its axes.
+    pub joints: Option<&'a JointPath<'a>>,
 }
 
-impl Plan<'_> {
-    /// The first point of the path.
-    pub fn start<const M: usize>(&self) -> [f64; M] {
-        self.path.start(0)
+impl<'a> Plan<'a> {
+    /// What the setpoints are of.
+    pub fn columns<const M: usize>(&self, limits: &'a Limits<M>) -> Box<dyn Columns<M> + 'a> {
+        match self.joints {
+            Some(joints) => Box::new(JointColumns::new(joints, limits)),
+            None => Box::new(Axes::new(&self.path, limits)),
+        }
     }
 
-    /// The last point of the path.
-    pub fn end<const M: usize>(&self) -> [f64; M] {
-        self.path.end(self.path.len() - 1)
+    /// Distance of a setpoint from the start or the end of a piece, less rounding.
+    pub fn distance_from_end<const M: usize>(
+        &self,
+        columns: &mut dyn Columns<M>,
+        (piece, at_end): (usize, bool),
+        q: &[f64; M],
+    ) -> f64 {
+        let [away, _] = columns.toward(piece, if at_end { self.path.width[piece] } else { 0.0 }, q);
+        length(&away) - rounding(columns.count(), columns.magnitude(piece), q)
     }
 
     /// The same plan with the starts of the runs on the clock of the setpoints.
-    pub fn with_clock<'b>(&'b self, run_starts: &'b [f64]) -> Plan<'b> {
+    pub fn with_clock<'b>(&self, run_starts: &'b [f64]) -> Plan<'b>
+    where
+        'a: 'b,
+    {
         Plan { profile: self.profile.map(|profile| ProfileClock { run_starts, ..profile }), ..*self }
     }
 
     /// Adds to the clock the starts of the runs that the rows reach.
     pub fn extend_clock<const M: usize>(&self, limits: &Limits<M>, rows: &[Row<M>], clock: &mut Vec<f64>) {
         let Some(profile) = &self.profile else { return };
+        let mut columns = self.columns(limits);
         let away = |run: usize, row: &Row<M>| {
-            let stop = match run {
-                0 => self.start::<M>(),
-                _ => self.path.end::<M>((self.path.runs[run] as usize).max(1) - 1),
-            };
-            let magnitude = stop.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
-            distance(&row.q, &stop) - ROUNDINGS * EPS * magnitude
+            let end = (self.path.runs[run] as usize).checked_sub(1);
+            self.distance_from_end(&mut *columns, end.map_or((0, false), |piece| (piece, true)), &row.q)
         };
-        profile.extend(&self.path, limits.period, rows, away, false, clock);
+        profile.extend(&self.path, limits.period, rows, away, clock);
     }
 
     /// Finds the places of the rows from `old` on.
@@ -102,32 +117,44 @@ impl Plan<'_> {
     }
 }
 
+/// Rounding of the distance of a setpoint from a place, by the greatest coordinate of both.
+fn rounding<const M: usize>(count: usize, magnitude: f64, q: &[f64; M]) -> f64 {
+    let most = q.iter().fold(magnitude, |most, q| q.abs().max(most));
+    ROUNDING * most * (count as f64).sqrt()
+}
+
+/// The place u of a piece, or its end where rounding does not tell it from there: the profile may pause at ends.
+fn settled(u: f64, ends: [f64; 2], rounding: f64) -> f64 {
+    ends.into_iter().find(|end| (end - u).abs() <= rounding).unwrap_or(u)
+}
+
 /// Finds the places of setpoints one after the other.
 struct Finder<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
-    /// The pieces, where there is no profile that has them.
-    columns: Axes<'a, M>,
+    /// Where there is no profile that has them.
+    columns: Option<Box<dyn Columns<M> + 'a>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
 }
 
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
-        let profile = plan
-            .profile
-            .as_ref()
-            .map(|profile| Reader::new(profile, Box::new(Axes::new(&plan.path, limits))));
-        let columns = Axes::new(&plan.path, limits);
+        let (mut profile, mut columns) = (None, None);
+        match &plan.profile {
+            Some(clock) => profile = Some(Reader::new(clock, plan.columns(limits))),
+            None => columns = Some(plan.columns(limits)),
+        }
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
         Self { plan, limits, profile, columns, reach }
     }
 
-    fn curve(&mut self, piece: usize) -> Arc<Curve<M>> {
-        match &mut self.profile {
-            Some(profile) => profile.columns.curve(piece),
-            None => self.columns.curve(piece),
+    fn columns(&mut self) -> &mut dyn Columns<M> {
+        match (&mut self.profile, &mut self.columns) {
+            (Some(profile), _) => &mut *profile.columns,
+            (_, Some(columns)) => &mut **columns,
+            _ => unreachable!("one of both has them"),
         }
     }
 
@@ -146,15 +173,16 @@ impl<'a, const M: usize> Finder<'a, M> {
         if !(row.t.is_finite() && row.q.iter().all(|q| q.is_finite()) && self.reach.is_finite()) {
             return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
-        let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
-        let most = self.curve(from.piece).magnitude();
-        let magnitude = row.q.iter().fold(most, |most, q| q.abs().max(most));
-        let rounding = ROUNDINGS * EPS * magnitude * (path.axes as f64).sqrt();
+        let columns = self.columns();
+        let (are_axes, magnitude) = (columns.are_axes(), columns.magnitude(from.piece));
+        let pieces = [previous.map_or(from.piece, |before| before.nearest.place.piece), from.piece];
+        let step = previous.map_or(0.0, |before| length(&columns.difference(pieces, &before.q, &row.q)));
+        let rounding = rounding(columns.count(), magnitude, &row.q);
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
         let close = PLACE_TOLERANCE + rounding;
         let guess = known
             .filter(|_| self.profile.is_some())
-            .and_then(|before| self.guess(from, before.nearest.step, &row.q, close));
+            .and_then(|before| self.guess(from, before.nearest.step, &row.q, rounding));
         let mut judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));
             (late - rounding).max(0.0)
@@ -162,7 +190,10 @@ impl<'a, const M: usize> Finder<'a, M> {
         let guess = guess.map(|(place, distance)| Found { place, distance, error: judge(place) });
         let found = match guess.filter(|guess| guess.error <= allowed) {
             Some(found) => found,
-            None => Search { path, reach: self.reach, close, judge, allowed }.next_place(from, &row.q),
+            None if are_axes => {
+                Search { path, reach: self.reach, close, judge, allowed }.next_place(from, &row.q)
+            }
+            None => self.by_time(from, row, rounding),
         };
         let place = found.place;
         let step = if place.piece == from.piece { place.u - from.u } else { 0.0 };
@@ -171,8 +202,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         let mut nearest = Nearest { place, step, magnitude, off, late, allowed, ..Nearest::default() };
         if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
-            nearest.velocity = here.velocity.value;
-            if let Some(recorded) = row.acceleration.filter(|_| nearest.is_good()) {
+            nearest.velocity = here.velocity;
+            if let Some(recorded) = row.acceleration.filter(|_| are_axes && nearest.is_good()) {
                 nearest.acceleration_off = profile.acceleration_off(&here, row.t, &recorded, limits);
             }
         }
@@ -181,31 +212,59 @@ impl<'a, const M: usize> Finder<'a, M> {
 
     /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead, on the same piece or the
     /// next one; none where that does not converge ahead of `from` or is not close.
-    fn guess(&mut self, from: Place, step: f64, q: &[f64; M], close: f64) -> Option<(Place, f64)> {
+    fn guess(&mut self, from: Place, step: f64, q: &[f64; M], rounding: f64) -> Option<(Place, f64)> {
         let (mut piece, mut u) = (from.piece, from.u + step);
-        let pieces = self.plan.path.len();
-        let mut curve = self.curve(piece);
+        let (path, columns) = (&self.plan.path, self.columns());
         for _ in 0..MOST_GUESSES {
-            if u > curve.width() {
+            if u > path.width[piece] {
                 piece += 1;
-                if piece > from.piece + 1 || piece == pieces {
+                if piece > from.piece + 1 || piece == path.len() {
                     return None;
                 }
-                (curve, u) = (self.curve(piece), 0.0);
+                u = 0.0;
             }
-            let [point, tangent] = curve.place(u);
-            let (away, square) = (from_to(&point, q), inner(&tangent, &tangent));
-            let along = inner(&away, &tangent);
+            let [away, slope] = columns.toward(piece, u, q);
+            let (square, along) = (inner(&slope, &slope), inner(&away, &slope));
             let (du, beside_sq) = (along / square, inner(&away, &away) - along * along / square);
             u += du;
             if du.abs() * square.sqrt() <= SETTLED {
                 let least = if piece == from.piece { from.u } else { 0.0 };
                 let distance = beside_sq.max(0.0).sqrt();
-                let good = least <= u && u <= curve.width() && distance <= close;
+                u = settled(u, [0.0, path.width[piece]], rounding / square.sqrt());
+                let good = least <= u && u <= path.width[piece] && distance <= PLACE_TOLERANCE + rounding;
                 return good.then_some((Place { piece, u }, distance));
             }
         }
         None
+    }
+
+    /// The place nearest to a setpoint on the phase that the profile is on at its time, where nothing else leads to one.
+    fn by_time(&mut self, from: Place, row: &Row<M>, rounding: f64) -> Found {
+        let Some(profile) = &mut self.profile else {
+            return Found { place: from, distance: f64::INFINITY, error: f64::INFINITY };
+        };
+        let (piece, ends, mut u) = profile.phase_at(row.t);
+        let columns = &mut *profile.columns;
+        let [mut away, mut slope] = columns.toward(piece, u, &row.q);
+        for _ in 0..MOST_STEPS {
+            let square = inner(&slope, &slope);
+            let step = inner(&away, &slope) / square;
+            let next = (u + if step.is_nan() { 0.0 } else { step }).clamp(ends[0], ends[1]);
+            // Steps below the rounding of the place would change the time next to rest.
+            if step.abs() * square.sqrt() <= rounding || next == u {
+                break;
+            }
+            let there = columns.toward(piece, next, &row.q);
+            let is_nearer = length(&there[0]) + rounding < length(&away);
+            if !is_nearer {
+                break;
+            }
+            (u, [away, slope]) = (next, there);
+        }
+        u = settled(u, [0.0, self.plan.path.width[piece]], rounding / length(&slope));
+        let (place, distance) = (Place { piece, u }, length(&away));
+        let error = (profile.late(place, row.t, self.limits) - rounding).max(0.0);
+        Found { place, distance, error }
     }
 }
 

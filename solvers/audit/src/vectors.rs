@@ -1,4 +1,4 @@
-//! Vectors of M numbers, one an axis: length, inner product, distance, and straight lines between two points.
+//! Vectors of M numbers, one an axis: length, inner product, distance, curvature, and straight lines between two points.
 
 /// Row `i` of a table with a column for each axis.
 #[inline(always)]
@@ -51,6 +51,18 @@ pub fn distance<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     length(&from_to(a, b))
 }
 
+/// Curvature in 1/mm from C' and C'': the part of C'' across the path over |C'|².
+#[inline]
+pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
+    let square = inner(tangent, tangent);
+    if square == 0.0 {
+        return 0.0;
+    }
+    let along = inner(tangent, bend) / square;
+    let across: [f64; M] = std::array::from_fn(|k| bend[k] - along * tangent[k]);
+    length(&across) / square
+}
+
 /// A straight line from one point to another, ends included.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<const M: usize> {
@@ -86,6 +98,7 @@ impl<const M: usize> Segment<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curve::Quadratic;
 
     #[test]
     fn a_point_beside_a_segment_is_as_far_as_the_nearest_end_or_foot() {
@@ -95,5 +108,15 @@ mod tests {
         assert_eq!(segment.distance_sq(&[7.0, 4.0]), 25.0);
         assert_eq!(segment.distance_sq(&[-3.0, 4.0]), 25.0);
         assert_eq!(Segment::new(&a, &a).distance_sq(&[3.0, 4.0]), 25.0);
+    }
+
+    #[test]
+    fn a_parabola_is_most_curved_at_its_tip() {
+        // y = x²/2 has curvature 1 at x = 0 and 1/√8 at x = 1.
+        let curve = Quadratic::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
+        let bend = curve.second_derivative();
+        assert!((curvature(&curve.derivative(1.0), &bend) - 1.0).abs() < 1e-15);
+        assert!((curvature(&curve.derivative(2.0), &bend) - 8.0_f64.sqrt().recip()).abs() < 1e-15);
+        assert_eq!(curvature(&[0.0, 0.0], &bend), 0.0);
     }
 }

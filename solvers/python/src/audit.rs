@@ -1,4 +1,4 @@
-//! The audit of plans and setpoints: the package's own types in, findings out.
+//! The audit of plans: the package's own types in, findings out.
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -13,14 +13,10 @@ use super::with_padded_axes;
 use super::work::run;
 
 use feedplan_audit::curve::{Followed, Pieces};
-use feedplan_audit::kernels::{PlanKernels, SetpointKernels};
+use feedplan_audit::kernels::PlanKernels;
 use feedplan_audit::moves::Programmed;
 use feedplan_audit::phases::Phases;
-use feedplan_audit::profile_clock::ProfileClock;
-use feedplan_audit::setpoints::{Chunk, Stream};
-use feedplan_audit::tracking::Plan;
 use feedplan_audit::{Check, Limits, Sided, Tally, FEEDS};
-use feedplan_geometry::watch::Watch;
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
@@ -96,7 +92,7 @@ impl ProblemArrays<'_> {
     }
 
     /// `feed` are the greatest speeds of each piece.
-    fn followed<'a>(&'a self, feed: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Followed<'a>> {
+    pub fn followed<'a>(&'a self, feed: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Followed<'a>> {
         let followed = Followed { feed: feed.as_slice()?, ..self.unlimited()? };
         require(followed.feed.len() == FEEDS * followed.len(), "path")?;
         Ok(followed)
@@ -157,7 +153,7 @@ pub fn phases<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyRes
 }
 
 /// The moves of a program on a path in so many axes.
-fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
+pub fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
     let none = Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] };
     require(moves.axes() == axes, "program")?;
     Ok(Programmed {
@@ -275,182 +271,6 @@ fn audit_plan(
     })
 }
 
-/// Setpoints whose accelerations and lines are not looked at.
-pub fn setpoint_chunk<'a>(
-    axes: usize,
-    t: &'a PyReadonlyArray1<'_, f64>,
-    position: &'a PyReadonlyArray2<'_, f64>,
-    velocity: &'a Option<PyReadonlyArray2<'_, f64>>,
-) -> PyResult<Chunk<'a>> {
-    let velocity = velocity.as_ref().map(|array| array.as_slice()).transpose()?;
-    let (t, position) = (t.as_slice()?, position.as_slice()?);
-    let rows = axes * t.len();
-    require(position.len() == rows && velocity.is_none_or(|flat| flat.len() == rows), "setpoints")?;
-    Ok(Chunk { axes, t, position, velocity, acceleration: None, line: None })
-}
-
-/// A stream whatever its number of axes.
-trait AnyStream: Send + Sync {
-    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch);
-    fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings;
-}
-
-impl<const M: usize> AnyStream for Stream<M>
-where
-    Stream<M>: SetpointKernels<M>,
-{
-    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch) {
-        // Places are found, then judged.
-        let each = watch.each(2 * chunk.t.len());
-        self.take(plan, chunk, &|count| each.advance(count));
-    }
-
-    fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings {
-        let axes = self.axes();
-        findings(&self.verdict(plan), axes)
-    }
-}
-
-/// What a stream of setpoints is compared with, kept as Python holds it.
-struct Compared {
-    problem: Py<PyAny>,
-    feed: Py<PyAny>,
-    profile: Option<Py<Profile>>,
-    program: Option<Py<Moves>>,
-    /// When every phase of the profile begins.
-    starts: Vec<f64>,
-}
-
-impl Compared {
-    /// Calls `work` with the plan, free of Python's lock.
-    fn with_plan<T: Send>(
-        &self,
-        py: Python<'_>,
-        progress: Option<&Bound<'_, PyAny>>,
-        work: impl FnOnce(&Plan, Watch) -> T + Send,
-    ) -> PyResult<T> {
-        let problem: ProblemArrays = self.problem.bind(py).extract()?;
-        let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
-        let path = problem.followed(&feed)?;
-        let phases = self.profile.as_ref().map(|profile| phases(profile.get(), &problem)).transpose()?;
-        let program =
-            self.program.as_ref().map(|moves| programmed(moves.get(), problem.axes())).transpose()?;
-        let profile = phases.map(|phases| ProfileClock { phases, starts: &self.starts, run_starts: &[] });
-        let plan = Plan { path, profile, program };
-        run(py, progress, |watch| work(&plan, watch))
-    }
-}
-
-/// Audits setpoints chunk by chunk; with a problem also their places on its path.
-#[pyclass]
-struct SetpointAudit {
-    axes: usize,
-    stream: Option<Box<dyn AnyStream>>,
-    compared: Option<Compared>,
-}
-
-#[pymethods]
-impl SetpointAudit {
-    #[new]
-    #[pyo3(signature = (limits, resolution=0.0, problem=None, feed=None, profile=None, program=None))]
-    fn new(
-        limits: LimitArrays,
-        resolution: f64,
-        problem: Option<Bound<'_, PyAny>>,
-        feed: Option<Bound<'_, PyAny>>,
-        profile: Option<Of<Profile>>,
-        program: Option<Of<Moves>>,
-    ) -> PyResult<Self> {
-        let axes = limits.max_velocity.len();
-        let stream: Box<dyn AnyStream> = with_padded_axes!(
-            axes,
-            M,
-            Ok(Box::new(Stream::new(limits.limits::<M>(axes)?, resolution)) as _)
-        )?;
-        let compared = problem
-            .zip(feed)
-            .map(|(problem, feed)| compare(axes, problem, feed, profile, program))
-            .transpose()?;
-        Ok(Self { axes, stream: Some(stream), compared: compared.flatten() })
-    }
-
-    /// The next setpoints.
-    #[pyo3(signature = (t, position, velocity=None, acceleration=None, line=None, progress=None))]
-    #[allow(clippy::too_many_arguments)]
-    fn push(
-        &mut self,
-        py: Python<'_>,
-        t: PyReadonlyArray1<'_, f64>,
-        position: PyReadonlyArray2<'_, f64>,
-        velocity: Option<PyReadonlyArray2<'_, f64>>,
-        acceleration: Option<PyReadonlyArray2<'_, f64>>,
-        line: Option<PyReadonlyArray1<'_, i32>>,
-        progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let chunk = Chunk {
-            acceleration: acceleration.as_ref().map(|array| array.as_slice()).transpose()?,
-            line: line.as_ref().map(|array| array.as_slice()).transpose()?,
-            ..setpoint_chunk(self.axes, &t, &position, &velocity)?
-        };
-        let good = chunk.acceleration.is_none_or(|flat| flat.len() == chunk.position.len())
-            && chunk.line.is_none_or(|flat| flat.len() == chunk.t.len());
-        require(good, "setpoints")?;
-        // An audit that is interrupted is finished.
-        let mut stream = self.stream.take().ok_or_else(finished)?;
-        let (pushed, progress) = (&mut stream, progress.as_ref());
-        match &self.compared {
-            Some(compared) => {
-                compared.with_plan(py, progress, |plan, watch| pushed.push(Some(plan), &chunk, watch))?;
-            }
-            None => run(py, progress, |watch| pushed.push(None, &chunk, watch))?,
-        }
-        self.stream = Some(stream);
-        Ok(())
-    }
-
-    /// What was found; nothing can be pushed afterwards.
-    fn finish(&mut self, py: Python<'_>) -> PyResult<Findings> {
-        let stream = self.stream.take().ok_or_else(finished)?;
-        match &self.compared {
-            Some(compared) => compared.with_plan(py, None, |plan, _| stream.finish(Some(plan))),
-            None => Ok(stream.finish(None)),
-        }
-    }
-}
-
-/// A plan to compare with, if the path has pieces; the profile only where its numbers can be used.
-fn compare(
-    axes: usize,
-    problem: Bound<'_, PyAny>,
-    feed: Bound<'_, PyAny>,
-    profile: Option<Of<Profile>>,
-    program: Option<Of<Moves>>,
-) -> PyResult<Option<Compared>> {
-    let arrays: ProblemArrays = problem.extract()?;
-    let feeds: PyReadonlyArray2<f64> = feed.extract()?;
-    let path = arrays.followed(&feeds)?;
-    require(arrays.axes() == axes, "limits and the path")?;
-    if path.is_empty() {
-        return Ok(None);
-    }
-    let mut starts = Vec::new();
-    let mut usable = None;
-    if let Some(profile) = profile {
-        let phases = phases(&profile, &arrays)?;
-        if phases.fits(&path, path.axes) {
-            starts = phases.starts(&path);
-            usable = Some(profile.native().clone_ref(problem.py()));
-        }
-    }
-    let program = program.map(Of::into_native);
-    Ok(Some(Compared { problem: problem.unbind(), feed: feed.unbind(), profile: usable, program, starts }))
-}
-
-pub fn finished() -> PyErr {
-    PyValueError::new_err("this audit is finished")
-}
-
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(audit_plan, module)?)?;
-    module.add_class::<SetpointAudit>()
+    module.add_function(wrap_pyfunction!(audit_plan, module)?)
 }

@@ -2,13 +2,11 @@
 
 use std::collections::HashMap;
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::audit::{
-    findings, finished, phases, require, setpoint_chunk, Findings, LimitArrays, ProblemArrays,
-};
+use super::audit::{findings, phases, require, Findings, LimitArrays, ProblemArrays};
 use super::kinematics::{operation_rows, ExpressionArrays};
 use super::native::Of;
 use super::profile::Profile;
@@ -16,11 +14,7 @@ use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::joints::formula::Formula;
 use feedplan_audit::joints::path::{JointPath, Words};
-use feedplan_audit::joints::plan::JointAudit;
-use feedplan_audit::joints::setpoints::JointSetpoints;
-use feedplan_audit::kernels::JointKernels;
-use feedplan_audit::setpoints::Chunk;
-use feedplan_geometry::watch::Watch;
+use feedplan_audit::kernels::PlanKernels;
 
 /// `feedplan.machine.words.AxisWords`.
 #[derive(FromPyObject)]
@@ -80,18 +74,17 @@ struct AxesOfPath {
     axes: Vec<String>,
 }
 
-/// What of a problem is kept from call to call.
-struct Kept {
+/// What the words of a problem mean, kept from call to call.
+pub struct JointWords {
     words: Vec<Words>,
     words_of: Vec<usize>,
     xyz: Vec<bool>,
     ijk: Vec<bool>,
     way_scale: Vec<f64>,
-    starts: Vec<f64>,
 }
 
-impl Kept {
-    fn new(problem: &Bound<'_, PyAny>, profile: &Profile, joints: usize) -> PyResult<Self> {
+impl JointWords {
+    pub fn new(problem: &Bound<'_, PyAny>, joints: usize) -> PyResult<Self> {
         let own: JointArrays = problem.extract()?;
         let arrays: ProblemArrays = problem.extract()?;
         let axes = &own.path.axes;
@@ -115,51 +108,28 @@ impl Kept {
             words_of.push(number);
         }
         let of = |letters: [&str; 3]| axes.iter().map(|axis| letters.contains(&axis.as_str())).collect();
-        Ok(Self {
-            words,
-            words_of,
-            xyz: of(["X", "Y", "Z"]),
-            ijk: of(["I", "J", "K"]),
-            way_scale,
-            starts: phases(profile, &arrays)?.starts(&path),
-        })
+        Ok(Self { words, words_of, xyz: of(["X", "Y", "Z"]), ijk: of(["I", "J", "K"]), way_scale })
     }
 
-    /// Calls `work` with what the audit knows, free of Python's lock.
-    fn with<const M: usize, T: Send>(
+    /// Calls `work` with the joints, which are of `count`.
+    pub fn with<T>(
         &self,
         problem: &Bound<'_, PyAny>,
-        profile: &Profile,
-        limits: &LimitArrays,
-        progress: Option<&Bound<'_, PyAny>>,
-        work: impl FnOnce(&JointAudit<M>, Watch) -> T + Send,
+        count: usize,
+        work: impl FnOnce(&JointPath) -> PyResult<T>,
     ) -> PyResult<T> {
-        let arrays: ProblemArrays = problem.extract()?;
-        let own: JointArrays = problem.extract()?;
-        let joints = limits.axes();
-        let audit = JointAudit {
-            path: JointPath {
-                path: arrays.unlimited()?,
-                joints,
-                words: &self.words,
-                words_of: &self.words_of,
-                xyz: &self.xyz,
-                ijk: &self.ijk,
-                way_scale: &self.way_scale,
-                feed: own.feed.as_slice()?,
-                junction_speed: arrays.junction_speed()?,
-            },
-            phases: phases(profile, &arrays)?,
-            limits: limits.limits::<M>(joints)?,
-            starts: &self.starts,
-        };
-        run(problem.py(), progress, |watch| work(&audit, watch))
+        let (arrays, own): (ProblemArrays, JointArrays) = (problem.extract()?, problem.extract()?);
+        work(&JointPath {
+            path: arrays.unlimited()?,
+            joints: count,
+            words: &self.words,
+            words_of: &self.words_of,
+            xyz: &self.xyz,
+            ijk: &self.ijk,
+            way_scale: &self.way_scale,
+            feed: own.feed.as_slice()?,
+        })
     }
-}
-
-fn widest(problem: &Bound<'_, PyAny>, limits: &LimitArrays) -> PyResult<usize> {
-    let arrays: ProblemArrays = problem.extract()?;
-    Ok(arrays.axes().max(limits.axes()))
 }
 
 /// Audits a profile whose limits belong to joints that are not the path's axes.
@@ -172,107 +142,20 @@ fn audit_joints(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
     let joints = limits.axes();
-    let kept = Kept::new(&problem, &profile, joints)?;
-    with_padded_axes!(widest(&problem, &limits)?, M, {
-        kept.with::<M, _>(&problem, &profile, &limits, progress.as_ref(), |audit, watch| {
-            // Phases are measured once, and once more for their jerk.
-            let times = if audit.limits.judges_jerk { 2 } else { 1 };
-            let each = watch.each(times * audit.phases.len());
-            findings(&audit.profile(&|count| each.advance(count)), joints)
+    let arrays: ProblemArrays = problem.extract()?;
+    let (junction_speed, phases) = (arrays.junction_speed()?, phases(&profile, &arrays)?);
+    with_padded_axes!(arrays.axes().max(joints), M, {
+        let limits = limits.limits::<M>(joints)?;
+        JointWords::new(&problem, joints)?.with(&problem, joints, |path| {
+            run(problem.py(), progress.as_ref(), |watch| {
+                let each = watch.each(phases.len());
+                let seen = |count| each.advance(count);
+                findings(&limits.joint_profile(path, junction_speed, &phases, &seen), joints)
+            })
         })
     })
 }
 
-/// A stream whatever its number of axes.
-trait AnyStream: Send + Sync {
-    fn push(
-        &mut self,
-        of: &Compared,
-        py: Python<'_>,
-        chunk: &Chunk,
-        progress: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()>;
-    fn finish(self: Box<Self>, of: &Compared, py: Python<'_>) -> PyResult<Findings>;
-}
-
-impl<const M: usize> AnyStream for JointSetpoints<M>
-where
-    for<'a> JointAudit<'a, M>: JointKernels<M>,
-{
-    fn push(
-        &mut self,
-        of: &Compared,
-        py: Python<'_>,
-        chunk: &Chunk,
-        progress: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        of.kept.with::<M, _>(of.problem.bind(py), of.profile.get(), &of.limits, progress, |audit, _| {
-            audit.take(self, chunk);
-        })
-    }
-
-    fn finish(self: Box<Self>, of: &Compared, py: Python<'_>) -> PyResult<Findings> {
-        of.kept.with::<M, _>(of.problem.bind(py), of.profile.get(), &of.limits, None, |audit, _| {
-            findings(&audit.verdict(*self), audit.path.joints)
-        })
-    }
-}
-
-/// What setpoints are compared with, kept as Python holds it.
-struct Compared {
-    problem: Py<PyAny>,
-    profile: Py<Profile>,
-    limits: LimitArrays,
-    kept: Kept,
-}
-
-/// Compares setpoints of joints with a profile along the tool's path, chunk by chunk.
-#[pyclass]
-struct JointSetpointAudit {
-    stream: Option<Box<dyn AnyStream>>,
-    compared: Compared,
-}
-
-#[pymethods]
-impl JointSetpointAudit {
-    #[new]
-    fn new(problem: Bound<'_, PyAny>, limits: LimitArrays, profile: Of<Profile>) -> PyResult<Self> {
-        let kept = Kept::new(&problem, &profile, limits.axes())?;
-        let stream: Box<dyn AnyStream> = with_padded_axes!(widest(&problem, &limits)?, M, {
-            kept.with::<M, _>(&problem, &profile, &limits, None, |audit, _| {
-                Box::new(audit.begin()) as Box<dyn AnyStream>
-            })
-        })?;
-        let profile = profile.native().clone_ref(problem.py());
-        let compared = Compared { problem: problem.unbind(), profile, limits, kept };
-        Ok(Self { stream: Some(stream), compared })
-    }
-
-    /// The next setpoints.
-    #[pyo3(signature = (t, position, velocity=None, progress=None))]
-    fn push(
-        &mut self,
-        py: Python<'_>,
-        t: PyReadonlyArray1<'_, f64>,
-        position: PyReadonlyArray2<'_, f64>,
-        velocity: Option<PyReadonlyArray2<'_, f64>>,
-        progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let chunk = setpoint_chunk(self.compared.limits.axes(), &t, &position, &velocity)?;
-        // An audit that is interrupted is finished.
-        let mut stream = self.stream.take().ok_or_else(finished)?;
-        stream.push(&self.compared, py, &chunk, progress.as_ref())?;
-        self.stream = Some(stream);
-        Ok(())
-    }
-
-    /// What was found; nothing can be pushed afterwards.
-    fn finish(&mut self, py: Python<'_>) -> PyResult<Findings> {
-        self.stream.take().ok_or_else(finished)?.finish(&self.compared, py)
-    }
-}
-
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(audit_joints, module)?)?;
-    module.add_class::<JointSetpointAudit>()
+    module.add_function(wrap_pyfunction!(audit_joints, module)?)
 }

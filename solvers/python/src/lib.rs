@@ -18,6 +18,7 @@ mod plan;
 mod problem;
 mod profile;
 mod sampling;
+mod setpoint_audit;
 mod views;
 mod work;
 
@@ -68,5 +69,6 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     gcode::register(module)?;
     kinematics::register(module)?;
     joint_audit::register(module)?;
+    setpoint_audit::register(module)?;
     Ok(())
 }

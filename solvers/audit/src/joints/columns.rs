@@ -3,36 +3,37 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::path::{Piece, Work};
-use super::plan::JointAudit;
+use super::path::{JointPath, Piece, Work};
 use crate::columns::{Columns, Place};
 use crate::curve::{Curve, Curves, Followed};
 use crate::station::{Rounded, Station};
 use crate::vectors::vector_of;
-use crate::FEEDS;
+use crate::{Limits, FEEDS};
 
 /// Intervals for each degree of a phase that covers its whole piece, and the least number.
-const STEPS: f64 = 4.0;
+const STEPS: f64 = 3.0;
 const LEAST: f64 = 2.0;
 
 /// See `Columns::smooth`: between two pieces the formula is evaluated on other numbers.
 const SMOOTH: f64 = 1e-6;
 
 pub struct JointColumns<'a, const M: usize> {
-    of: &'a JointAudit<'a, M>,
+    of: &'a JointPath<'a>,
+    limits: &'a Limits<M>,
     work: Work,
     curves: Curves<'a, M>,
     /// The last two pieces, the last one first.
     pieces: [Option<Rc<Piece<'a, M>>>; 2],
-    /// The last two places at which everything is known.
+    /// The last place, and the last two at which everything is known.
+    last: Option<Place<M>>,
     kept: [Option<(Place<M>, Station<M>)>; 2],
     older: usize,
 }
 
 impl<'a, const M: usize> JointColumns<'a, M> {
-    pub fn new(of: &'a JointAudit<'a, M>) -> Self {
-        let (work, curves) = (of.path.work(), Curves::new(of.path.path.pieces));
-        Self { of, work, curves, pieces: [None, None], kept: [None, None], older: 0 }
+    pub fn new(of: &'a JointPath<'a>, limits: &'a Limits<M>) -> Self {
+        let (work, curves) = (of.work(), Curves::new(of.path.pieces));
+        Self { of, limits, work, curves, pieces: [None, None], last: None, kept: [None, None], older: 0 }
     }
 
     /// A piece of the path.
@@ -45,7 +46,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
             }
         }
         let Self { of, curves, pieces, .. } = self;
-        pieces[0].get_or_insert_with(|| Rc::new(of.path.piece_on(number, curves.get(number).clone()))).clone()
+        pieces[0].get_or_insert_with(|| Rc::new(of.piece_on(number, curves.get(number).clone()))).clone()
     }
 
     fn known(&self, piece: usize, u: f64) -> Option<&(Place<M>, Station<M>)> {
@@ -55,26 +56,27 @@ impl<'a, const M: usize> JointColumns<'a, M> {
 
 impl<const M: usize> Columns<M> for JointColumns<'_, M> {
     fn count(&self) -> usize {
-        self.of.path.joints
+        self.of.joints
     }
 
     fn path(&self) -> &Followed<'_> {
-        &self.of.path.path
+        &self.of.path
     }
 
-    fn curve(&mut self, piece: usize) -> Arc<Curve<M>> {
-        self.curves.get(piece).clone()
+    fn curve(&mut self, piece: usize) -> &Arc<Curve<M>> {
+        self.curves.get(piece)
     }
 
     fn scale(&self) -> [f64; M] {
-        self.of.path.scale()
+        self.of.scale()
     }
 
     fn place(&mut self, piece: usize, u: f64) -> Place<M> {
-        match self.known(piece, u) {
-            Some((place, _)) => *place,
-            None => self.piece(piece).place(u, &mut self.work),
-        }
+        let last = self.last.filter(|place| place.piece == piece && place.u == u);
+        let known = last.or_else(|| self.known(piece, u).map(|(place, _)| *place));
+        let place = known.unwrap_or_else(|| self.piece(piece).place(u, &mut self.work));
+        self.last = Some(place);
+        place
     }
 
     fn station(&mut self, piece: usize, u: f64) -> Option<Station<M>> {
@@ -92,17 +94,27 @@ impl<const M: usize> Columns<M> for JointColumns<'_, M> {
         Rounded { value, rounding: vector_of(|k| from.position.rounding[k] + to.position.rounding[k]) }
     }
 
+    fn difference(&mut self, [from, to]: [usize; 2], a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+        let [first, last] = [from, to].map(|piece| self.piece(piece));
+        last.between(a, b, Some(&first))
+    }
+
+    fn toward(&mut self, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
+        let place = self.place(piece, u);
+        [self.piece(piece).between(&place.position.value, q, None), place.slope.value]
+    }
+
     fn are_axes(&self) -> bool {
         false
     }
 
-    fn held_slope(&mut self, piece: usize, u: f64, _: &[f64; M]) -> f64 {
-        self.piece(piece).feed_slope(u)
+    fn held_slope(&mut self, piece: usize, u: f64, _: &[f64; M]) -> [f64; 2] {
+        [self.piece(piece).feed_slope(u), 0.0]
     }
 
     fn feeds(&self, piece: usize) -> [f64; FEEDS] {
         let mut feeds = [f64::INFINITY; FEEDS];
-        feeds[0] = self.of.path.feed[piece];
+        feeds[0] = self.of.feed[piece];
         feeds
     }
 
@@ -110,8 +122,24 @@ impl<const M: usize> Columns<M> for JointColumns<'_, M> {
         tip
     }
 
+    fn tip(&mut self, piece: usize, u: f64, _: &[f64; M]) -> [f64; M] {
+        self.curves.get(piece).at(u)
+    }
+
+    fn tip_way(&mut self, piece: usize, _: usize, from: &[f64; M], to: &[f64; M]) -> f64 {
+        self.piece(piece).feed_way(from, to)
+    }
+
+    fn chord_axes(&mut self, piece: usize) -> [f64; M] {
+        self.piece(piece).linear()
+    }
+
     fn curvature(&mut self, piece: usize, u: f64) -> f64 {
         self.piece(piece).curvature(u)
+    }
+
+    fn magnitude(&mut self, piece: usize) -> f64 {
+        self.piece(piece).start_size()
     }
 
     fn turned(&mut self, _: usize) -> f64 {
@@ -129,14 +157,14 @@ impl<const M: usize> Columns<M> for JointColumns<'_, M> {
 
     /// Plans are made on stand-ins for the joints, some 1e-10 mm from them.
     fn settling(&self, duration: f64) -> f64 {
-        self.of.limits.period.max(duration)
+        self.limits.period.max(duration)
     }
 
     fn negligible_speed(&self, place: &Place<M>, time: f64) -> f64 {
-        let limits = &self.of.limits;
+        let limits = self.limits;
         let (mut least, mut weakest) = (f64::INFINITY, f64::INFINITY);
         for k in 0..self.count() {
-            let share = limits.negligible_jump(k, time) / place.slope.value[k].abs() * place.tip_slope[0];
+            let share = limits.negligible_jump(k, time) / place.slope.value[k].abs() * place.tip_slope;
             if share.is_finite() {
                 least = least.min(share);
             }

@@ -5,9 +5,8 @@ use std::sync::Arc;
 use super::formula::{Formula, Jet};
 use crate::columns::Place;
 use crate::curve::{Curve, Followed};
-use crate::phase_motion::curvature;
 use crate::station::{Rounded, Station};
-use crate::vectors::length;
+use crate::vectors::{curvature, length};
 use crate::{EPS, ROUNDINGS};
 
 pub const TURN: f64 = 360.0;
@@ -44,7 +43,6 @@ pub struct JointPath<'a> {
     pub way_scale: &'a [f64],
     /// The greatest speed of each piece.
     pub feed: &'a [f64],
-    pub junction_speed: &'a [f64],
 }
 
 /// A piece ready to be measured.
@@ -250,7 +248,7 @@ impl<const M: usize> Piece<'_, M> {
             position: self.joint_rows(table, 0),
             slope: self.joint_rows(table, 1),
             way_slope,
-            tip_slope: [self.feed_slope_of(&tip, &slope), 0.0],
+            tip_slope: self.feed_slope_of(&tip, &slope),
         }
     }
 
@@ -286,7 +284,7 @@ impl<const M: usize> Piece<'_, M> {
         let way: [_; 3] = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
         let joints = [1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
         let place = self.place_of(u, tip, slopes[0], &work.bends);
-        let tool = [place.tip_slope[0] / way[0].0, self.curvature(u)];
+        let tool = [place.tip_slope / way[0].0, self.curvature(u)];
         (place, Station::of_joints(u, &joints, way, tool))
     }
 

@@ -6,12 +6,13 @@
 use std::rc::Rc;
 
 use super::columns::JointColumns;
-use super::path::{Piece, TURN};
-use super::plan::JointAudit;
+use super::path::{JointPath, Piece, TURN};
 use crate::nearest::Place;
 use crate::phase_motion::ROUNDING;
+use crate::phases::Phases;
+use crate::profile_clock::ProfileClock;
 use crate::profile_reader::Reader;
-use crate::{Check, Tally, Worst};
+use crate::{Check, Limits, Tally, Worst};
 
 /// Even intervals of a piece for each degree.
 const INTERVALS: usize = 4;
@@ -20,9 +21,14 @@ const INTERVALS: usize = 4;
 type Span = [(f64, Place); 2];
 
 /// The travel of every joint, at the times of a profile if its numbers can be used.
-pub fn audit_travel<const M: usize>(of: &JointAudit<M>) -> Tally<M> {
-    let (mut tally, mut columns) = (Tally::default(), JointColumns::new(of));
-    let (mut work, path) = (of.path.work(), &of.path.path);
+pub fn audit_travel<const M: usize>(
+    of: &JointPath,
+    phases: Phases,
+    starts: &[f64],
+    limits: &Limits<M>,
+) -> Tally<M> {
+    let (mut tally, mut columns) = (Tally::default(), JointColumns::new(of, limits));
+    let (mut work, path) = (of.work(), &of.path);
     let nowhere = (f64::NAN, Place { piece: 0, u: 0.0 });
     let mut spans: [Span; M] = [[nowhere; 2]; M];
     let mut turns = [f64::NAN; M];
@@ -41,7 +47,7 @@ pub fn audit_travel<const M: usize>(of: &JointAudit<M>) -> Tally<M> {
                     std::array::from_fn(|k| seen[k] + step[k])
                 }
             };
-            for k in 0..of.path.joints {
+            for k in 0..of.joints {
                 if !piece.turning(k) && turns[k].is_nan() {
                     turns[k] = TURN * ((position[k] - reached[k]) / TURN).round();
                 }
@@ -55,12 +61,11 @@ pub fn audit_travel<const M: usize>(of: &JointAudit<M>) -> Tally<M> {
             last = Some((piece.clone(), position, reached));
         }
     }
-    let mut reader = of
-        .phases
-        .fits(path, of.path.joints)
-        .then(|| Reader::new(&of.clock(&[]), Box::new(JointColumns::new(of))));
-    for k in 0..of.path.joints {
-        let [lower, upper] = of.limits.travel[k];
+    let clock = ProfileClock { phases, starts, run_starts: &[] };
+    let mut reader =
+        phases.fits(path, of.joints).then(|| Reader::new(&clock, Box::new(JointColumns::new(of, limits))));
+    for k in 0..of.joints {
+        let [lower, upper] = limits.travel[k];
         let [least, most] = spans[k];
         if !((upper - lower).is_finite() && (most.0 - least.0).is_finite()) {
             continue;

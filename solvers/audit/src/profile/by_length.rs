@@ -277,7 +277,7 @@ mod tests {
             let (kind, speeds) = if flat { (FEED, [speeds[0]; 2]) } else { (SPEED_CUBIC, speeds) };
             let (mut limits, free) = (Limits::none(), Limits::none());
             let mut columns = Axes::new(&path, &free);
-            let curve = columns.curve(0);
+            let curve = columns.curve(0).clone();
             let p = [0, 1].map(|i| (speeds[i] / length(&curve.derivative(u[i]))).powi(2));
             let phases = Phases {
                 piece: &[0],
