@@ -10,14 +10,18 @@
 //! Energies of intervals of length h differ as h⁻⁵, so that one complementarity s λ for all rows would be far too great for
 //! some and far too small for others. All rows of an interval aim at s λ = μ d ε²/h⁵ instead, the unit of the interval, d
 //! being the density of the energy (`pace`): the intervals converge together, which takes about half as many iterations.
+//!
+//! What happens at one place of the curve fades along it. So each group of four intervals, a quad, has its own μ and its own
+//! length of the step, where one for the whole window would be the least of all: a single corner would stop the others. The
+//! lengths differ little from one quad to the next, and what the rows then miss is made good by the next steps.
 
 use fearless_simd::{dispatch, Level, Simd};
 use feedplan_geometry::lanes::{Lanes, Register};
 
 use super::band::Band;
 use super::problem::Problem;
-use super::quads::{Columns, LocalMatrix, Quads};
-use super::spline::ORDER;
+use super::quads::{Columns, LocalMatrix, Quads, LANES};
+use super::spline::{DEGREE, ORDER};
 
 /// It ends when the sum of all s λ is below this part of the energy,
 const GAP: f64 = 1e-3;
@@ -25,10 +29,21 @@ const GAP: f64 = 1e-3;
 const OFF: f64 = 1e-3;
 /// Where vertices pull, the residuals must be less than the pull of vertices that are off by this part of their limits.
 const OFF_VERTEX: f64 = 1e-2;
-/// The least μ; below it there is nothing but rounding, since the pulls of vertices are some thousandths of a unit or more.
-const LEAST_MU: f64 = 1e-9;
+/// The force of a vertex on any coefficient that it moves is at least this part of its pull, when residuals are compared.
+const LEAST_FORCE: f64 = 1e-3;
+/// The least μ to aim at: the pulls of vertices are some thousandths of a unit or more. It is less where the sum of all s λ
+/// would be more than a tenth of what it may be.
+const LEAST_MU: f64 = 1e-6;
+/// The mean μ below which there is nothing but rounding.
+const ROUNDING: f64 = 1e-9;
 /// μ at the start.
-const START_MU: f64 = 2.0;
+const START_MU: f64 = 50.0;
+/// The greatest ratio between the μ to aim at of neighbouring quads,
+const MU_RATIO: f64 = 10.0;
+/// and between the lengths of their steps.
+const LENGTH_RATIO: f64 = 1.5;
+/// A slack becomes that of its row, if it has to change by no more than this part of itself.
+const SLACK_CHANGE: f64 = 0.05;
 /// The weight at the start of all targets, in units over the squares of their limits.
 const START_WEIGHT: f64 = 200.0;
 /// The slacks at the start are at least this part of the limits.
@@ -51,19 +66,18 @@ impl<const D: usize> Problem<D> {
         newton.approximate(simd);
         newton.begin(simd);
         let mut iteration = 0;
-        let mut length = 0.0;
         while iteration < MOST_ITERATIONS {
-            let residuals = newton.linearise(simd, length);
+            let residuals = newton.linearise(simd);
             if newton.is_solved(&residuals) {
                 break;
             }
             newton.band.factor(&newton.problem.fixed);
-            let aim = newton.predict(simd, residuals.mu);
-            length = newton.correct(simd, aim);
-            if !length.is_finite() {
+            newton.predict(simd, newton.least_mu(&residuals));
+            newton.correct(simd);
+            if !newton.length.iter().all(|length| length.is_finite()) {
                 break;
             }
-            newton.x.add_part(&newton.step, length);
+            newton.advance();
             iteration += 1;
         }
         let found = |i: usize| if self.fixed[i] { self.x[i] } else { newton.x.point(i) };
@@ -81,7 +95,7 @@ impl<const D: usize> Problem<D> {
                 let pull = row.pull * OFF_VERTEX * row.half[0];
                 work[j] += pull * row.half[0];
                 for a in 0..ORDER {
-                    force[j + a] += row.basis[a] * pull;
+                    force[j + a] += row.basis[a].max(LEAST_FORCE) * pull;
                 }
             }
         }
@@ -102,6 +116,8 @@ struct Pairs<const D: usize> {
 }
 
 const SIGN: [f64; 2] = [1.0, -1.0];
+/// The coefficient in the middle of the first quad: coefficient i moves intervals i − DEGREE to i.
+const MIDDLE: f64 = 0.5 * (LANES + DEGREE - 1) as f64;
 
 impl<const D: usize> Pairs<D> {
     /// Slack, multiplier, 1/s, the error of the slack and Newton's step of it, on a side of direction r in which the place
@@ -127,10 +143,18 @@ struct Residuals {
     energy: f64,
     /// Σ s λ.
     work: f64,
-    /// The mean of s λ in units.
-    mu: f64,
     /// The greatest error of a slack, in parts of its limit.
     worst: f64,
+}
+
+/// Changes each value by a function of itself and of its neighbour, from the first to the last, and back.
+fn between_neighbours(values: &mut [f64], change: impl Fn(f64, f64) -> f64) {
+    for i in 1..values.len() {
+        values[i] = change(values[i], values[i - 1]);
+    }
+    for i in (1..values.len()).rev() {
+        values[i - 1] = change(values[i - 1], values[i]);
+    }
 }
 
 /// Newton's iteration for a problem.
@@ -144,14 +168,19 @@ struct Newton<'a, const D: usize> {
     /// The gradient of energy and multipliers, its parts by the sums of both multipliers of each row.
     gradient: Columns<D>,
     size: Columns<D>,
-    /// Gradients of the corrector: without and with μ.
-    fixed_part: Columns<D>,
-    centring: Columns<D>,
+    /// What the predictor adds to the gradient.
+    predictor: Columns<D>,
     /// Σ s λ of each interval.
     work: Vec<Lanes>,
     pull: (Vec<f64>, Vec<f64>),
-    /// Pairs of slack and multiplier.
-    total: f64,
+    /// The mean of s λ in units, then what it is to become, of each quad.
+    mu: Vec<f64>,
+    /// The length of the step of each quad.
+    length: Vec<f64>,
+    /// Pairs of slack and multiplier of each quad.
+    pairs: Vec<f64>,
+    /// Σ s λ at μ = 1.
+    whole: f64,
     least_energy: f64,
     unknowns: Vec<[f64; D]>,
 }
@@ -159,25 +188,36 @@ struct Newton<'a, const D: usize> {
 impl<'a, const D: usize> Newton<'a, D> {
     fn new(problem: &'a Problem<D>, band: &'a mut Band<D>) -> Self {
         let quads = Quads::new(problem);
+        let pairs = |quad: usize| {
+            let [first, end] = [quad, quad + 1].map(|i| problem.start[(i * LANES).min(problem.unit.len())]);
+            (2 * D * (end - first)) as f64
+        };
         let zeros = Columns::zeros(quads.count());
         let mut x = zeros.clone();
         x.set(&problem.x);
         let none = [[Lanes::ZERO; D]; 2];
         let one = [[Lanes::ONE; D]; 2];
-        let pairs = Pairs { off: none[0], s: one, l: none, inverse: one, ds: none, dl: none };
+        let state = Pairs { off: none[0], s: one, l: none, inverse: one, ds: none, dl: none };
         Self {
             problem,
             band,
             x,
             step: zeros.clone(),
-            state: vec![pairs; quads.rows.len()],
+            state: vec![state; quads.rows.len()],
             gradient: zeros.clone(),
             size: zeros.clone(),
-            fixed_part: zeros.clone(),
-            centring: zeros,
+            predictor: zeros,
             work: vec![Lanes::ZERO; quads.count()],
             pull: problem.pulls(),
-            total: (2 * D * problem.rows.len()) as f64,
+            mu: vec![0.0; quads.count()],
+            length: vec![0.0; quads.count()],
+            pairs: (0..quads.count()).map(pairs).collect(),
+            whole: problem
+                .unit
+                .iter()
+                .zip(problem.start.windows(2))
+                .map(|(unit, pair)| unit * (2 * D * (pair[1] - pair[0])) as f64)
+                .sum(),
             least_energy: NO_ENERGY * problem.unit.iter().sum::<f64>(),
             unknowns: vec![],
             quads,
@@ -210,7 +250,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         }
         self.band.factor(&self.problem.fixed);
         self.downhill(|newton, i| newton.gradient.point(i));
-        self.x.add_part(&self.step, 1.0);
+        self.x.add_parts(&self.step, |_| 1.0);
     }
 
     /// Slacks of x, at least START_SLACK of their limits, and multipliers on the central path.
@@ -236,17 +276,18 @@ impl<'a, const D: usize> Newton<'a, D> {
 
     /// Takes a part of the last step of slacks and multipliers; then Newton's matrix, the gradients and the residuals.
     #[inline(always)]
-    fn linearise<S: Simd>(&mut self, simd: S, part: f64) -> Residuals {
+    fn linearise<S: Simd>(&mut self, simd: S) -> Residuals {
         let zero = Register::all(simd, 0.0);
         self.band.clear(self.x.len());
         let mut energy = self.quads.energy_gradient(simd, &self.x, &mut self.gradient);
         self.size.fill(0.0);
-        self.fixed_part.fill(0.0);
-        let (mut pulled, mut mu, mut worst) = (zero, zero, zero);
+        self.predictor.fill(0.0);
+        let (mut pulled, mut worst) = (zero, zero);
         for quad in 0..self.quads.count() {
             let x = self.x.around(simd, quad);
+            let length = self.length[quad];
             let mut local = LocalMatrix::zero();
-            let mut work = zero;
+            let (mut work, mut mu) = (zero, zero);
             // Gradient, its size, and what the predictor adds to the gradient.
             let mut sums = [[[zero; D]; ORDER]; 3];
             for i in self.quads.range(quad) {
@@ -264,8 +305,10 @@ impl<'a, const D: usize> Newton<'a, D> {
                     let half = row.half[r].load(simd);
                     let per_half = half.inverse();
                     for side in 0..2 {
-                        let s = pairs.ds[side][r].load(simd) * part + pairs.s[side][r];
-                        let l = pairs.dl[side][r].load(simd) * part + pairs.l[side][r];
+                        let s = pairs.ds[side][r].load(simd) * length + pairs.s[side][r];
+                        let slack = half - off * SIGN[side];
+                        let s = slack.max(s * (1.0 - SLACK_CHANGE)).min(s * (1.0 + SLACK_CHANGE));
+                        let l = pairs.dl[side][r].load(simd) * length + pairs.l[side][r];
                         let inverse = s.inverse();
                         let lack = off * SIGN[side] + s - half;
                         let stiffness = l * inverse;
@@ -288,21 +331,22 @@ impl<'a, const D: usize> Newton<'a, D> {
                 }
             }
             self.work[quad] = work.into();
+            self.mu[quad] = mu.sum() / self.pairs[quad];
             self.quads.add_to(simd, quad, &local, self.band);
             self.gradient.add(quad, &sums[0]);
             self.size.add(quad, &sums[1]);
-            self.fixed_part.add(quad, &sums[2]);
+            self.predictor.add(quad, &sums[2]);
         }
         energy += 0.5 * pulled.sum();
         let sum = self.work.iter().map(|work| work.values().iter().sum::<f64>()).sum();
-        Residuals { energy, work: sum, mu: mu.sum() / self.total, worst: worst.greatest() }
+        Residuals { energy, work: sum, worst: worst.greatest() }
     }
 
     /// Whether the residuals are small everywhere: the gradient compared with the multipliers, and where vertices pull, the
     /// gradient and s λ compared with their pull. A corner has much greater multipliers than an arc next to it, so that a
     /// sum over the window says little about the arc.
     fn is_solved(&self, residuals: &Residuals) -> bool {
-        let Residuals { energy, work, mu, worst } = *residuals;
+        let Residuals { energy, work, worst } = *residuals;
         if !(work < GAP * energy.max(self.least_energy) && worst < OFF) {
             return false;
         }
@@ -317,34 +361,35 @@ impl<'a, const D: usize> Newton<'a, D> {
         });
         let settled =
             || pulls.clone().all(|(j, &pull)| pull == 0.0 || self.work[j / 4].values()[j % 4] <= pull);
-        mu < LEAST_MU || still && settled()
+        work < ROUNDING * self.whole || still && settled()
+    }
+
+    /// The least μ to aim at.
+    fn least_mu(&self, residuals: &Residuals) -> f64 {
+        LEAST_MU.min(0.1 * GAP * residuals.energy.max(self.least_energy) / self.whole)
     }
 
     /// The predictor: the pure Newton step, from whose length follows the μ to aim at. It keeps the products of both steps for
     /// the corrector.
     #[inline(always)]
-    fn predict<S: Simd>(&mut self, simd: S, mu: f64) -> f64 {
-        let zero = Register::all(simd, 0.0);
+    fn predict<S: Simd>(&mut self, simd: S, least_mu: f64) {
         self.downhill(|newton, i| {
-            let (a, b) = (newton.gradient.point(i), newton.fixed_part.point(i));
+            let (a, b) = (newton.gradient.point(i), newton.predictor.point(i));
             std::array::from_fn(|k| a[k] + b[k])
         });
-        self.fixed_part.fill(0.0);
-        self.centring.fill(0.0);
-        // Greatest −dz/z, and Σ s λ in units after a step of length a: sums of its powers.
-        let (mut most, mut first, mut second) = (Register::all(simd, 1e-300), zero, zero);
+        let zero = Register::all(simd, 0.0);
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
-            let mut sums = [[[zero; D]; ORDER]; 2];
+            // Greatest −dz/z, and Σ s λ in units after a step of length a: sums of its powers.
+            let (mut most, mut first, mut second) = (Register::all(simd, 1e-300), zero, zero);
             for i in self.quads.range(quad) {
                 let (row, pairs) = (&self.quads.rows[i], &mut self.state[i]);
                 let moved = row.place(simd, &step);
-                let mut forces = [[zero; D]; 2];
                 let (mut linear, mut square) = (zero, zero);
                 for r in 0..D {
                     let half = row.half[r].load(simd);
                     for side in 0..2 {
-                        let [s, l, inverse, lack, ds] = pairs.newton(r, side, half, moved[r]);
+                        let [s, l, inverse, _, ds] = pairs.newton(r, side, half, moved[r]);
                         // dλ/λ is −1 − ds/s.
                         let ratio = ds * inverse;
                         let dl = -l - l * ratio;
@@ -352,40 +397,49 @@ impl<'a, const D: usize> Newton<'a, D> {
                         most = most.max(-ratio).max(ratio + Lanes::ONE);
                         linear += s * dl + l * ds;
                         square += product;
-                        forces[0][r] += (l * lack - s * l - product) * inverse * SIGN[side];
-                        forces[1][r] += inverse * row.unit * SIGN[side];
                         pairs.dl[side][r] = product.into();
                     }
                 }
                 first += linear * row.per_unit;
                 second += square * row.per_unit;
-                for (force, sums) in forces.iter().zip(&mut sums) {
-                    row.push(simd, force, sums);
-                }
             }
-            self.fixed_part.add(quad, &sums[0]);
-            self.centring.add(quad, &sums[1]);
+            let (mu, length) = (self.mu[quad], (1.0 / most.greatest()).min(1.0));
+            let after = mu + (length * first.sum() + length * length * second.sum()) / self.pairs[quad];
+            self.mu[quad] = (mu * (after / mu).powi(3).clamp(1e-3, 0.8)).max(least_mu);
         }
-        let length = (1.0 / most.greatest()).min(1.0);
-        let after = mu + (length * first.sum() + length * length * second.sum()) / self.total;
-        mu * (after / mu).powi(3).clamp(1e-3, 0.8)
+        between_neighbours(&mut self.mu, |mu, beside| mu.max(beside / MU_RATIO));
     }
 
-    /// The corrector: the step towards s λ = μ in units, with the second order of the predictor, and its length.
+    /// The corrector: the step towards s λ = μ in units, with the second order of the predictor, and its lengths.
     #[inline(always)]
-    fn correct<S: Simd>(&mut self, simd: S, mu: f64) -> f64 {
-        self.downhill(|newton, i| {
-            let (a, b) = (newton.gradient.point(i), newton.fixed_part.point(i));
-            let c = newton.centring.point(i);
-            std::array::from_fn(|k| a[k] + b[k] + mu * c[k])
-        });
-        let mut most = Register::all(simd, 1e-300);
+    fn correct<S: Simd>(&mut self, simd: S) {
+        let zero = Register::all(simd, 0.0);
+        for quad in 0..self.quads.count() {
+            let mut sums = [[zero; D]; ORDER];
+            for i in self.quads.range(quad) {
+                let (row, pairs) = (&self.quads.rows[i], &self.state[i]);
+                let aim = row.unit.load(simd) * self.mu[quad];
+                let mut force = [zero; D];
+                for r in 0..D {
+                    let half = row.half[r].load(simd);
+                    for side in 0..2 {
+                        let [s, l, inverse, lack, _] = pairs.newton(r, side, half, zero);
+                        let product = pairs.dl[side][r];
+                        force[r] += (aim + l * lack - s * l - product.load(simd)) * inverse * SIGN[side];
+                    }
+                }
+                row.push(simd, &force, &mut sums);
+            }
+            self.gradient.add(quad, &sums);
+        }
+        self.downhill(|newton, i| newton.gradient.point(i));
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
+            let mut most = Register::all(simd, 1e-300);
             for i in self.quads.range(quad) {
                 let (row, pairs) = (&self.quads.rows[i], &mut self.state[i]);
                 let moved = row.place(simd, &step);
-                let aim = row.unit.load(simd) * mu;
+                let aim = row.unit.load(simd) * self.mu[quad];
                 for r in 0..D {
                     let half = row.half[r].load(simd);
                     for side in 0..2 {
@@ -399,8 +453,22 @@ impl<'a, const D: usize> Newton<'a, D> {
                     }
                 }
             }
+            self.length[quad] = (STEP / most.greatest()).min(1.0);
         }
-        (STEP / most.greatest()).min(1.0)
+        between_neighbours(&mut self.length, |length, beside| length.min(LENGTH_RATIO * beside));
+    }
+
+    /// Moves x by the step. A coefficient is in the middle of the intervals that it moves; between the middles of two quads
+    /// the length of the step is linear.
+    fn advance(&mut self) {
+        let last = self.length.len() - 1;
+        let part = |i: usize| {
+            let place = ((i as f64 - MIDDLE) / LANES as f64).clamp(0.0, last as f64);
+            let before = place as usize;
+            let [a, b] = [before, (before + 1).min(last)].map(|quad| self.length[quad]);
+            a + (b - a) * (place - before as f64)
+        };
+        self.x.add_parts(&self.step, part);
     }
 
     /// The step of Newton's matrix against a gradient.

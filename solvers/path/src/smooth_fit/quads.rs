@@ -13,7 +13,7 @@ use super::rows::Row;
 use super::spline::ORDER;
 
 /// Intervals of a quad.
-const LANES: usize = 4;
+pub const LANES: usize = 4;
 
 /// Numbers for the coefficients that the intervals of a quad see, by axis.
 pub type Around<S, const D: usize> = [[Register<S>; D]; ORDER];
@@ -41,11 +41,12 @@ impl<const D: usize> Columns<D> {
         self.0[0].len()
     }
 
-    /// Adds so many times the other.
-    pub fn add_part(&mut self, other: &Self, part: f64) {
-        for (column, other) in self.0.iter_mut().zip(&other.0) {
-            for (x, y) in column.iter_mut().zip(other) {
-                *x += part * y;
+    /// Adds to each coefficient a part of that of the other.
+    pub fn add_parts(&mut self, other: &Self, part: impl Fn(usize) -> f64) {
+        for i in 0..self.len() {
+            let part = part(i);
+            for (column, other) in self.0.iter_mut().zip(&other.0) {
+                column[i] += part * other[i];
             }
         }
     }

@@ -15,7 +15,7 @@
 
 use super::polyline::{Hold, Polyline};
 use super::spline::{around, basis, ORDER};
-use feedplan_geometry::quadratic::{dot, norm};
+use feedplan_geometry::quadratic::{dot, norm, sub};
 
 /// The number of samples of an interval, in addition to the vertices in it.
 const SAMPLES: usize = 4;
@@ -37,6 +37,18 @@ pub struct Row<const D: usize> {
     pub half: [f64; D],
     /// The weight of half the square of the distance.
     pub pull: f64,
+}
+
+impl<const D: usize> Row<D> {
+    /// Widens the limits so that the place of these coefficients has a slack of this part of the limit.
+    pub fn admit(&mut self, x: &[[f64; D]], room: f64) {
+        let place: [f64; D] =
+            std::array::from_fn(|k| self.basis.iter().zip(x).map(|(basis, x)| basis * x[k]).sum());
+        let away = sub(&place, &self.target);
+        for (half, direction) in self.half.iter_mut().zip(&self.direction) {
+            *half = half.max((1.0 + room) * dot(direction, &away).abs());
+        }
+    }
 }
 
 /// The rows of the intervals from `first` on, one for each `density` of energy, and the number of rows before each of them.

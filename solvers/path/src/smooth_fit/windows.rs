@@ -24,6 +24,8 @@ const BENT: f64 = 0.25;
 const FITTED_BENT: f64 = 0.35;
 /// which is at most so many times the length from which a chord is long.
 const MOST_BENT: f64 = 4.0;
+/// The slack that rows of held coefficients have at least, in parts of their limits: other windows meet rows nearly.
+const ROOM: f64 = 0.01;
 /// In place of a chord: the coefficient is free.
 pub const FREE: u32 = u32::MAX;
 
@@ -126,21 +128,20 @@ impl<'a, const D: usize> Fit<'a, D> {
         let density: Vec<f64> = (first..end)
             .map(|j| pace.density(0.5 * (knots[j] + knots[j + 1]), knots[j + 1] - knots[j]))
             .collect();
-        let (rows, start) = rows(self.line, knots, first, &density, &origin);
+        let (mut rows, start) = rows(self.line, knots, first, &density, &origin);
+        let x: Vec<[f64; D]> = given.iter().map(|x| std::array::from_fn(|k| x[k] - origin[k])).collect();
+        for (j, pair) in start.windows(2).enumerate() {
+            if fixed[j..=j + DEGREE].contains(&true) {
+                rows[pair[0]..pair[1]].iter_mut().for_each(|row| row.admit(&x[j..=j + DEGREE], ROOM));
+            }
+        }
         let unit = |j: usize| {
             let tolerance = self.line.tolerance[self.line.chord_at(knots[j])];
             density[j - first] * tolerance.powi(2) / (knots[j + 1] - knots[j]).powi(5)
         };
         let (energy, pull) = (first..end).map(|j| pace.energy(&around(knots, j))).unzip();
-        let mut problem = Problem {
-            energy,
-            pull,
-            rows,
-            start,
-            x: given.iter().map(|x| std::array::from_fn(|k| x[k] - origin[k])).collect(),
-            fixed,
-            unit: (first..end).map(unit).collect(),
-        };
+        let mut problem =
+            Problem { energy, pull, rows, start, x, fixed, unit: (first..end).map(unit).collect() };
         let iterations = problem.solve(band);
         let moved = problem.x.iter().zip(&problem.fixed).zip(given).map(|((x, &fixed), given)| {
             if fixed {
