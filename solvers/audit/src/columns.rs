@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::curve::{Curve, Curves, Followed};
 use super::station::{Rounded, Station};
-use super::vectors::{curvature, from_to, length, vector_of};
+use super::vectors::{from_to, length, vector_of};
 use super::{Limits, EPS, FEEDS, ROUNDINGS};
 
 /// The speed that chord errors are about, beside those that feeds are about.
@@ -214,10 +214,7 @@ impl<const M: usize> Columns<M> for Axes<'_, M> {
     }
 
     fn curvature(&mut self, piece: usize, u: f64) -> f64 {
-        match &**self.curves.get(piece) {
-            Curve::Quadratic(curve) => curvature(&curve.derivative(u), &curve.second_derivative()),
-            Curve::General(general) => general.polygon.curvature(u / self.path.width[piece]),
-        }
+        self.curves.get(piece).curvature(u)
     }
 
     fn magnitude(&mut self, piece: usize) -> f64 {

@@ -1,5 +1,4 @@
-//! The followed geometry as the audit sees it: pieces of degree 2 by a start point and two differences, all others
-//! by their polygon.
+//! The followed geometry as the audit sees it: pieces by their control polygons.
 //!
 //! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
 
@@ -7,7 +6,7 @@ use std::sync::Arc;
 
 use super::hodographs::Hodographs;
 use super::polygon::Polygon;
-use super::vectors::{length, vector, vector_of};
+use super::vectors::{curvature, length, vector, vector_of};
 
 use super::FEEDS;
 
@@ -117,23 +116,11 @@ impl Pieces<'_> {
     }
 
     /// Piece `i`, ready to be evaluated.
-    #[inline]
     pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
-        let rows = self.rows(i);
-        if rows.len() == 3 && self.weights.is_empty() {
-            let points = std::array::from_fn(|j| self.point(rows.start + j));
-            Curve::Quadratic(Quadratic::new(&points, self.width[i]))
-        } else {
-            self.general(i)
-        }
-    }
-
-    #[inline(never)]
-    fn general<const M: usize>(&self, i: usize) -> Curve<M> {
         let rows = self.rows(i);
         let weights = if self.weights.is_empty() { &[][..] } else { &self.weights[rows.clone()] };
         let points = rows.map(|row| self.point(row));
-        Curve::general(Polygon::new(points, weights), self.width[i])
+        Curve::new(Polygon::new(points, weights), self.width[i])
     }
 
     /// At least how far `q` is from piece `i`: from the box around its control points.
@@ -175,189 +162,136 @@ impl<'a, const M: usize> Curves<'a, M> {
 
 /// A piece, over u in [0, width].
 #[derive(Clone, Debug)]
-pub enum Curve<const M: usize> {
-    Quadratic(Quadratic<M>),
-    General(Box<General<M>>),
-}
-
-/// A piece of another degree, or with weights.
-#[derive(Clone, Debug)]
-pub struct General<const M: usize> {
+pub struct Curve<const M: usize> {
     pub polygon: Polygon<M>,
     hodographs: Hodographs<M>,
     width: f64,
     per_width: f64,
 }
 
-impl<const M: usize> General<M> {
-    /// u as parts of the width from both ends.
-    fn parts(&self, u: f64) -> (f64, f64) {
-        (u * self.per_width, (self.width - u) * self.per_width)
-    }
-}
-
 impl<const M: usize> Curve<M> {
-    pub fn general(polygon: Polygon<M>, width: f64) -> Self {
-        let hodographs = Hodographs::new(&polygon);
-        Curve::General(Box::new(General { polygon, hodographs, width, per_width: 1.0 / width }))
+    pub fn new(polygon: Polygon<M>, width: f64) -> Self {
+        Self { hodographs: Hodographs::new(&polygon), polygon, width, per_width: 1.0 / width }
     }
 
     /// Length of the parameter interval, in mm.
     #[inline]
     pub fn width(&self) -> f64 {
-        match self {
-            Curve::Quadratic(curve) => curve.width,
-            Curve::General(general) => general.width,
-        }
+        self.width
+    }
+
+    /// u as parts of the width from both ends.
+    #[inline]
+    fn parts(&self, u: f64) -> (f64, f64) {
+        (u * self.per_width, (self.width - u) * self.per_width)
     }
 
     /// C(u).
     #[inline]
     pub fn at(&self, u: f64) -> [f64; M] {
-        match self {
-            Curve::Quadratic(curve) => curve.at(u),
-            Curve::General(general) => {
-                let (t, rest) = general.parts(u);
-                general.hodographs.at(t, rest)
-            }
-        }
+        let (t, rest) = self.parts(u);
+        self.hodographs.at(t, rest)
+    }
+
+    /// The part between two parameters.
+    fn part(&self, from: f64, to: f64) -> Polygon<M> {
+        self.polygon.part(from * self.per_width, (to - from) * self.per_width)
     }
 
     /// The length between two parameters, or somewhat more: that of the control polygon of this part.
     pub fn way_at_most(&self, from: f64, to: f64) -> f64 {
-        match self {
-            Curve::Quadratic(curve) => {
-                0.5 * (to - from) * (length(&curve.derivative(from)) + length(&curve.derivative(to)))
-            }
-            Curve::General(general) => {
-                general.polygon.part(from / general.width, (to - from) / general.width).way()
-            }
-        }
+        self.part(from, to).way()
     }
 
     /// From one place to another, where the first derivatives are known; short ways lose no digits.
     pub fn way(&self, [from, to]: [f64; 2], slopes: [&[f64; M]; 2]) -> [f64; M] {
-        match self {
-            Curve::Quadratic(_) => vector_of(|k| 0.5 * (to - from) * (slopes[0][k] + slopes[1][k])),
-            Curve::General(_) if from == to => [0.0; M],
-            Curve::General(general) => {
-                let (least, step) = (from.min(to) / general.width, (to - from) / general.width);
-                let way = general.polygon.part(least, step.abs()).chord();
-                vector_of(|k| way[k] * step.signum())
-            }
+        if self.has_linear_slope() || from == to {
+            return vector_of(|k| 0.5 * (to - from) * (slopes[0][k] + slopes[1][k]));
         }
+        let way = self.part(from.min(to), from.max(to)).chord();
+        vector_of(|k| way[k] * (to - from).signum())
     }
 
     /// C'(u).
     #[inline]
     pub fn derivative(&self, u: f64) -> [f64; M] {
-        match self {
-            Curve::Quadratic(curve) => curve.derivative(u),
-            Curve::General(general) => {
-                let (t, rest) = general.parts(u);
-                let slope = general.hodographs.slope(t, rest);
-                vector_of(|k| slope[k] * general.per_width)
-            }
-        }
+        let (t, rest) = self.parts(u);
+        let slope = self.hodographs.slope(t, rest);
+        vector_of(|k| slope[k] * self.per_width)
     }
 
     /// C(u) and C'(u).
     #[inline]
     pub fn place(&self, u: f64) -> [[f64; M]; 2] {
-        match self {
-            Curve::Quadratic(curve) => [curve.at(u), curve.derivative(u)],
-            Curve::General(general) => {
-                let (t, rest) = general.parts(u);
-                let [point, slope] = general.hodographs.derivatives(t, rest);
-                [point, vector_of(|k| slope[k] * general.per_width)]
-            }
-        }
+        let (t, rest) = self.parts(u);
+        let [point, slope] = self.hodographs.derivatives(t, rest);
+        [point, vector_of(|k| slope[k] * self.per_width)]
     }
 
     /// The first three derivatives at u.
     #[inline]
     pub fn derivatives(&self, u: f64) -> [[f64; M]; 3] {
-        match self {
-            Curve::Quadratic(curve) => [curve.derivative(u), curve.second_derivative(), [0.0; M]],
-            Curve::General(general) => {
-                let (t, rest) = general.parts(u);
-                let [_, first, second, third] = general.hodographs.derivatives(t, rest);
-                by_width([first, second, third], general.per_width)
-            }
-        }
+        let (t, rest) = self.parts(u);
+        let [_, first, second, third] = self.hodographs.derivatives(t, rest);
+        by_width([first, second, third], self.per_width)
     }
 
     /// What the rounding of the first three derivatives is relative to.
     #[inline]
     pub fn derivative_sizes(&self) -> [[f64; M]; 3] {
-        match self {
-            Curve::Quadratic(curve) => {
-                let size = self.derivative_size();
-                [size, size.map(|size| size / curve.width), [0.0; M]]
-            }
-            Curve::General(general) => by_width(*general.hodographs.sizes(), general.per_width),
-        }
+        by_width(*self.hodographs.sizes(), self.per_width)
     }
 
     /// The greatest lengths of the second to the fifth derivative; infinite on pieces with weights.
     pub fn bounds(&self) -> [f64; 4] {
-        match self {
-            Curve::Quadratic(curve) => [length(&curve.second_derivative()), 0.0, 0.0, 0.0],
-            Curve::General(general) => {
-                let mut scale = 1.0 / general.width;
-                general.hodographs.bounds().map(|bound| {
-                    scale /= general.width;
-                    bound * scale
-                })
-            }
-        }
+        let mut scale = self.per_width;
+        self.hodographs.bounds().map(|bound| {
+            scale *= self.per_width;
+            bound * scale
+        })
     }
 
     /// For each axis what the rounding of C' is relative to.
+    #[inline]
     pub fn derivative_size(&self) -> [f64; M] {
-        match self {
-            Curve::Quadratic(curve) => {
-                let scale = 2.0 / curve.width;
-                vector_of(|k| scale * (curve.first[k].abs() + curve.second[k].abs()))
-            }
-            Curve::General(general) => {
-                let [size, ..] = general.hodographs.sizes();
-                vector_of(|k| size[k] * general.per_width)
-            }
-        }
+        let [size, ..] = self.hodographs.sizes();
+        vector_of(|k| size[k] * self.per_width)
     }
 
     /// How much the rounding of the control points turns C' against that of a neighbour, per 1 mm/mm.
     pub fn derivative_scale(&self) -> f64 {
-        match self {
-            Curve::Quadratic(curve) => 2.0 / curve.width,
-            Curve::General(general) => general.polygon.slope_scale() / general.width,
-        }
+        self.polygon.slope_scale() * self.per_width
+    }
+
+    /// Curvature in 1/mm at u; 0 where the piece has no direction.
+    pub fn curvature(&self, u: f64) -> f64 {
+        let [tangent, bend, _] = self.derivatives(u);
+        curvature(&tangent, &bend)
     }
 
     /// Greatest coordinate: what rounding is relative to.
     #[inline]
     pub fn magnitude(&self) -> f64 {
-        match self {
-            Curve::Quadratic(curve) => curve.magnitude(),
-            Curve::General(general) => general.polygon.magnitude(),
-        }
+        self.polygon.magnitude()
     }
 
-    /// How much more shape the piece can have than one of degree 2.
+    /// Whether C' is linear in u.
+    fn has_linear_slope(&self) -> bool {
+        self.polygon.degree() <= 2 && !self.polygon.is_rational()
+    }
+
+    /// How much shape the piece can have: 1 where C' is linear in u, more for each degree.
     pub fn turns(&self) -> usize {
-        match self {
-            Curve::Quadratic(_) => 1,
-            Curve::General(general) => general.polygon.degree(),
+        if self.has_linear_slope() {
+            1
+        } else {
+            self.polygon.degree()
         }
     }
 
     /// Least and greatest position of an axis between the ends.
     pub fn extremes(&self, axis: usize) -> [f64; 2] {
-        match self {
-            Curve::Quadratic(curve) => [curve.turn(axis); 2],
-            Curve::General(general) => general.polygon.extremes(axis),
-        }
+        self.polygon.extremes(axis)
     }
 }
 
@@ -374,78 +308,12 @@ fn by_width<const M: usize>(mut derivatives: [[f64; M]; 3], per_width: f64) -> [
     derivatives
 }
 
-/// C(t) = start + t (2 first + t (second − first)) with t = u / width.
-#[derive(Clone, Copy, Debug)]
-pub struct Quadratic<const M: usize> {
-    pub start: [f64; M],
-    /// From the first control point to the second, and from the second to the third.
-    pub first: [f64; M],
-    pub second: [f64; M],
-    pub width: f64,
-}
-
-impl<const M: usize> Quadratic<M> {
-    pub fn new(points: &[[f64; M]; 3], width: f64) -> Self {
-        Self {
-            start: points[0],
-            first: std::array::from_fn(|k| points[1][k] - points[0][k]),
-            second: std::array::from_fn(|k| points[2][k] - points[1][k]),
-            width,
-        }
-    }
-
-    /// C(u).
-    #[inline]
-    pub fn at(&self, u: f64) -> [f64; M] {
-        let t = u / self.width;
-        std::array::from_fn(|k| {
-            self.start[k] + t * (2.0 * self.first[k] + t * (self.second[k] - self.first[k]))
-        })
-    }
-
-    /// C'(u), counted from the nearer end so that both ends are exact.
-    #[inline]
-    pub fn derivative(&self, u: f64) -> [f64; M] {
-        let t = u / self.width;
-        let scale = 2.0 / self.width;
-        if t <= 0.5 {
-            std::array::from_fn(|k| scale * (self.first[k] + t * (self.second[k] - self.first[k])))
-        } else {
-            let rest = (self.width - u) / self.width;
-            std::array::from_fn(|k| scale * (self.second[k] + rest * (self.first[k] - self.second[k])))
-        }
-    }
-
-    /// C'', the same everywhere on the piece.
-    #[inline]
-    pub fn second_derivative(&self) -> [f64; M] {
-        let scale = 2.0 / (self.width * self.width);
-        std::array::from_fn(|k| scale * (self.second[k] - self.first[k]))
-    }
-
-    /// Greatest coordinate: what rounding is relative to.
-    #[inline]
-    pub fn magnitude(&self) -> f64 {
-        let mut most = 0.0_f64;
-        for k in 0..M {
-            most = most.max(self.start[k].abs()).max((self.start[k] + self.first[k] + self.second[k]).abs());
-        }
-        most
-    }
-
-    /// Where an axis turns; its start where it does not.
-    fn turn(&self, k: usize) -> f64 {
-        let turn = self.first[k] / (self.first[k] - self.second[k]);
-        self.start[k] + if turn > 0.0 && turn < 1.0 { turn * self.first[k] } else { 0.0 }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn parabola() -> Quadratic<2> {
-        Quadratic::new(&[[0.0, 0.0], [1.0, 2.0], [3.0, 0.0]], 4.0)
+    fn parabola() -> Curve<2> {
+        Curve::new(Polygon::new([[0.0, 0.0], [1.0, 2.0], [3.0, 0.0]].into_iter(), &[]), 4.0)
     }
 
     #[test]
@@ -460,10 +328,22 @@ mod tests {
         for u in [0.5, 1.9, 2.1, 3.5] {
             let (before, after) = (curve.at(u - 1e-5), curve.at(u + 1e-5));
             let (left, right) = (curve.derivative(u - 1e-5), curve.derivative(u + 1e-5));
+            let [first, second, _] = curve.derivatives(u);
             for k in 0..2 {
-                assert!((curve.derivative(u)[k] - (after[k] - before[k]) / 2e-5).abs() < 1e-9);
-                assert!((curve.second_derivative()[k] - (right[k] - left[k]) / 2e-5).abs() < 1e-9);
+                assert!((first[k] - (after[k] - before[k]) / 2e-5).abs() < 1e-9);
+                assert!((second[k] - (right[k] - left[k]) / 2e-5).abs() < 1e-9);
             }
+            let way = curve.way([u, 0.3], [&curve.derivative(u), &curve.derivative(0.3)]);
+            assert!((way[0] - curve.at(0.3)[0] + curve.at(u)[0]).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn a_parabola_is_most_curved_at_its_tip() {
+        // y = x²/2 has curvature 1 at x = 0 and 1/√8 at x = 1.
+        let curve = Curve::new(Polygon::new([[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]].into_iter(), &[]), 2.0);
+        assert!((curve.curvature(1.0) - 1.0).abs() < 1e-15);
+        assert!((curve.curvature(2.0) - 8.0_f64.sqrt().recip()).abs() < 1e-15);
+        assert_eq!(curvature(&[0.0, 0.0], &[1.0, 0.0]), 0.0);
     }
 }

@@ -204,4 +204,15 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_rational_quarter_of_a_circle_has_its_curvature_everywhere() {
+        let points = [[1010.0, 0.0], [1010.0, 10.0], [1000.0, 10.0]];
+        let quarter = Hodographs::new(&Polygon::new(points.into_iter(), &[1.0, 0.5_f64.sqrt(), 1.0]));
+        for i in 0..=20 {
+            let t = f64::from(i) / 20.0;
+            let [_, tangent, bend] = quarter.derivatives::<3>(t, 1.0 - t);
+            assert!((crate::vectors::curvature(&tangent, &bend) - 0.1).abs() < 1e-14, "{t}");
+        }
+    }
 }

@@ -334,7 +334,8 @@ impl<const M: usize> PhaseMotion<M> {
 mod tests {
     use super::*;
     use crate::columns::Axes;
-    use crate::curve::{Followed, Pieces, Quadratic};
+    use crate::curve::{Curve, Followed, Pieces};
+    use crate::polygon::Polygon;
     use crate::Limits;
 
     /// One phase on one piece in X and Y, and what it is on.
@@ -430,7 +431,7 @@ mod tests {
         const ROWS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 1.0], [1.01, 2.0]];
         const CUBIC: [[f64; 2]; 4] =
             [[0.0, 0.0], [2.0 / 3.0, 2.0 / 3.0], [3.01 / 3.0, 4.0 / 3.0], [1.01, 2.0]];
-        let curve = Quadratic::new(&ROWS, 2.0);
+        let curve = Curve::new(Polygon::new(ROWS.into_iter(), &[]), 2.0);
         let (g0, g1) = (curve.derivative(0.0)[0], curve.derivative(2.0)[0]);
         let (p0, value) = (9.0, 3.0);
         let p1 = (g0 * g0 * p0 + 2.0 * value * 1.01) / (g1 * g1);

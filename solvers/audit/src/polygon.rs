@@ -12,7 +12,7 @@
 
 mod nearest;
 
-use super::vectors::{inner, length};
+use super::vectors::length;
 
 /// Greatest degree.
 pub const MOST: usize = 9;
@@ -145,39 +145,6 @@ impl<const M: usize> Polygon<M> {
         }
         let way = self.local(t).way;
         std::array::from_fn(|k| self.start[k] + way[k])
-    }
-
-    /// Curvature in 1/mm at t; 0 where the piece has no direction.
-    ///
-    /// The last three points of de Casteljau's algorithm make a piece of degree 2 with 2 (n − 1)/n of the curvature.
-    pub fn curvature(&self, t: f64) -> f64 {
-        let mut result = 0.0;
-        let degree = self.degree as f64;
-        self.levels(t, |steps, weights, [first, last]| {
-            if steps.len() != 2 {
-                return;
-            }
-            // τ of both steps, and the tangent of the piece of degree 2.
-            let tau = [[1.0 - first, first], [last, 1.0 - last]];
-            let along: [f64; M] = std::array::from_fn(|k| tau[0][0] * steps[0][k] + tau[1][1] * steps[1][k]);
-            let square = inner(&along, &along);
-            let [w0, w1, w2] = [weights[0], weights[1], weights[2]];
-            let s = 1.0 - t;
-            let (left, right) = (s * w0 + t * w1, s * w1 + t * w2);
-            let weight = s * left + t * right;
-            let across = |step: &[f64; M]| -> [f64; M] {
-                let part = inner(step, &along) / square;
-                std::array::from_fn(|k| step[k] - part * along[k])
-            };
-            let (a, b) = (across(&steps[0]), across(&steps[1]));
-            // C'' across the tangent, from the points' distances from the tangent; |C'|.
-            let (from_a, from_b) = (-(w0 * tau[0][1] + 2.0 * w1 * tau[0][0]), w2 * tau[1][0]);
-            let bend: [f64; M] = std::array::from_fn(|k| 2.0 * (from_a * a[k] + from_b * b[k]) / weight);
-            let speed = 2.0 * left * right / (weight * weight);
-            let curvature = 2.0 * (degree - 1.0) / degree * length(&bend) / (speed * speed * square);
-            result = if square > 0.0 { curvature } else { 0.0 };
-        });
-        result
     }
 
     /// The part from the start to t, and the part from t to the end.
@@ -336,7 +303,6 @@ mod tests {
             let t = f64::from(i) / 20.0;
             let [x, y] = quarter.at(t);
             assert!(((x - 1000.0).hypot(y) - 10.0).abs() < 3e-13, "t = {t}");
-            assert!((quarter.curvature(t) - 0.1).abs() < 1e-14, "t = {t}: {}", quarter.curvature(t));
             let slope = quarter.local(t).slope;
             assert!(((x - 1000.0) * slope[0] + y * slope[1]).abs() < 1e-10);
         }
@@ -368,20 +334,6 @@ mod tests {
             for k in 0..2 {
                 assert!((slope[k] / share - whole[k]).abs() < 1e-8, "{slope:?} {whole:?}");
             }
-        }
-    }
-
-    #[test]
-    fn the_curvature_of_a_cubic_is_that_of_its_derivatives() {
-        let cubic = cubic();
-        for t in [0.0, 0.2, 0.7, 1.0] {
-            let h = 1e-4;
-            let slope = cubic.local(t).slope;
-            let bend: [f64; 2] = std::array::from_fn(|k| {
-                (cubic.local(t + h).slope[k] - cubic.local(t - h).slope[k]) / (2.0 * h)
-            });
-            let exact = (slope[0] * bend[1] - slope[1] * bend[0]).abs() / length(&slope).powi(3);
-            assert!((cubic.curvature(t) - exact).abs() < 1e-6 * exact.max(1.0));
         }
     }
 

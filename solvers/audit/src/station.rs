@@ -158,13 +158,13 @@ impl<const M: usize> Station<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::Quadratic;
+    use crate::polygon::Polygon;
     use crate::vectors::distance;
 
     #[test]
     fn on_a_parabola_acceleration_and_jerk_are_those_of_its_parameter() {
         // C = (x, x²/2) with x = 1 + 2 t + 3 t² + 4 t³ at t = 0, where ẋ = 2, ẍ = 6, x⃛ = 24: v = √2 ẋ at x = 1.
-        let curve = Curve::Quadratic(Quadratic::new(&[[0.0, 0.0], [1.0, 0.0], [2.0, 2.0]], 2.0));
+        let curve = Curve::new(Polygon::new([[0.0, 0.0], [1.0, 0.0], [2.0, 2.0]].into_iter(), &[]), 2.0);
         let [dx, ddx, dddx] = [2.0, 6.0, 24.0];
         let velocity: [f64; 2] = [dx, dx];
         let acceleration: [f64; 2] = [ddx, ddx + dx * dx];

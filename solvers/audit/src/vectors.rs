@@ -98,7 +98,6 @@ impl<const M: usize> Segment<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::Quadratic;
 
     #[test]
     fn a_point_beside_a_segment_is_as_far_as_the_nearest_end_or_foot() {
@@ -108,15 +107,5 @@ mod tests {
         assert_eq!(segment.distance_sq(&[7.0, 4.0]), 25.0);
         assert_eq!(segment.distance_sq(&[-3.0, 4.0]), 25.0);
         assert_eq!(Segment::new(&a, &a).distance_sq(&[3.0, 4.0]), 25.0);
-    }
-
-    #[test]
-    fn a_parabola_is_most_curved_at_its_tip() {
-        // y = x²/2 has curvature 1 at x = 0 and 1/√8 at x = 1.
-        let curve = Quadratic::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
-        let bend = curve.second_derivative();
-        assert!((curvature(&curve.derivative(1.0), &bend) - 1.0).abs() < 1e-15);
-        assert!((curvature(&curve.derivative(2.0), &bend) - 8.0_f64.sqrt().recip()).abs() < 1e-15);
-        assert_eq!(curvature(&[0.0, 0.0], &bend), 0.0);
     }
 }
