@@ -41,7 +41,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 self.piece = Some(piece);
             }
             let limit = path.tolerance[piece] + PLACE_TOLERANCE;
-            let away = self.near.distance(&row.q, settled(tally) * limit + rounding);
+            let away = self.near.distance(&row.q, [settled(tally) * limit + rounding; 2]);
             tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
         }
         if nearest.is_good() {

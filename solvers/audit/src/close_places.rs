@@ -21,30 +21,40 @@ impl<'a, const M: usize> ClosePlaces<'a, M> {
         Self { curves: Curves::new(pieces), place: Place { piece: 0, u: 0.0 } }
     }
 
-    /// The next search starts on this piece.
-    pub fn start_on(&mut self, piece: usize) {
-        self.place = Place { piece, u: 0.5 * self.curves.get(piece).width() };
+    /// The next search starts at this place.
+    pub fn start_at(&mut self, place: Place) {
+        self.place = place;
     }
 
-    /// A place on the pieces from `least` to `most` whose distance from `q` is no more than that piece's `enough`, and the
-    /// distance; none where a few steps lead to none.
+    /// Whether the last place is on one of these pieces.
+    pub fn is_on(&self, [least, most]: [usize; 2]) -> bool {
+        (least..=most).contains(&self.place.piece)
+    }
+
+    /// A place on the pieces from `least` to `most` that is close to `q`, and the distance: the first within the smaller of the
+    /// distances that count as close on that piece, or else the nearest of a few steps if that is within the greater one.
     pub fn find(
         &mut self,
         q: &[f64; M],
         [least, most]: [usize; 2],
-        enough: impl Fn(usize) -> f64,
+        close: impl Fn(usize) -> [f64; 2],
     ) -> Option<(usize, f64)> {
         let Place { mut piece, mut u } = self.place;
         if piece < least || piece > most {
             (piece, u) = (least, 0.0);
         }
+        let mut nearest = (piece, f64::INFINITY);
         for _ in 0..MOST_STEPS {
             let curve = self.curves.get(piece);
             let ([point, tangent], width) = (curve.place(u), curve.width());
             let away = from_to(&point, q);
+            let distance = length(&away);
             self.place = Place { piece, u };
-            if length(&away) <= enough(piece) {
-                return Some((piece, length(&away)));
+            if distance < nearest.1 {
+                nearest = (piece, distance);
+            }
+            if distance <= close(piece)[0] {
+                break;
             }
             let next = u + inner(&away, &tangent) / inner(&tangent, &tangent);
             if next > width && u == width && piece < most {
@@ -52,13 +62,13 @@ impl<'a, const M: usize> ClosePlaces<'a, M> {
             } else if next < 0.0 && u == 0.0 && piece > least {
                 piece -= 1;
                 u = self.curves.get(piece).width();
-            } else if next.is_nan() {
-                return None;
+            } else if next.is_nan() || next.clamp(0.0, width) == u {
+                break;
             } else {
                 u = next.clamp(0.0, width);
             }
         }
-        None
+        (nearest.1 <= close(nearest.0)[1]).then_some(nearest)
     }
 }
 
@@ -90,11 +100,11 @@ mod tests {
         };
         let mut places = ClosePlaces::new(pieces);
         for (q, piece) in [([0.3, 0.01], 0), ([2.4, 0.01], 2), ([0.7, 0.0], 0), ([3.01, 0.6], 3)] {
-            let (found, distance) = places.find(&q, [0, 3], |_| 0.0100001).unwrap();
+            let (found, distance) = places.find(&q, [0, 3], |_| [0.0100001; 2]).unwrap();
             assert!(found == piece && distance <= 0.0100001, "{q:?}: {found}, {distance}");
         }
-        assert!(places.find(&[0.3, 0.01], [2, 3], |_| 0.5).is_none());
-        assert!(places.find(&[0.3, 1.0], [0, 3], |_| 0.5).is_none());
-        assert!(places.find(&[f64::NAN, 0.0], [0, 3], |_| 0.5).is_none());
+        assert!(places.find(&[0.3, 0.01], [2, 3], |_| [0.5; 2]).is_none());
+        assert!(places.find(&[0.3, 1.0], [0, 3], |_| [0.5; 2]).is_none());
+        assert!(places.find(&[f64::NAN, 0.0], [0, 3], |_| [0.5; 2]).is_none());
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::close_places::ClosePlaces;
 use super::curve::Followed;
 use super::moves::{Move, Programmed};
-use super::nearest::{distance_to_piece, outwards};
+use super::nearest::{nearest_on_piece, outwards, Place};
 use super::neighbours::{Followers, Neighbours};
 use super::phases::Phases;
 use super::vectors::distance;
@@ -118,14 +118,9 @@ pub(crate) fn audit_deviation<const M: usize>(
 ) -> Tally<M> {
     let times = entry_times(path, phases);
     let followers = followers(path, program.len());
-    let from_path = blocks(
-        path.len(),
-        seen,
-        || (),
-        |i, (), tally| {
-            piece_to_moves(path, program, &followers, i, times[i], tally);
-        },
-    );
+    let from_path = blocks(path.len(), seen, Neighbours::default, |i, near, tally| {
+        piece_to_moves(path, program, (&followers, near), (i, times[i]), tally);
+    });
     let from_program = blocks(
         program.len(),
         seen,
@@ -157,22 +152,20 @@ pub fn window(path: &Followed, piece: usize, moves: usize) -> impl Iterator<Item
     (first..last).chain(first.checked_sub(1)).chain(Some(last).filter(|&m| m < moves))
 }
 
-/// What a place may be off its nearest neighbour without changing the tally: no more than its worst so far, and not
-/// near the tolerance. The first neighbour within it settles the place.
+/// What a place may be off its nearest neighbour without changing the tally: no more than its worst so far. The first neighbour
+/// within it settles the place.
 pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
-    tally.get(Check::Deviation, 0).ratio.clamp(0.0, NEAR)
+    tally.get(Check::Deviation, 0).ratio.max(0.0)
 }
 
-fn piece_to_moves<const M: usize>(
+fn piece_to_moves<'a, const M: usize>(
     path: &Followed,
-    program: &Programmed,
-    followers: &[Followers],
-    piece: usize,
-    time: f64,
+    program: &Programmed<'a>,
+    (followers, near): (&[Followers], &mut Neighbours<'a, M>),
+    (piece, time): (usize, f64),
     tally: &mut Tally<M>,
 ) {
     let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
-    let mut near = Neighbours::default();
     near.replace(program, window(path, piece, program.len()));
     // A piece is within the convex hull of its control points: where these lie along one move, its places change nothing.
     let points = path.rows(piece).map(|row| path.point::<M>(row));
@@ -185,11 +178,14 @@ fn piece_to_moves<const M: usize>(
     let (width, places) = (curve.width(), PLACES * curve.turns());
     let rounding = ROUNDINGS * EPS * curve.magnitude();
     near.start_at(followers, piece);
-    let mut off = |t: f64, enough: f64| near.distance(&curve.at(t * width), enough + rounding) - rounding;
+    let mut off = |t: f64, shares: [f64; 2]| {
+        near.distance(&curve.at(t * width), shares.map(|share| share * tolerance + rounding)) - rounding
+    };
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
     for i in 0..=places {
         let t = i as f64 / places as f64;
-        let value = off(t, settled(tally) * tolerance);
+        // Where it comes near its tolerance the piece is looked at again.
+        let value = off(t, [settled(tally).min(NEAR), settled(tally)]);
         tally.offer(Check::Deviation, 0, value, tolerance, time, line);
         if value > worst {
             (worst, worst_t) = (value, t);
@@ -200,7 +196,7 @@ fn piece_to_moves<const M: usize>(
         let step = 1.0 / (places * PLACES) as f64;
         for i in 0..=2 * PLACES {
             let t = (worst_t + (i as f64 - PLACES as f64) * step).clamp(0.0, 1.0);
-            tally.offer(Check::Deviation, 0, off(t, 0.0), tolerance, time, line);
+            tally.offer(Check::Deviation, 0, off(t, [settled(tally); 2]), tolerance, time, line);
         }
     }
 }
@@ -259,7 +255,7 @@ fn move_to_pieces<const M: usize>(
         let (enough, tolerance_of) =
             (settled(tally), |piece: usize| path.tolerance[piece].max(GAP_TOLERANCE));
         if let Some((piece, away)) =
-            close.find(&q, [least, most], |piece| enough * tolerance_of(piece) + rounding)
+            close.find(&q, [least, most], |piece| [enough * tolerance_of(piece) + rounding; 2])
         {
             tally.offer(Check::Deviation, 0, away - rounding, tolerance_of(piece), times[first], line);
             expected = piece;
@@ -271,9 +267,11 @@ fn move_to_pieces<const M: usize>(
             if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond {
                 continue;
             }
-            let away = distance_to_piece(close.curves.get(piece), &q) - rounding;
+            let (u, distance) = nearest_on_piece(close.curves.get(piece), &q);
+            let away = distance - rounding;
             if away / tolerance < nearest.0 {
                 nearest = (away / tolerance, away, tolerance);
+                close.start_at(Place { piece, u });
                 expected = piece;
             }
             if nearest.0 <= enough {

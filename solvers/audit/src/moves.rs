@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::arc_slope::{Arc, ArcSlope};
 use super::close_places::ClosePlaces;
 use super::curve::Pieces;
-use super::nearest::{distance_to_piece, outwards};
+use super::nearest::{nearest_on_piece, outwards, Place};
 use super::vectors::{distance, vector, Segment};
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
@@ -160,40 +160,40 @@ impl<const M: usize> Move<'_, M> {
         }
     }
 
-    /// Distance of `q` from the nearest place of the move, in mm. The search ends at a place
-    /// within `enough`; of a spline it starts at the piece `expected`, which becomes the nearest one, or at the last place that
-    /// was `close`.
+    /// Distance of `q` from the nearest place of the move, in mm. The search ends at a place within the first distance of `enough`; of
+    /// a spline it starts at the piece `expected`, which becomes the nearest one, or at the last place that was `close`, and the
+    /// nearest place of a few steps counts within the second distance.
     pub(super) fn distance(
         &self,
         q: &[f64; M],
         expected: &mut usize,
-        enough: f64,
+        enough: [f64; 2],
         mut close: Option<&mut ClosePlaces<M>>,
     ) -> f64 {
         match &self.shape {
             Shape::Line => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
-            Shape::Arc(arc) => self.distance_to_arc(arc, q, enough),
+            Shape::Arc(arc) => self.distance_to_arc(arc, q, enough[0]),
             Shape::Spline { pieces, first, last } => {
                 let found = close.as_mut().and_then(|close| close.find(q, [*first, *last], |_| enough));
                 if let Some((piece, away)) = found {
                     *expected = piece;
                     return away;
                 }
-                let mut least = f64::INFINITY;
+                let (mut least, mut nearest) = (f64::INFINITY, 0.0);
                 for piece in outwards((*expected).clamp(*first, *last), *first, *last) {
                     if pieces.distance_at_least(piece, q) > least {
                         continue;
                     }
-                    let away = distance_to_piece(&pieces.curve::<M>(piece), q);
+                    let (u, away) = nearest_on_piece(&pieces.curve::<M>(piece), q);
                     if away < least {
-                        (least, *expected) = (away, piece);
+                        (least, nearest, *expected) = (away, u, piece);
                     }
-                    if least <= enough {
+                    if least <= enough[0] {
                         break;
                     }
                 }
                 if let Some(close) = close {
-                    close.start_on(*expected);
+                    close.start_at(Place { piece: *expected, u: nearest });
                 }
                 least
             }
@@ -236,7 +236,7 @@ mod tests {
 
     /// The distance from the nearest place.
     fn off<const M: usize>(programmed: &Move<M>, q: &[f64; M]) -> f64 {
-        programmed.distance(q, &mut 0, 0.0, None)
+        programmed.distance(q, &mut 0, [0.0; 2], None)
     }
 
     #[test]
@@ -274,11 +274,12 @@ mod tests {
         // Across the parabola at x = 6, where it rises at 45 degrees.
         for expected in [0, 1, 7] {
             assert!(
-                (spline.distance(&[7.0, 0.0], &mut { expected }, 0.0, None) - 2.0_f64.sqrt()).abs() < 1e-12
+                (spline.distance(&[7.0, 0.0], &mut { expected }, [0.0; 2], None) - 2.0_f64.sqrt()).abs()
+                    < 1e-12
             );
             let mut close = ClosePlaces::new(splines);
             for enough in [0.0, 1.5, 0.0, 1.42] {
-                let away = spline.distance(&[7.0, 0.0], &mut { expected }, enough, Some(&mut close));
+                let away = spline.distance(&[7.0, 0.0], &mut { expected }, [enough; 2], Some(&mut close));
                 let most = enough.max(2.0_f64.sqrt() + 1e-12);
                 assert!((2.0_f64.sqrt() - 1e-12..=most).contains(&away), "{away}");
             }

@@ -37,10 +37,14 @@ pub fn all_minima<const M: usize>(
     });
 }
 
-/// Distance of `q` from the nearest place of the piece.
-pub fn distance_to_piece<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> f64 {
-    let mut nearest = f64::INFINITY;
-    all_minima(curve, q, 0.0, |_, distance| nearest = nearest.min(distance));
+/// The parameter of the place of a piece that is nearest to `q`, and its distance.
+pub fn nearest_on_piece<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> (f64, f64) {
+    let mut nearest = (0.0, f64::INFINITY);
+    all_minima(curve, q, 0.0, |u, distance| {
+        if distance < nearest.1 {
+            nearest = (u, distance);
+        }
+    });
     nearest
 }
 
@@ -230,7 +234,7 @@ mod tests {
             for x in [1e-9, 0.01, 2.0] {
                 let (u, off, falls) = first_minimum(&curve, &[x, 0.0], 0.0);
                 assert!(!falls && off < 1e-13, "{x}: {u} is {off} off");
-                assert!(distance_to_piece(&curve, &[x, 0.0]) < 1e-13);
+                assert!(nearest_on_piece(&curve, &[x, 0.0]).1 < 1e-13);
             }
             let (u, off, falls) = first_minimum(&curve, &[-1.0, 0.0], 0.0);
             assert!(u < 1e-12 && off == 1.0 && !falls, "{u}");
@@ -247,7 +251,7 @@ mod tests {
             let dense = (0..=5000)
                 .map(|i| distance(&[x, y], &curve.at(3.0 * f64::from(i) / 5000.0)))
                 .fold(f64::INFINITY, f64::min);
-            let found = distance_to_piece(&curve, &[x, y]);
+            let (_, found) = nearest_on_piece(&curve, &[x, y]);
             prop_assert!(found <= dense + 1e-12);
             prop_assert!(found >= dense - 2e-3);
         }

@@ -2,6 +2,7 @@
 
 use super::close_places::ClosePlaces;
 use super::moves::{Move, Programmed, Shape};
+use super::nearest::Place;
 
 /// First and last piece that follow a move.
 pub type Followers = (usize, usize);
@@ -33,13 +34,17 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         self.expected.extend(self.moves.iter().map(|(number, _)| expected(*number)));
     }
 
-    /// Expects the nearest place of a spline to be as far along it as `piece` is along the pieces that follow it.
+    /// Expects the nearest place of a spline to be as far along it as `piece` is along the pieces that follow it, where no place of
+    /// that spline is known.
     pub fn start_at(&mut self, followers: &[Followers], piece: usize) {
         for ((number, programmed), expected) in self.moves.iter().zip(&mut self.expected) {
             if let Shape::Spline { first, last, .. } = programmed.shape {
                 let (from, to) = followers[*number];
                 let share = piece.saturating_sub(from) as f64 / (to + 1).saturating_sub(from).max(1) as f64;
                 *expected = (first + (share * (last + 1 - first) as f64) as usize).min(last);
+                if let Some(close) = self.close.as_mut().filter(|close| !close.is_on([first, last])) {
+                    close.start_at(Place { piece: *expected, u: 0.0 });
+                }
             }
         }
     }
@@ -54,14 +59,16 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         let mut straight =
             self.moves.iter().filter(|(_, programmed)| matches!(programmed.shape, Shape::Line));
         straight.find_map(|(_, programmed)| {
-            let away =
-                |q: [f64; M]| Some(programmed.distance(&q, &mut 0, 0.0, None)).filter(|away| *away <= enough);
+            let away = |q: [f64; M]| {
+                Some(programmed.distance(&q, &mut 0, [0.0; 2], None)).filter(|away| *away <= enough)
+            };
             points.clone().try_fold(0.0, |most: f64, q| Some(most.max(away(q)?)))
         })
     }
 
-    /// Distance of `q` from the nearest move, or from the first that is within `enough`; a NaN if there is one.
-    pub fn distance(&mut self, q: &[f64; M], enough: f64) -> f64 {
+    /// Distance of `q` from the nearest move, or from the first that is within the first of `enough`; see `Move::distance` for the
+    /// second. A NaN if there is one.
+    pub fn distance(&mut self, q: &[f64; M], enough: [f64; 2]) -> f64 {
         let mut least = f64::INFINITY;
         let first = self.nearest;
         for m in (first..self.moves.len()).chain(0..first) {
@@ -72,7 +79,7 @@ impl<'a, const M: usize> Neighbours<'a, M> {
             if away < least {
                 (least, self.nearest) = (away, m);
             }
-            if least <= enough {
+            if least <= enough[0] {
                 break;
             }
         }

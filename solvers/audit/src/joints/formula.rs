@@ -68,18 +68,19 @@ impl Formula {
         // The cosine of an angle comes right after its sine.
         let mut wave = (0.0, 1.0);
         for (i, step) in self.steps.iter().enumerate() {
-            let [a, b] = step.operands.map(|place| table[place]);
+            let (known, rest) = table.split_at_mut(self.inputs + i);
+            let [a, b] = step.operands.map(|place| &known[place]);
             let c = step.constant;
-            table[self.inputs + i] = match step.code {
+            rest[0] = match step.code {
                 0 => Jet::constant(c),
                 1 => a.scaled(-1.0),
-                2 => a.plus(&b, 1.0),
-                3 => a.plus(&b, -1.0),
-                4 => a.times(&b),
+                2 => a.plus(b, 1.0),
+                3 => a.plus(b, -1.0),
+                4 => a.times(b),
                 5 => a.times(&b.reciprocal()),
                 6 => a.shifted(c),
                 7 => a.scaled(c),
-                8 => a.times(&a),
+                8 => a.times(a),
                 9 => a.root(),
                 SINE => {
                     wave = a.value[0].sin_cos();
@@ -90,7 +91,7 @@ impl Formula {
                     let (s, c) = wave;
                     a.composed([c, -s, -c, s, c], ELEMENTARY)
                 }
-                12 => a.angle(&b),
+                12 => a.angle(b),
                 13 => a.scaled(PI / 180.0),
                 _ => a.scaled(180.0 / PI),
             };
