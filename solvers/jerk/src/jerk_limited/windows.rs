@@ -25,7 +25,7 @@ use crate::path_problem::{Effort, Fault, Geometry, Limits, Problem};
 
 /// Windows reach this many stop times and intervals beyond their cuts: the time of the first plan on the way there (the optimum
 /// takes a third of it or more) over the time to stop from the greatest speed that the envelope allows on that way.
-const REACH: (f64, usize) = (14.0, 80);
+const REACH: (f64, usize) = (11.0, 80);
 /// They end where the first plan uses its limits least, of this many stations from there on: beside an end on a limit
 /// there is almost no interior.
 const EASE: usize = 20;
