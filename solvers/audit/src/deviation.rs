@@ -5,13 +5,12 @@
 //! side. Distances are those from true segments, circles, helices and parabolas. Where a piece comes near its
 //! tolerance it is looked at again, closer.
 
-use rayon::prelude::*;
-
 use super::close_places::ClosePlaces;
 use super::curve::Followed;
 use super::moves::{Move, Programmed};
 use super::nearest::{nearest_on_piece, outwards, Place};
 use super::neighbours::{Followers, Neighbours};
+use super::parallel;
 use super::phases::Phases;
 use super::vectors::distance;
 use super::{tell, Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
@@ -38,11 +37,9 @@ pub(crate) fn audit_path<const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let times = entry_times(path, phases);
-    blocks(
-        path.len(),
-        seen,
-        || (),
-        |i, (), tally| {
+    parallel::tally(path.len(), BLOCK, &|block, tally| {
+        for i in block {
+            tell(seen, i);
             let (time, line) = (times[i], path.line[i]);
             let (rows, width) = (path.rows(i), path.width[i]);
             let control = &path.control[rows.start * path.stride..rows.end * path.stride];
@@ -52,7 +49,7 @@ pub(crate) fn audit_path<const M: usize>(
                 && width.is_finite();
             if !finite || width < 0.0 || (width == 0.0 && !path.is_motionless(i)) {
                 tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
-                return;
+                continue;
             }
             tally.offer(Check::Numbers, 0, 0.0, 0.0, time, line);
             if i > 0 {
@@ -77,8 +74,8 @@ pub(crate) fn audit_path<const M: usize>(
                 }
             }
             tally.samples += 1;
-        },
-    )
+        }
+    })
 }
 
 /// The share of half the travel that a position is away from the middle.
@@ -104,6 +101,12 @@ pub fn offer_travel<const M: usize>(
     line: i32,
 ) {
     let [least, most] = limits.travel[axis];
+    // Most positions change nothing, and a product is had sooner than a share.
+    let (middle, half, known) =
+        (0.5 * (least + most), 0.5 * (most - least), tally.get(Check::Travel, axis).ratio);
+    if known >= 0.0 && (q - middle).abs() < known * half {
+        return;
+    }
     let bound = if q < 0.5 * (least + most) { least } else { most };
     let ratio = travel_share(limits, axis, q);
     tally.offer_ratio(Check::Travel, axis, Worst { value: q, limit: bound, ratio, time, line });
@@ -118,17 +121,20 @@ pub(crate) fn audit_deviation<const M: usize>(
 ) -> Tally<M> {
     let times = entry_times(path, phases);
     let followers = followers(path, program.len());
-    let from_path = blocks(path.len(), seen, Neighbours::default, |i, near, tally| {
-        piece_to_moves(path, program, (&followers, near), (i, times[i]), tally);
+    let from_path = parallel::tally(path.len(), BLOCK, &|block, tally| {
+        let mut near = Neighbours::default();
+        for i in block {
+            tell(seen, i);
+            piece_to_moves(path, program, (&followers, &mut near), (i, times[i]), tally);
+        }
     });
-    let from_program = blocks(
-        program.len(),
-        seen,
-        || ClosePlaces::new(path.pieces),
-        |m, close, tally| {
-            move_to_pieces(path, program, (m, followers[m]), &times, close, tally);
-        },
-    );
+    let from_program = parallel::tally(program.len(), BLOCK, &|block, tally| {
+        let mut close = ClosePlaces::new(path.pieces);
+        for m in block {
+            tell(seen, m);
+            move_to_pieces(path, program, (m, followers[m]), &times, &mut close, tally);
+        }
+    });
     let mut ends = Tally::default();
     if !path.is_empty() && !program.is_empty() {
         let last = path.len() - 1;
@@ -297,26 +303,6 @@ fn entry_times(path: &Followed, phases: Option<&Phases>) -> Vec<f64> {
     }
     times[piece..].fill(starts[phases.len()]);
     times
-}
-
-/// Calls `check` for every index, in parallel; each thread `keeps` something from one to the next.
-fn blocks<const M: usize, K>(
-    count: usize,
-    seen: Seen,
-    keeps: impl Fn() -> K + Sync,
-    check: impl Fn(usize, &mut K, &mut Tally<M>) + Sync,
-) -> Tally<M> {
-    (0..count.div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|block| {
-            let (mut tally, mut kept) = (Tally::default(), keeps());
-            for i in block * BLOCK..((block + 1) * BLOCK).min(count) {
-                tell(seen, i);
-                check(i, &mut kept, &mut tally);
-            }
-            tally
-        })
-        .reduce(Tally::default, Tally::merge)
 }
 
 fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {

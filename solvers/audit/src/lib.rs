@@ -7,7 +7,7 @@
 //! The path: `vectors`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
 //! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics). The profile: `phases`, `phase_order`, `quadrature`,
 //! `phase_motion`, `speed_by_length`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
-//! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Other crates call `kernels`.
+//! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Loops: `parallel`. Other crates call `kernels`.
 
 mod against_plan;
 mod arc_slope;
@@ -24,6 +24,7 @@ mod motion;
 pub mod moves;
 mod nearest;
 mod neighbours;
+mod parallel;
 mod peak;
 mod phase_by_length;
 mod phase_jerk;
@@ -230,6 +231,11 @@ impl<const M: usize> Tally<M> {
         line: i32,
         time: impl FnOnce() -> f64,
     ) {
+        // Most values change nothing, and a product is had sooner than a ratio.
+        let known = self.worst[check as usize][axis].ratio;
+        if known >= 0.0 && value < known * limit {
+            return;
+        }
         let ratio = if value <= 0.0 { 0.0 } else { value / limit };
         self.offer_share(check, axis, (value, limit, ratio), line, time);
     }

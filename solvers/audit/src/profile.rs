@@ -6,10 +6,9 @@
 
 mod by_length;
 
-use rayon::prelude::*;
-
 use super::chord::chord_error;
 use super::columns::{Columns, Place, CHORD};
+use super::parallel;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{PhaseMotion, State};
 use super::phase_order::PhaseOrder;
@@ -57,21 +56,16 @@ pub fn audit_profile<'a, const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let phases = of.phases;
-    let blocks = phases.len().div_ceil(BLOCK);
-    let inside = (0..blocks)
-        .into_par_iter()
-        .map(|block| {
-            let (mut tally, mut columns) = (Tally::default(), columns());
-            for i in block * BLOCK..((block + 1) * BLOCK).min(phases.len()) {
-                tell(seen, i);
-                of.phase(i, &mut *columns, &mut tally);
-                if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
-                    of.joint([i - 1, i], &mut *columns, &mut tally);
-                }
+    let inside = parallel::tally(phases.len(), BLOCK, &|block, tally| {
+        let mut columns = columns();
+        for i in block {
+            tell(seen, i);
+            of.phase(i, &mut *columns, tally);
+            if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
+                of.joint([i - 1, i], &mut *columns, tally);
             }
-            tally
-        })
-        .reduce(Tally::default, Tally::merge);
+        }
+    });
     let mut order = Tally::default();
     of.order(&mut *columns(), &mut order);
     inside.merge(order)

@@ -4,11 +4,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::against_plan::Comparison;
 use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
+use super::parallel;
 use super::rows::{Nearest, Row};
 use super::tracking::Plan;
 use super::vectors::{length, vector};
@@ -75,7 +74,7 @@ impl<const M: usize> Stream<M> {
     pub(crate) fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
-        rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| chunk.row(i)));
+        rows.extend((0..chunk.t.len()).map(|i| chunk.row(i)));
         if let Some(plan) = plan {
             plan.extend_clock(&self.limits, &rows, &mut self.clock);
         }
@@ -85,15 +84,10 @@ impl<const M: usize> Stream<M> {
             plan.find_nearest(&self.limits, &mut rows, old, seen);
         }
         let view = View { differences: self.differences(&rows), plan };
-        let found = (old..rows.len())
-            .step_by(BLOCK)
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|first| {
-                seen(BLOCK.min(rows.len() - first));
-                view.block(first..(first + BLOCK).min(rows.len()))
-            })
-            .reduce(Tally::default, Tally::merge);
+        let found = parallel::tally(chunk.t.len(), BLOCK, &|block, tally| {
+            seen(block.len());
+            view.block(old + block.start..old + block.end, tally);
+        });
         let mut first = Tally::default();
         if self.count == 0 && !rows.is_empty() {
             view.first(&mut first);
@@ -162,8 +156,7 @@ impl<const M: usize> View<'_, M> {
     }
 
     /// All that some rows show, together with those before them.
-    fn block(&self, rows: Range<usize>) -> Tally<M> {
-        let mut tally = Tally::default();
+    fn block(&self, rows: Range<usize>, tally: &mut Tally<M>) {
         let mut comparison = self.plan.map(|plan| Comparison::new(plan, self.differences.limits));
         let mut recent = self.recent(rows.start);
         for n in rows {
@@ -175,12 +168,11 @@ impl<const M: usize> View<'_, M> {
                 let [_, early, late] = recent.accelerations;
                 recent.accelerations = [early, late, newest];
             }
-            self.arrival(n, &recent, &rounding, comparison.as_mut(), &mut tally);
+            self.arrival(n, &recent, &rounding, comparison.as_mut(), tally);
             if n > AROUND {
-                self.centre(n - AROUND, &recent.accelerations[0], comparison.as_mut(), &mut tally);
+                self.centre(n - AROUND, &recent.accelerations[0], comparison.as_mut(), tally);
             }
         }
-        tally
     }
 
     /// What row `n` − 1 leaves for row `n`.

@@ -4,14 +4,13 @@
 //! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
 //! that is early or late is the way that the profile moves in that time.
 
-use rayon::prelude::*;
-
 use super::columns::{Axes, Columns};
 use super::curve::Followed;
 use super::joints::columns::JointColumns;
 use super::joints::path::JointPath;
 use super::moves::Programmed;
 use super::nearest::{Found, Place, Search};
+use super::parallel;
 use super::phase_motion::ROUNDING;
 use super::profile_clock::ProfileClock;
 use super::profile_reader::Reader;
@@ -98,7 +97,7 @@ impl<'a> Plan<'a> {
         let (known, fresh) = rows.split_at_mut(old);
         // Without a profile every search starts from the place before; with one its time says where to start.
         let block = if self.profile.is_some() { BLOCK } else { fresh.len().max(1) };
-        fresh.par_chunks_mut(block).enumerate().for_each(|(number, rows)| {
+        parallel::each_part(fresh, block, &|number, rows| {
             let mut finder = Finder::new(self, limits);
             let mut astray = 0;
             for i in 0..rows.len() {

@@ -1,0 +1,36 @@
+//! Work on blocks in parallel. The loop itself is compiled once, not for each kind of work and each number of axes.
+
+use std::ops::Range;
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::Tally;
+
+fn each_block(blocks: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..blocks).into_par_iter().for_each(work);
+}
+
+/// Calls `work` with the number of every part of so many items, and the part.
+pub fn each_part<T: Send>(items: &mut [T], size: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    let parts: Vec<Mutex<&mut [T]>> = items.chunks_mut(size).map(Mutex::new).collect();
+    each_block(parts.len(), &|number| {
+        // Nobody else ever has it.
+        if let Ok(mut part) = parts[number].lock() {
+            work(number, &mut part);
+        }
+    });
+}
+
+/// What `work` finds in blocks of so many of `count` things, in their order.
+pub fn tally<const M: usize>(
+    count: usize,
+    size: usize,
+    work: &(dyn Fn(Range<usize>, &mut Tally<M>) + Sync),
+) -> Tally<M> {
+    let mut found = vec![Tally::default(); count.div_ceil(size)];
+    each_part(&mut found, 1, &|number, part| {
+        work(number * size..((number + 1) * size).min(count), &mut part[0]);
+    });
+    found.into_iter().fold(Tally::default(), Tally::merge)
+}
