@@ -156,8 +156,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 beyond = beyond.min(next + dual[k] * known);
                 step[k] = next.into();
             }
-            // Few intervals need a shorter step than all before; only these divide.
-            if beyond.least() < 0.0 {
+            // Few intervals need a shorter step than all before; only these divide. No lane is above 0.
+            if beyond.sum() < 0.0 {
                 for k in 0..RowLayout::<M>::COUNT {
                     let part = step[k] * dual[k].load(simd).inverse();
                     dual_most = (-part).greatest().max(dual_most);

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, Simd};
 use feedplan_geometry::elementary::Elementary;
-use feedplan_geometry::lanes::{Lanes, LogProduct};
+use feedplan_geometry::lanes::{Lanes, LogProduct, Register};
 
 use super::band::Band;
 use super::constraints::{Constraints, RowLayout};
@@ -94,19 +94,22 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         trial: bool,
     ) -> Option<f64> {
         let mut product = LogProduct::default();
+        let (mut least, mut sum) = (Register::all(simd, f64::INFINITY), Register::all(simd, 0.0));
         for (n, interval) in rows.intervals.iter().enumerate() {
             let slack = RowLayout::<M>::of_mut(&mut self.state.slack, n);
             self.model.slack(simd, rows, n, &local(x, n, interval.h), trial, slack);
-            let (mut least, mut all) = (slack[0].load(simd), slack[0].load(simd));
+            let mut all = slack[0].load(simd);
+            least = all.min(least);
             for slack in &slack[1..] {
                 least = slack.load(simd).min(least);
                 all = all * *slack;
             }
-            // A NaN is refused as well.
-            if least.least() <= 0.0 || all.sum().is_nan() {
-                return None;
-            }
+            sum += all;
             product.take(all.values());
+        }
+        // A NaN is refused as well.
+        if least.least() <= 0.0 || sum.sum().is_nan() {
+            return None;
         }
         let mut logarithm = product.ln();
         for row in self.ends.iter_mut().flatten() {
