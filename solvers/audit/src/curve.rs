@@ -160,6 +160,9 @@ impl<'a, const M: usize> Curves<'a, M> {
     }
 }
 
+/// On so short a part of a piece, as a share of it, the trapezoid rule is as good as the slopes are known.
+const SHORT: f64 = 1e-8;
+
 /// A piece, over u in [0, width].
 #[derive(Clone, Debug)]
 pub struct Curve<const M: usize> {
@@ -205,7 +208,7 @@ impl<const M: usize> Curve<M> {
 
     /// From one place to another, where the first derivatives are known; short ways lose no digits.
     pub fn way(&self, [from, to]: [f64; 2], slopes: [&[f64; M]; 2]) -> [f64; M] {
-        if self.has_linear_slope() || from == to {
+        if self.has_linear_slope() || (to - from).abs() <= SHORT * self.width {
             return vector_of(|k| 0.5 * (to - from) * (slopes[0][k] + slopes[1][k]));
         }
         let way = self.part(from.min(to), from.max(to)).chord();
@@ -345,5 +348,17 @@ mod tests {
         assert!((curve.curvature(1.0) - 1.0).abs() < 1e-15);
         assert!((curve.curvature(2.0) - 8.0_f64.sqrt().recip()).abs() < 1e-15);
         assert_eq!(curvature(&[0.0, 0.0], &[1.0, 0.0]), 0.0);
+    }
+
+    #[test]
+    fn a_way_of_one_rounding_at_the_end_of_a_piece_is_one() {
+        let cubic = [[0.0, 0.0], [1.0, 2.0], [3.0, 0.0], [4.0, 1.0]];
+        let curve = Curve::new(Polygon::new(cubic.into_iter(), &[]), 7.1638);
+        let (from, to) = (7.1638_f64.next_down(), 7.1638);
+        let way = curve.way([to, from], [&curve.derivative(to), &curve.derivative(from)]);
+        assert!(way[0] < 0.0 && (way[0] / (from - to) / curve.derivative(to)[0] - 1.0).abs() < 1e-12);
+        let short = [1.0, 1.0 + 1e-7];
+        let way = curve.way(short, [&curve.derivative(short[0]), &curve.derivative(short[1])]);
+        assert!((way[1] / (short[1] - short[0]) / curve.derivative(1.0)[1] - 1.0).abs() < 1e-6);
     }
 }

@@ -105,4 +105,4 @@ kernels!(3 6 9);
 
 // Tests call the kernels directly; one instance shows that all are in use.
 #[cfg(test)]
-kernels!(3);
+kernels!(2);
