@@ -22,7 +22,7 @@ use super::{EPS, ROUNDINGS};
 pub const ROUNDING: f64 = 2.0 * ROUNDINGS * EPS;
 
 /// Where a greater part of a speed is uncertain, it is taken from the recorded p at the ends of the phase.
-const HIDDEN: f64 = 1e-3;
+pub const HIDDEN: f64 = 1e-3;
 
 /// Parts of a phase over which an acceleration near a place is taken: inside it, of the way to a turn, and at its ends.
 const NEAR: f64 = 5e-4;
