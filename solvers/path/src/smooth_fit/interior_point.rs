@@ -43,7 +43,7 @@ const MU_RATIO: f64 = 10.0;
 /// and between the lengths of their steps.
 const LENGTH_RATIO: f64 = 1.5;
 /// A slack becomes that of its row, if it has to change by no more than this part of itself.
-const SLACK_CHANGE: f64 = 0.05;
+const SLACK_CHANGE: f64 = 0.04;
 /// The weight at the start of all targets, in units over the squares of their limits.
 const START_WEIGHT: f64 = 200.0;
 /// The slacks at the start are at least this part of the limits.
