@@ -371,7 +371,10 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
             problem.watch.check();
             Measures::new(problem, part)
         };
-        let measures: Vec<Measures<M>> = parts.par_iter().with_min_len(16).map(measures).collect();
+        Self::measured(problem, parts, parts.par_iter().with_min_len(16).map(measures).collect())
+    }
+
+    fn measured(problem: &'a Problem<'a, M>, parts: &'a [Part], measures: Vec<Measures<M>>) -> Self {
         let mut knots = vec![0.0];
         let mut total = 0.0;
         for own in &measures {
@@ -381,17 +384,12 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         Self { problem, parts, measures, tables: vec![OnceLock::new(); parts.len()], knots }
     }
 
-    /// The parts that two lengths have between them, by the same lengths, with tables of their own.
-    pub fn between(&self, [from, to]: [f64; 2]) -> Self {
+    /// The parts that two lengths have between them, with tables and lengths of their own, and the index of the first. Lengths
+    /// from there keep digits that those of a path of half a kilometre do not have.
+    pub fn between(&self, [from, to]: [f64; 2]) -> (Self, usize) {
         let first = self.part(from);
         let end = first + 1 + self.knots[first + 1..].partition_point(|&knot| knot < to);
-        Self {
-            problem: self.problem,
-            parts: &self.parts[first..end],
-            measures: self.measures[first..end].to_vec(),
-            tables: vec![OnceLock::new(); end - first],
-            knots: self.knots[first..=end].to_vec(),
-        }
+        (Self::measured(self.problem, &self.parts[first..end], self.measures[first..end].to_vec()), first)
     }
 
     fn table(&self, part: usize) -> &[Row] {

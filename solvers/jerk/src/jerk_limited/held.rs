@@ -38,22 +38,43 @@ pub struct Stretch {
     pub held: Option<f64>,
 }
 
-/// A stretch as a path of its own, by the arc length of its subrun. The tables that its plan needs go with it.
-pub struct Between<'a, const M: usize> {
+/// A stretch as a path of its own, by the arc length from the start of its first part. The tables that its plan needs go with
+/// it.
+pub struct Between<'a, 'b, const M: usize> {
     pub path: ArcLengthPath<'a, M>,
     knots: Vec<f64>,
+    /// The knots of the subrun at those of `path`.
+    outer: &'b [f64],
 }
 
-impl<'a, const M: usize> Between<'a, M> {
-    pub fn new(path: &ArcLengthPath<'a, M>, [from, to]: [f64; 2]) -> Self {
-        let path = path.between([from, to]);
-        let inner = &path.knots()[1..path.parts.len()];
-        let knots = [&[from], inner, &[to]].concat();
-        Self { path, knots }
+impl<'a, 'b, const M: usize> Between<'a, 'b, M> {
+    pub fn new(subrun: &'b ArcLengthPath<'a, M>, ends: [f64; 2]) -> Self {
+        let (path, first) = subrun.between(ends);
+        let outer = &subrun.knots()[first..=first + path.parts.len()];
+        let mut own = Self { path, knots: vec![], outer };
+        let inner = &own.path.knots()[1..own.path.parts.len()];
+        own.knots = [&[own.within(ends[0])], inner, &[own.within(ends[1])]].concat();
+        own
+    }
+
+    /// The arc length of the stretch at one of the subrun.
+    pub fn within(&self, s: f64) -> f64 {
+        moved(self.outer, self.path.knots(), s)
+    }
+
+    /// The arc length of the subrun at one of the stretch.
+    pub fn outside(&self, s: f64) -> f64 {
+        moved(self.path.knots(), self.outer, s)
     }
 }
 
-impl<const M: usize> Geometry<M> for Between<'_, M> {
+/// As far from its knot among `to` as s is from that among `from`.
+fn moved(from: &[f64], to: &[f64], s: f64) -> f64 {
+    let knot = from.partition_point(|&knot| knot <= s).max(1) - 1;
+    to[knot] + (s - from[knot])
+}
+
+impl<const M: usize> Geometry<M> for Between<'_, '_, M> {
     fn knots(&self) -> &[f64] {
         &self.knots
     }
@@ -362,8 +383,18 @@ mod tests {
     const LIMITS: Limits<2> =
         Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
 
-    /// Pieces of one run from rest to rest, each of so many control points, by their feeds.
     fn looked(control: &[[f64; 2]], feed: &[f64]) -> Vec<Stretch> {
+        on_path(control, feed, |problem, path| {
+            stretches(problem, path, &LIMITS, &path.junctions(&LIMITS.jerk), [End::Rest; 2])
+        })
+    }
+
+    /// Pieces of one run from rest to rest, each of so many control points, by their feeds.
+    fn on_path<T>(
+        control: &[[f64; 2]],
+        feed: &[f64],
+        work: impl FnOnce(&Problem<2>, &ArcLengthPath<2>) -> T,
+    ) -> T {
         let count = control.len() / feed.len();
         let offset: Vec<usize> = (0..=feed.len()).map(|i| i * count).collect();
         let problem = Problem {
@@ -386,8 +417,28 @@ mod tests {
             watch: Default::default(),
         };
         let parts: Vec<Part> = (0..feed.len()).map(|piece| Part { piece, u: [0.0, 1.0] }).collect();
-        let path = ArcLengthPath::new(&problem, &parts);
-        stretches(&problem, &path, &LIMITS, &path.junctions(&LIMITS.jerk), [End::Rest; 2])
+        work(&problem, &ArcLengthPath::new(&problem, &parts))
+    }
+
+    #[test]
+    fn a_stretch_after_a_long_way_has_the_digits_of_its_own_lengths() {
+        // 600 m there and back, then three lines of a tenth of a micrometre.
+        let mut control = vec![[0.0, 0.0], [3e5, 0.0], [3e5, 0.0], [0.0, 0.0]];
+        for i in 0..3 {
+            control.extend([i, i + 1].map(|end| [0.0, 1e-4 * f64::from(end)]));
+        }
+        on_path(&control, &[50.0; 5], |_, path| {
+            let knots = path.knots();
+            let off = |knots: &[f64]| ((knots[1] - knots[0]) / 1e-4 - 1.0).abs();
+            assert!(off(&knots[2..]) > 1e-9);
+            let own = Between::new(path, [knots[2], path.total()]);
+            assert!(own.knots().windows(2).all(|pair| off(pair) < 1e-12), "{:?}", own.knots());
+            assert_eq!((own.within(knots[3]), own.outside(own.knots()[2])), (own.knots()[1], knots[4]));
+            // It begins and ends within parts as well.
+            let own = Between::new(path, [knots[2] + 4e-5, knots[4] + 4e-5]);
+            assert_eq!(own.knots().len(), 4);
+            assert!((own.knots()[0] - 4e-5).abs() < 1e-9 && (own.knots()[3] - 2.4e-4).abs() < 1e-9);
+        });
     }
 
     #[test]

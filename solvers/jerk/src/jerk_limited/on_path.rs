@@ -272,14 +272,16 @@ impl<const M: usize> Task<'_, M> {
             return Ok(phases);
         }
         let own = Between::new(path, ends);
-        let problem = path_problem::Problem {
-            geometry: &own,
-            limits: self.limits,
-            caps: caps_between(caps, ends),
-            ends: states,
-        };
+        let within = |cap: &SpeedCap| SpeedCap { s: own.within(cap.s), ..*cap };
+        let caps: Vec<SpeedCap> = caps_between(caps, ends).iter().map(within).collect();
+        let problem =
+            path_problem::Problem { geometry: &own, limits: self.limits, caps: &caps, ends: states };
         let moves = moving(self.problem, path, ends);
-        let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort })?;
+        let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort });
+        let plan = plan.map_err(|fault| match fault {
+            path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
+            fault => fault,
+        })?;
         phases.push_profile(self.problem, &own.path, &self.limits.jerk, &plan.profile);
         // The phases are kept until all stretches of the subrun are planned.
         phases.phases.shrink_to_fit();
@@ -288,7 +290,7 @@ impl<const M: usize> Task<'_, M> {
         if plan.iterations > 0.0 {
             phases.excess.push(plan.excess);
         }
-        self.kinks(path, junctions, |s| plan.profile.at(s)[0], ends, &mut phases);
+        self.kinks(path, junctions, |s| plan.profile.at(own.within(s))[0], ends, &mut phases);
         Ok(phases)
     }
 
