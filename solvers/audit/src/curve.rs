@@ -50,6 +50,24 @@ pub struct Followed<'a> {
     pub dwell: &'a [f64],
 }
 
+#[cfg(test)]
+impl<'a> Followed<'a> {
+    /// A path of one piece, without a limit of the feed.
+    pub fn of_one(pieces: Pieces<'a>) -> Self {
+        Self {
+            pieces,
+            feed: &[f64::INFINITY; super::FEEDS],
+            line: &[1],
+            moves: &[0, 0],
+            tolerance: &[0.0],
+            runs: &[0, 1],
+            new_words: &[false],
+            start_dwell: 0.0,
+            dwell: &[0.0],
+        }
+    }
+}
+
 impl<'a> std::ops::Deref for Followed<'a> {
     type Target = Pieces<'a>;
 

@@ -356,33 +356,9 @@ mod tests {
             let (control, offsets, width) = (points.concat(), [0, points.len()], [width]);
             let pieces =
                 Pieces { axes: 2, stride: 2, control: &control, weights, offsets: &offsets, width: &width };
-            let path = Followed {
-                pieces,
-                feed: &[],
-                line: &[1],
-                moves: &[0, 0],
-                tolerance: &[0.0],
-                runs: &[0, 1],
-                new_words: &[false],
-                start_dwell: 0.0,
-                dwell: &[0.0],
-            };
-            let phases = Phases {
-                piece: &[0],
-                kind: &[kind],
-                axis: &[axis],
-                value: &[value],
-                u0: &u[..1],
-                u1: &u[1..],
-                p0: &p[..1],
-                p1: &p[1..],
-                duration: &[1.0],
-                a0: &[0.0],
-                a1: &[0.0],
-                share: &[],
-                pieces: 1,
-                runs: &[0, 1],
-            };
+            let path = Followed::of_one(pieces);
+            let (kind, axis, value) = ([kind], [axis], [value]);
+            let phases = Phases::of_one(&kind, &axis, &value, &u, &p);
             let limits = Limits::none();
             let mut columns = Axes::new(&path, &limits);
             let motion = PhaseMotion::new(&phases, 0, &mut columns);

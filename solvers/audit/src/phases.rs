@@ -32,6 +32,35 @@ pub struct Phases<'a> {
     pub runs: &'a [i64],
 }
 
+#[cfg(test)]
+impl<'a> Phases<'a> {
+    /// The one phase of a path of one piece; it takes 1 s.
+    pub fn of_one(
+        kind: &'a [u8; 1],
+        axis: &'a [u8; 1],
+        value: &'a [f64; 1],
+        u: &'a [f64; 2],
+        p: &'a [f64; 2],
+    ) -> Self {
+        Self {
+            piece: &[0],
+            kind,
+            axis,
+            value,
+            u0: &u[..1],
+            u1: &u[1..],
+            p0: &p[..1],
+            p1: &p[1..],
+            duration: &[1.0],
+            a0: &[0.0],
+            a1: &[0.0],
+            share: &[],
+            pieces: 1,
+            runs: &[0, 1],
+        }
+    }
+}
+
 /// Numbers of the laws; see `feedplan.profile.PhaseLaw`.
 pub const AXIS_ACCELERATION: u8 = 0;
 pub const PARAMETER_ACCELERATION: u8 = 1;

@@ -260,17 +260,8 @@ mod tests {
         ) {
             let control: Vec<f64> = (0..=degree).flat_map(|i| [i as f64, bends[i]]).collect();
             let (offsets, width) = ([0, degree + 1], [degree as f64]);
-            let path = Followed {
-                pieces: Pieces { axes: 2, stride: 2, control: &control, weights: &[], offsets: &offsets, width: &width },
-                feed: &[f64::INFINITY; FEEDS],
-                line: &[1],
-                moves: &[0, 0],
-                tolerance: &[0.0],
-                runs: &[0, 1],
-                new_words: &[false],
-                start_dwell: 0.0,
-                dwell: &[0.0],
-            };
+            let pieces = Pieces { axes: 2, stride: 2, control: &control, weights: &[], offsets: &offsets, width: &width };
+            let path = Followed::of_one(pieces);
             let [width] = width;
             let from = 0.8 * width * cut[0];
             let u = [from, from + 0.2 * width * (0.1 + 0.9 * cut[1])];
@@ -279,22 +270,8 @@ mod tests {
             let mut columns = Axes::new(&path, &free);
             let curve = columns.curve(0).clone();
             let p = [0, 1].map(|i| (speeds[i] / length(&curve.derivative(u[i]))).powi(2));
-            let phases = Phases {
-                piece: &[0],
-                kind: &[kind],
-                axis: &[255],
-                value: &[speeds[0] * speeds[0]],
-                u0: &u[..1],
-                u1: &u[1..],
-                p0: &p[..1],
-                p1: &p[1..],
-                duration: &[1.0],
-                a0: &[0.0],
-                a1: &[0.0],
-                share: &[],
-                pieces: 1,
-                runs: &[0, 1],
-            };
+            let (kind, value) = ([kind], [speeds[0] * speeds[0]]);
+            let phases = Phases::of_one(&kind, &[255], &value, &u, &p);
             let motion = phases.by_length(0, &mut columns).unwrap();
             let mut most = [[0.0_f64; 2]; 3];
             for i in 0..=2000 {

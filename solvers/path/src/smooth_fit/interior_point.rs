@@ -12,8 +12,8 @@
 //! being the density of the energy (`pace`): the intervals converge together, which takes about half as many iterations.
 //!
 //! What happens at one place of the curve fades along it. So each group of four intervals, a quad, has its own μ and its own
-//! length of the step, where one for the whole window would be the least of all: a single corner would stop the others. The
-//! lengths differ little from one quad to the next, and what the rows then miss is made good by the next steps.
+//! length of the step. One length for the whole window would be the least of all, so that a single corner would stop the others.
+//! Lengths of neighbours differ little. Where they differ, slacks do not fit their rows exactly; the next steps correct that.
 
 use fearless_simd::{dispatch, Level, Simd};
 use feedplan_geometry::lanes::{Lanes, Register};

@@ -24,7 +24,8 @@ const BENT: f64 = 0.25;
 const FITTED_BENT: f64 = 0.35;
 /// which is at most so many times the length from which a chord is long.
 const MOST_BENT: f64 = 4.0;
-/// The slack that rows of held coefficients have at least, in parts of their limits: other windows meet rows nearly.
+/// The least slack of a row with held coefficients, in parts of its limit: the window that they come from may exceed the limit a
+/// little.
 const ROOM: f64 = 0.01;
 /// In place of a chord: the coefficient is free.
 pub const FREE: u32 = u32::MAX;
