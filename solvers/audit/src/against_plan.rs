@@ -17,7 +17,7 @@ pub const VELOCITY_SHARE: f64 = 1e-3;
 pub struct Comparison<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
-    columns: Box<dyn Columns<M> + 'a>,
+    columns: Columns<'a, M>,
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
@@ -61,12 +61,15 @@ impl<'a, const M: usize> Comparison<'a, M> {
             let rest = self.plan.path.width[nearest.place.piece] - nearest.place.u;
             let at_joint = nearest.place.u.min(rest) <= PLACE_TOLERANCE;
             for k in 0..self.columns.count() {
-                // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
-                let unknown = 2.0 * (limits.acceleration.greatest(k) * away).sqrt() + velocity.rounding[k];
-                let off = (recorded[k] - velocity.value[k]).abs() - unknown;
+                let off = (recorded[k] - velocity.value[k]).abs();
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
-                tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
+                if !tally.is_passed(Check::RecordedVelocity, k, off, limit) {
+                    // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
+                    let unknown =
+                        2.0 * (limits.acceleration.greatest(k) * away).sqrt() + velocity.rounding[k];
+                    tally.offer(Check::RecordedVelocity, k, off - unknown, limit, row.t, row.line);
+                }
             }
         }
         if row.acceleration.is_some() && self.columns.are_axes() {
@@ -99,7 +102,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
         let (time, line, has_chord) = (row.t, row.line, limits.chord_tolerance.is_finite());
         let (from, to) = (before.nearest.place, row.nearest.place);
-        let columns = &mut *self.columns;
+        let columns = &mut self.columns;
         let tips = [before, row].map(|row| columns.tip(row.nearest.place.piece, row.nearest.place.u, &row.q));
         let (mut ways, mut least_times, mut error_sq) = ([0.0; FEEDS], [0.0; FEEDS], 0.0_f64);
         // Where the tool of joints stands still from one run to the next, each side has a chord of its own.
@@ -117,7 +120,11 @@ impl<'a, const M: usize> Comparison<'a, M> {
             if !is_first && stops(piece) {
                 chord_start = last;
             }
-            if has_chord && end > start {
+            // Between two places of one piece no chord is farther from it than this.
+            let sagitta = 0.125 * curve.bounds()[0] * (end - start) * (end - start);
+            let is_flat =
+                is_first && is_last && tally.is_passed(Check::Chord, 0, sagitta, limits.chord_tolerance);
+            if has_chord && end > start && !is_flat {
                 let chord_end = if !is_last && stops(piece + 1) { next } else { tips[1] };
                 let counted = |point: &[f64; M]| -> [f64; M] { vector_of(|k| axes[k] * point[k]) };
                 let chord = Segment::new(&counted(&chord_start), &counted(&chord_end));
@@ -202,7 +209,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
         let mut corners = 0.0;
         for piece in self.begun([rows[0], rows[2]]) {
-            let columns = &mut *self.columns;
+            let columns = &mut self.columns;
             let into = columns.place(piece - 1, self.plan.path.width[piece - 1]).slope.value;
             let out = columns.place(piece, 0.0).slope.value;
             let (a, b) = (length(&into), length(&out));

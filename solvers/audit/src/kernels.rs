@@ -1,10 +1,9 @@
 //! The audits for 3, 6 and 9 axes, compiled here, so that crates that call them compile nothing. Axes beyond the machine's own
 //! rest and change nothing.
 
-use crate::columns::Axes;
+use crate::columns::Columns;
 use crate::curve::Followed;
 use crate::deviation::{audit_deviation, audit_path};
-use crate::joints::columns::JointColumns;
 use crate::joints::path::JointPath;
 use crate::joints::travel::audit_travel;
 use crate::moves::Programmed;
@@ -61,7 +60,7 @@ macro_rules! kernels {
                 seen: Seen,
             ) -> Tally<$count> {
                 let of = Audited { junction_speed, phases, limits: self, starts: &phases.starts(path) };
-                audit_profile(&of, &|| Box::new(Axes::new(path, self)), seen)
+                audit_profile(&of, &|| Columns::new(path, self, None), seen)
             }
 
             fn joint_profile(
@@ -73,7 +72,7 @@ macro_rules! kernels {
             ) -> Tally<$count> {
                 let starts = &phases.starts(&joints.path);
                 let of = Audited { junction_speed, phases, limits: self, starts };
-                audit_profile(&of, &|| Box::new(JointColumns::new(joints, self)), seen)
+                audit_profile(&of, &|| Columns::new(&joints.path, self, Some(joints)), seen)
                     .merge(audit_travel(joints, *phases, starts, self))
             }
 

@@ -232,12 +232,18 @@ impl<const M: usize> Tally<M> {
         time: impl FnOnce() -> f64,
     ) {
         // Most values change nothing, and a product is had sooner than a ratio.
-        let known = self.worst[check as usize][axis].ratio;
-        if known >= 0.0 && value < known * limit {
+        if self.is_passed(check, axis, value, limit) {
             return;
         }
         let ratio = if value <= 0.0 { 0.0 } else { value / limit };
         self.offer_share(check, axis, (value, limit, ratio), line, time);
+    }
+
+    /// Whether a value up to `most` changes nothing; what is not a number always does.
+    #[inline(always)]
+    pub fn is_passed(&self, check: Check, axis: usize, most: f64, limit: f64) -> bool {
+        let known = self.worst[check as usize][axis].ratio;
+        known >= 0.0 && most < known * limit
     }
 
     /// The same of value, limit and their ratio.

@@ -6,6 +6,7 @@ use super::phase_motion::{PhaseMotion, State, ROUNDING};
 use super::phases::Phases;
 use super::speed_by_length::Pace;
 use super::station::Rounded;
+use super::vectors::vector_of;
 
 /// Halvings until a place is known as closely as its numbers.
 const MOST_STEPS: u32 = 53;
@@ -31,13 +32,13 @@ pub struct Passage<const M: usize> {
     pub since: f64,
     pub doubt: f64,
     pub velocity: Rounded<M>,
-    /// The motion along the path where it is known by the length.
-    pace: Option<Pace>,
+    /// Where it follows from the place at once: on phases by length; any where the path has no direction.
+    acceleration: Option<Rounded<M>>,
 }
 
 impl<const M: usize> Motion<M> {
     /// Of phase `i`, whose numbers must be good.
-    pub fn new(phases: &Phases, i: usize, columns: &mut dyn Columns<M>) -> Self {
+    pub fn new(phases: &Phases, i: usize, columns: &mut Columns<M>) -> Self {
         let law = match phases.by_length(i, columns) {
             Some(motion) => Law::ByLength(motion),
             None => Law::ByParameter(PhaseMotion::new(phases, i, columns)),
@@ -46,37 +47,50 @@ impl<const M: usize> Motion<M> {
         Self { piece: phases.piece[i] as usize, u, duration: phases.duration[i], law }
     }
 
-    pub fn passage(&self, u: f64, columns: &mut dyn Columns<M>) -> Passage<M> {
+    pub fn passage(&self, u: f64, columns: &mut Columns<M>) -> Passage<M> {
         match &self.law {
             Law::ByLength(motion) => {
-                let (here, place) = (motion.place(u), columns.place(self.piece, u));
-                let since = motion.since(&here);
-                let root_p = if place.way_slope > 0.0 { here.pace.v / place.way_slope } else { 0.0 };
-                let velocity = State::new(place, root_p, ROUNDING).velocity;
-                Passage { u, since, doubt: ROUNDING * since.abs(), velocity, pace: Some(here.pace) }
+                let here = motion.place(u);
+                let (since, Pace { v, .. }) = (motion.since(&here), here.pace);
+                let (velocity, acceleration) = match columns.station(self.piece, u) {
+                    Some(station) => {
+                        let Rounded { value, rounding } = station.velocity(v);
+                        let rounding = vector_of(|k| rounding[k] + ROUNDING * value[k].abs());
+                        (Rounded { value, rounding }, station.acceleration(here.pace))
+                    }
+                    None => {
+                        let place = columns.place(self.piece, u);
+                        let root_p = if place.way_slope > 0.0 { v / place.way_slope } else { 0.0 };
+                        let any = Rounded { value: [0.0; M], rounding: [f64::INFINITY; M] };
+                        (State::new(place, root_p, ROUNDING).velocity, any)
+                    }
+                };
+                Passage {
+                    u,
+                    since,
+                    doubt: ROUNDING * since.abs(),
+                    velocity,
+                    acceleration: Some(acceleration),
+                }
             }
             Law::ByParameter(motion) => {
                 let here = motion.at(u, columns);
                 let [since, doubt] = motion.since(&here, self.duration, columns);
-                Passage { u, since, doubt, velocity: here.velocity, pace: None }
+                Passage { u, since, doubt, velocity: here.velocity, acceleration: None }
             }
         }
     }
 
-    /// Accelerations at a place; any where the path has no direction.
-    pub fn acceleration(&self, here: &Passage<M>, columns: &mut dyn Columns<M>) -> Rounded<M> {
-        match (&self.law, here.pace) {
+    /// Accelerations at a place of this phase.
+    pub fn acceleration(&self, here: &Passage<M>, columns: &mut Columns<M>) -> Rounded<M> {
+        match (&self.law, here.acceleration) {
             (Law::ByParameter(motion), _) => motion.acceleration_near(here.u, columns),
-            (_, Some(pace)) => match columns.station(self.piece, here.u) {
-                Some(station) => station.acceleration(pace),
-                None => Rounded { value: [0.0; M], rounding: [f64::INFINITY; M] },
-            },
-            _ => Rounded { value: [f64::NAN; M], rounding: [0.0; M] },
+            (_, known) => known.unwrap_or(Rounded { value: [f64::NAN; M], rounding: [0.0; M] }),
         }
     }
 
     /// u at a time since the start of the phase.
-    pub fn place_at(&self, time: f64, columns: &mut dyn Columns<M>) -> f64 {
+    pub fn place_at(&self, time: f64, columns: &mut Columns<M>) -> f64 {
         let [mut low, mut high] = self.u;
         for _ in 0..MOST_STEPS {
             let middle = 0.5 * (low + high);

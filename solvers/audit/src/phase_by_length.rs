@@ -9,7 +9,7 @@ use super::curve::Curve;
 use super::quadrature::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
 use super::speed_by_length::{Bounds, Pace, SpeedByLength};
 use super::station::Station;
-use super::vectors::{inner, length, vector_of};
+use super::vectors::{inner, length, times};
 use super::{EPS, ROUNDINGS};
 
 /// An interval on which the rule is good: the distance of its start from the anchor and the length up to there, and the same of
@@ -77,7 +77,7 @@ impl<const M: usize> PhaseByLength<M> {
     /// |C'| at a distance from the anchor, as the axes count.
     fn slope(&self, d: f64) -> f64 {
         let tangent = self.curve.derivative(if self.anchored_at_end { self.u[1] - d } else { self.u[0] + d });
-        length(&vector_of::<M>(|k| self.scale[k] * tangent[k]))
+        length(&times(&self.scale, &tangent))
     }
 
     /// Adds the lengths of parts between two distances from the anchor.
@@ -206,7 +206,7 @@ impl<const M: usize> PhaseByLength<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vectors::distance;
+    use crate::vectors::{distance, vector_of};
 
     #[test]
     fn at_rest_where_the_tangent_vanishes_the_length_starts_with_the_cube_of_the_time() {

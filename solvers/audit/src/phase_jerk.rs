@@ -45,7 +45,7 @@ impl<const M: usize> Jerks<'_, M> {
     }
 
     /// The step of the acceleration from phase `i` to phase `j`, the next one in its run.
-    pub fn joint(&self, [i, j]: [usize; 2], columns: &mut dyn Columns<M>, line: i32, tally: &mut Tally<M>) {
+    pub fn joint(&self, [i, j]: [usize; 2], columns: &mut Columns<M>, line: i32, tally: &mut Tally<M>) {
         let (phases, limits, time) = (self.phases, self.limits, self.starts[j]);
         let (Some(before), Some(after)) =
             (phases.end_acceleration(i, true), phases.end_acceleration(j, false))

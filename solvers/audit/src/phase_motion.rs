@@ -86,7 +86,7 @@ impl<const M: usize> State<M> {
 
 impl<const M: usize> PhaseMotion<M> {
     /// Phase `i`, whose numbers must be good.
-    pub fn new(phases: &Phases, i: usize, columns: &mut dyn Columns<M>) -> Self {
+    pub fn new(phases: &Phases, i: usize, columns: &mut Columns<M>) -> Self {
         let (piece, kind, k) = (phases.piece[i] as usize, phases.kind[i], phases.axis[i] as usize);
         let (u, p, value) = ([phases.u0[i], phases.u1[i]], [phases.p0[i], phases.p1[i]], phases.value[i]);
         let share = if kind == FEED { phases.counted(i) } else { [1.0; M] };
@@ -116,7 +116,7 @@ impl<const M: usize> PhaseMotion<M> {
             SPEED_LINE => Law::Speed { speed_sq },
             _ => Law::Speed { speed_sq: [value; 2] },
         };
-        let whole = columns.path().width[piece];
+        let whole = columns.path.width[piece];
         let anchor = State::new(place, root_p, ROUNDING);
         let mut motion = Self { law, u, p, whole, anchored_at_end, anchor, share };
         let by_law = motion.state(place, columns);
@@ -168,7 +168,7 @@ impl<const M: usize> PhaseMotion<M> {
     }
 
     /// The motion at u.
-    pub fn at(&self, u: f64, columns: &mut dyn Columns<M>) -> State<M> {
+    pub fn at(&self, u: f64, columns: &mut Columns<M>) -> State<M> {
         if u == self.anchor.place.u {
             return self.anchor;
         }
@@ -176,7 +176,7 @@ impl<const M: usize> PhaseMotion<M> {
         self.state(place, columns)
     }
 
-    fn state(&self, place: Place<M>, columns: &mut dyn Columns<M>) -> State<M> {
+    fn state(&self, place: Place<M>, columns: &mut Columns<M>) -> State<M> {
         match self.law {
             Law::Column { k, start_sq, error, twice } => {
                 let (mut speed_sq, mut error_sq) = (start_sq, 0.0);
@@ -238,7 +238,7 @@ impl<const M: usize> PhaseMotion<M> {
     }
 
     /// The time between two states, and its relative error.
-    pub fn time(&self, [a, b]: [&State<M>; 2], columns: &mut dyn Columns<M>) -> [f64; 2] {
+    pub fn time(&self, [a, b]: [&State<M>; 2], columns: &mut Columns<M>) -> [f64; 2] {
         let step = (b.place.u - a.place.u).abs();
         if step == 0.0 {
             return [0.0; 2];
@@ -277,13 +277,13 @@ impl<const M: usize> PhaseMotion<M> {
     }
 
     /// Time since the start of the phase, which takes `duration`, and its error in s.
-    pub fn since(&self, here: &State<M>, duration: f64, columns: &mut dyn Columns<M>) -> [f64; 2] {
+    pub fn since(&self, here: &State<M>, duration: f64, columns: &mut Columns<M>) -> [f64; 2] {
         let [time, doubt] = self.time([&self.anchor, here], columns);
         [if self.anchored_at_end { duration - time } else { time }, time * doubt]
     }
 
     /// Accelerations near u as a difference quotient over a small part of the phase, less where p changes fast.
-    pub fn acceleration_near(&self, u: f64, columns: &mut dyn Columns<M>) -> Rounded<M> {
+    pub fn acceleration_near(&self, u: f64, columns: &mut Columns<M>) -> Rounded<M> {
         let beside = (u - self.u[0]).min(self.u[1] - u);
         let half = f64::min(NEAR * self.width(), OF_TURN * self.way_to_turn(u, columns));
         let half = half.min(beside.max(AT_END * self.width()));
@@ -299,7 +299,7 @@ impl<const M: usize> PhaseMotion<M> {
     }
 
     /// About how far from u the column of the law turns round, or the path where the speed along it is given: p changes fast there.
-    fn way_to_turn(&self, u: f64, columns: &mut dyn Columns<M>) -> f64 {
+    fn way_to_turn(&self, u: f64, columns: &mut Columns<M>) -> f64 {
         let inwards = if u < 0.5 * (self.u[0] + self.u[1]) { AT_END } else { -AT_END };
         let step = inwards * self.width();
         let [here, there] = [u, u + step].map(|u| columns.place(self.anchor.place.piece, u).slope.value);
@@ -333,14 +333,13 @@ impl<const M: usize> PhaseMotion<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::columns::Axes;
     use crate::curve::{Curve, Followed, Pieces};
     use crate::polygon::Polygon;
     use crate::Limits;
 
     /// One phase on one piece in X and Y, and what it is on.
     struct Phase<'a> {
-        columns: Axes<'a, 2>,
+        columns: Columns<'a, 2>,
         motion: PhaseMotion<2>,
         u: [f64; 2],
     }
@@ -360,7 +359,7 @@ mod tests {
             let (kind, axis, value) = ([kind], [axis], [value]);
             let phases = Phases::of_one(&kind, &axis, &value, &u, &p);
             let limits = Limits::none();
-            let mut columns = Axes::new(&path, &limits);
+            let mut columns = Columns::new(&path, &limits, None);
             let motion = PhaseMotion::new(&phases, 0, &mut columns);
             check(&mut Phase { columns, motion, u });
         }

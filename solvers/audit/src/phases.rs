@@ -4,6 +4,7 @@ use super::columns::Columns;
 use super::curve::Followed;
 use super::phase_by_length::PhaseByLength;
 use super::speed_by_length::{Pace, SpeedByLength};
+use super::vectors::{length, times};
 use super::{EPS, ROUNDINGS};
 
 /// The profile's arrays, one entry a phase; see `feedplan.profile.SpeedProfile`.
@@ -125,28 +126,21 @@ impl Phases<'_> {
     }
 
     /// Whether the speed on phase `i` is known by the length of the path.
-    pub fn is_by_length<const M: usize>(&self, i: usize, columns: &dyn Columns<M>) -> bool {
+    pub fn is_by_length<const M: usize>(&self, i: usize, columns: &Columns<M>) -> bool {
         let kind = self.kind[i];
         matches!(kind, PATH_JERK | SPEED_CUBIC)
             || (kind == FEED && columns.are_axes() && self.counted::<M>(i) == [1.0; M])
     }
 
     /// Phase `i` on its piece, where its speed is known by the length of the path; its numbers must be good.
-    pub fn by_length<const M: usize>(
-        &self,
-        i: usize,
-        columns: &mut dyn Columns<M>,
-    ) -> Option<PhaseByLength<M>> {
+    pub fn by_length<const M: usize>(&self, i: usize, columns: &mut Columns<M>) -> Option<PhaseByLength<M>> {
         if !self.is_by_length(i, columns) {
             return None;
         }
         let (kind, piece, u) = (self.kind[i], self.piece[i] as usize, [self.u0[i], self.u1[i]]);
-        let (curve, scale) = (columns.curve(piece).clone(), columns.scale());
-        let mut slope = |u: f64| match columns.station(piece, u) {
-            Some(station) => station.slope,
-            None => columns.place(piece, u).way_slope,
-        };
-        let mut speeds = [slope(u[0]) * self.p0[i].sqrt(), slope(u[1]) * self.p1[i].sqrt()];
+        let (scale, curve) = (columns.scale(), columns.curve(piece).clone());
+        let slopes = u.map(|u| length(&times(&scale, &curve.derivative(u))));
+        let mut speeds = [slopes[0] * self.p0[i].sqrt(), slopes[1] * self.p1[i].sqrt()];
         // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
         let anchored_at_end = kind != FEED && speeds[1] < speeds[0];
         let mut a = [self.a0[i], self.a1[i]];

@@ -52,7 +52,7 @@ pub struct Audited<'a, const M: usize> {
 /// The whole profile: phases, joints, ends of runs. Each thread makes columns of its own.
 pub fn audit_profile<'a, const M: usize>(
     of: &Audited<M>,
-    columns: &(dyn Fn() -> Box<dyn Columns<M> + 'a> + Sync),
+    columns: &(dyn Fn() -> Columns<'a, M> + Sync),
     seen: Seen,
 ) -> Tally<M> {
     let phases = of.phases;
@@ -60,27 +60,27 @@ pub fn audit_profile<'a, const M: usize>(
         let mut columns = columns();
         for i in block {
             tell(seen, i);
-            of.phase(i, &mut *columns, tally);
+            of.phase(i, &mut columns, tally);
             if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
-                of.joint([i - 1, i], &mut *columns, tally);
+                of.joint([i - 1, i], &mut columns, tally);
             }
         }
     });
     let mut order = Tally::default();
-    of.order(&mut *columns(), &mut order);
+    of.order(&mut columns(), &mut order);
     inside.merge(order)
 }
 
 impl<const M: usize> Audited<'_, M> {
-    fn phase(&self, i: usize, columns: &mut dyn Columns<M>, tally: &mut Tally<M>) {
+    fn phase(&self, i: usize, columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
-        let line = columns.path().line_of(piece);
+        let line = columns.path.line_of(piece);
         if !phases.has_good_numbers(i, columns.count()) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return;
         }
-        let width = columns.path().width[piece];
+        let width = columns.path.width[piece];
         let u = [phases.u0[i], phases.u1[i]];
         if u[1] <= u[0] || u[0] < 0.0 || u[1] > width * (1.0 + ROUNDINGS * EPS) {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
@@ -165,7 +165,7 @@ impl<const M: usize> Audited<'_, M> {
         &self,
         i: usize,
         ends: [Option<&Look<M>>; 2],
-        columns: &mut dyn Columns<M>,
+        columns: &mut Columns<M>,
         line: i32,
         tally: &mut Tally<M>,
     ) {
@@ -184,7 +184,7 @@ impl<const M: usize> Audited<'_, M> {
         i: usize,
         motion: &PhaseMotion<M>,
         ends: &[State<M>; 2],
-        columns: &mut dyn Columns<M>,
+        columns: &mut Columns<M>,
         line: i32,
         tally: &mut Tally<M>,
     ) {
@@ -210,12 +210,12 @@ impl<const M: usize> Audited<'_, M> {
         [i, side]: [usize; 2],
         (speeds, rates, rounding): ([f64; 2], &[f64; M], &[f64; M]),
         slope: f64,
-        columns: &mut dyn Columns<M>,
+        columns: &mut Columns<M>,
         line: i32,
         tally: &mut Tally<M>,
     ) {
         let phases = self.phases;
-        let way = ROUNDINGS * EPS * columns.path().width[phases.piece[i] as usize] * slope;
+        let way = ROUNDINGS * EPS * columns.path.width[phases.piece[i] as usize] * slope;
         let time = self.starts[i] + side as f64 * phases.duration[i];
         for k in 0..columns.count() {
             let rate = rates[k].abs();
@@ -228,19 +228,19 @@ impl<const M: usize> Audited<'_, M> {
     }
 
     /// A jump of the velocity of a column that means nothing on phase `i`.
-    fn negligible(&self, i: usize, k: usize, columns: &dyn Columns<M>) -> f64 {
+    fn negligible(&self, i: usize, k: usize, columns: &Columns<M>) -> f64 {
         self.limits.negligible_jump(k, columns.settling(self.phases.duration[i]))
     }
 
-    fn jerks(&self, columns: &dyn Columns<M>) -> Jerks<'_, M> {
+    fn jerks(&self, columns: &Columns<M>) -> Jerks<'_, M> {
         let Self { phases, limits, starts, .. } = *self;
         Jerks { phases, limits, starts, smooth: columns.smooth() }
     }
 
     /// Phases must follow each other without gap over every piece, and runs begin and end at rest.
-    fn order(&self, columns: &mut dyn Columns<M>, tally: &mut Tally<M>) {
+    fn order(&self, columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let Self { phases, starts, .. } = *self;
-        let order = PhaseOrder { path: columns.path(), phases, starts, axes: columns.count() };
+        let order = PhaseOrder { path: &columns.path, phases, starts, axes: columns.count() };
         if !order.audit(tally) {
             return;
         }
@@ -256,21 +256,21 @@ impl<const M: usize> Audited<'_, M> {
     }
 
     /// The place at an end of phase `i`, and √p there.
-    fn end(&self, [i, side]: [usize; 2], columns: &mut dyn Columns<M>) -> (Place<M>, f64) {
+    fn end(&self, [i, side]: [usize; 2], columns: &mut Columns<M>) -> (Place<M>, f64) {
         let phases = self.phases;
         let (u, p) = if side == 0 { (phases.u0[i], phases.p0[i]) } else { (phases.u1[i], phases.p1[i]) };
         (columns.place(phases.piece[i] as usize, u), p.sqrt())
     }
 
     /// The change from one phase to the next: no jump of the speed, and of the velocities only at corners.
-    fn joint(&self, [i, j]: [usize; 2], columns: &mut dyn Columns<M>, tally: &mut Tally<M>) {
+    fn joint(&self, [i, j]: [usize; 2], columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let phases = self.phases;
         if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, columns.count())) {
             return; // reported with the phase itself
         }
         let pieces = [i, j].map(|phase| phases.piece[phase] as usize);
         let [before, after] = pieces;
-        let (time, line) = (self.starts[j], columns.path().line_of(after));
+        let (time, line) = (self.starts[j], columns.path.line_of(after));
         let states = [[i, 1], [j, 0]].map(|end| {
             let (mut place, root_p) = self.end(end, columns);
             // Between two pieces the control points' own rounding turns the tangent.
@@ -303,22 +303,16 @@ impl<const M: usize> Audited<'_, M> {
         for junction in before + 1..=after {
             let allowed = self.junction_speed[junction] + slack;
             tally.offer(Check::Junction, 0, fastest, allowed, time, line);
-            if !columns.path().is_motionless(junction) {
+            if !columns.path.is_motionless(junction) {
                 break;
             }
         }
     }
 
     /// The speed at the start or the end of a run.
-    fn run_end(
-        &self,
-        [i, side]: [usize; 2],
-        wanted: f64,
-        columns: &mut dyn Columns<M>,
-        tally: &mut Tally<M>,
-    ) {
+    fn run_end(&self, [i, side]: [usize; 2], wanted: f64, columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let (place, root_p) = self.end([i, side], columns);
-        let line = columns.path().line_of(place.piece);
+        let line = columns.path.line_of(place.piece);
         let (state, duration) = (State::new(place, root_p, 0.0), self.phases.duration[i]);
         let [speed, _] = columns.speed(CHORD, &state.velocity, state.tip());
         let off = (speed - wanted).abs() - ROUNDINGS * EPS * (speed + wanted);
@@ -332,9 +326,9 @@ impl<const M: usize> Audited<'_, M> {
 }
 
 /// Walks one phase and offers what it meets.
-struct Probe<'a, const M: usize> {
+struct Probe<'a, 'b, const M: usize> {
     motion: &'a PhaseMotion<M>,
-    columns: &'a mut dyn Columns<M>,
+    columns: &'a mut Columns<'b, M>,
     limits: &'a Limits<M>,
     tally: &'a mut Tally<M>,
     feeds: [f64; FEEDS],
@@ -348,7 +342,7 @@ struct Probe<'a, const M: usize> {
     halvings: u32,
 }
 
-impl<const M: usize> Probe<'_, M> {
+impl<const M: usize> Probe<'_, '_, M> {
     fn state(&mut self, y: f64) -> State<M> {
         self.motion.at(self.motion.parameter(y), self.columns)
     }

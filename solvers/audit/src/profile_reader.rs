@@ -22,7 +22,7 @@ pub struct Reader<'a, const M: usize> {
     clock: ProfileClock<'a>,
     phase: usize,
     run: usize,
-    pub columns: Box<dyn Columns<M> + 'a>,
+    pub columns: Columns<'a, M>,
     motion: Motion<M>,
     /// Where it was last.
     last: Option<(Place, Passage<M>)>,
@@ -30,8 +30,8 @@ pub struct Reader<'a, const M: usize> {
 
 impl<'a, const M: usize> Reader<'a, M> {
     /// On the first phase; there must be one, and a run of the path for it.
-    pub fn new(clock: &ProfileClock<'a>, mut columns: Box<dyn Columns<M> + 'a>) -> Self {
-        let motion = Motion::new(&clock.phases, 0, &mut *columns);
+    pub fn new(clock: &ProfileClock<'a>, mut columns: Columns<'a, M>) -> Self {
+        let motion = Motion::new(&clock.phases, 0, &mut columns);
         let mut reader = Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None };
         reader.enter(0);
         reader
@@ -45,7 +45,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     }
 
     fn motion_of(&mut self, phase: usize) -> Motion<M> {
-        Motion::new(&self.clock.phases, phase, &mut *self.columns)
+        Motion::new(&self.clock.phases, phase, &mut self.columns)
     }
 
     fn ends(&self, phase: usize) -> [f64; 2] {
@@ -67,7 +67,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
         let (phases, phase) = (&self.clock.phases, self.phase);
         let u = if phases.piece[phase] as usize == place.piece { place.u } else { phases.u0[phase] };
-        let passage = self.motion.passage(u, &mut *self.columns);
+        let passage = self.motion.passage(u, &mut self.columns);
         self.last = Some((place, passage));
         passage
     }
@@ -86,7 +86,7 @@ impl<'a, const M: usize> Reader<'a, M> {
             self.enter(phase);
         }
         let ends = self.ends(phase);
-        let u = self.motion.place_at(since, &mut *self.columns).clamp(ends[0], ends[1]);
+        let u = self.motion.place_at(since, &mut self.columns).clamp(ends[0], ends[1]);
         (self.clock.phases.piece[phase] as usize, ends, u)
     }
 
@@ -121,11 +121,8 @@ impl<'a, const M: usize> Reader<'a, M> {
             };
         }
         if here.u >= phases.u1[phase] && phase + 1 == clock.phases_of(run).end {
-            until = clock
-                .run_starts
-                .get(run + 1)
-                .copied()
-                .unwrap_or(end + self.columns.path().dwell[run] + period);
+            until =
+                clock.run_starts.get(run + 1).copied().unwrap_or(end + self.columns.path.dwell[run] + period);
         }
         [from, until]
     }
@@ -179,8 +176,8 @@ impl<'a, const M: usize> Reader<'a, M> {
             return None;
         }
         let motion = self.motion_of(phase);
-        let u = motion.place_at(since, &mut *self.columns);
-        let here = motion.passage(u, &mut *self.columns);
+        let u = motion.place_at(since, &mut self.columns);
+        let here = motion.passage(u, &mut self.columns);
         Some((motion, here, phase))
     }
 
@@ -188,7 +185,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     /// a setpoint does not tell the ways to and from it apart.
     fn acceleration_at(&mut self, time: f64) -> Option<[f64; M]> {
         let (motion, here, _) = self.motion_at(time)?;
-        Some(motion.acceleration(&here, &mut *self.columns).value)
+        Some(motion.acceleration(&here, &mut self.columns).value)
     }
 
     /// How far recorded accelerations are from those of the profile, at a place of the reader's phase or, where they are not
@@ -217,16 +214,16 @@ impl<'a, const M: usize> Reader<'a, M> {
                 range[k] = [range[k][0].min(value[k] - rounding[k]), range[k][1].max(value[k] + rounding[k])];
             }
         };
-        include(self.motion.acceleration(here, &mut *self.columns));
+        include(self.motion.acceleration(here, &mut self.columns));
         let switch = SWITCH_SHARE * period;
         let ProfileClock { phases, starts, .. } = self.clock;
         let time = time - self.clock.shift(self.run);
         let run = self.clock.phases_of(self.run);
         let mut neighbour = |phase: usize, at_end: bool| {
             let ends = [phases.u0[phase], phases.u1[phase]];
-            let motion = Motion::new(&phases, phase, &mut *self.columns);
-            let there = motion.passage(ends[usize::from(at_end)], &mut *self.columns);
-            include(motion.acceleration(&there, &mut *self.columns));
+            let motion = Motion::new(&phases, phase, &mut self.columns);
+            let there = motion.passage(ends[usize::from(at_end)], &mut self.columns);
+            include(motion.acceleration(&there, &mut self.columns));
         };
         let mut first = self.phase;
         while first > run.start.max(self.phase.saturating_sub(MOST_SWITCHES)) && time - starts[first] < switch

@@ -27,8 +27,9 @@ impl<const M: usize> Row<M> {
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest<const M: usize> {
     pub place: Place,
-    /// How far u went to it from the place of the setpoint before, where that is on the same piece.
+    /// How far u went to it from the place of the setpoint before, and how far it goes to the next one if that step changes as this one.
     pub step: f64,
+    pub next_step: f64,
     /// Greatest coordinate of the piece, in mm.
     pub magnitude: f64,
     /// Distance from the path, and along it from where the profile is at that time, in mm.
@@ -47,6 +48,7 @@ impl<const M: usize> Default for Nearest<M> {
         Self {
             place: Place { piece: 0, u: 0.0 },
             step: 0.0,
+            next_step: 0.0,
             magnitude: 0.0,
             off: 0.0,
             late: 0.0,

@@ -136,7 +136,7 @@ impl<const M: usize> View<'_, M> {
     /// The first setpoint must be the start of the path, at time 0.
     fn first(&self, tally: &mut Tally<M>) {
         let (Some(plan), row) = (self.plan, &self.differences.rows[0]) else { return };
-        let columns = &mut *plan.columns(self.differences.limits);
+        let columns = &mut plan.columns(self.differences.limits);
         let away = plan.distance_from_end(columns, (0, false), &row.q);
         tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, row.line);
         tally.offer(Check::Grid, 0, row.t.abs(), self.differences.uneven(), row.t, row.line);
@@ -147,7 +147,7 @@ impl<const M: usize> View<'_, M> {
         let (Some(plan), rows) = (self.plan, self.differences.rows) else { return };
         match rows.last() {
             Some(row) => {
-                let columns = &mut *plan.columns(self.differences.limits);
+                let columns = &mut plan.columns(self.differences.limits);
                 let away = plan.distance_from_end(columns, (plan.path.len() - 1, true), &row.q);
                 tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, row.line);
             }

@@ -4,9 +4,8 @@
 //! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
 //! that is early or late is the way that the profile moves in that time.
 
-use super::columns::{Axes, Columns};
+use super::columns::Columns;
 use super::curve::Followed;
-use super::joints::columns::JointColumns;
 use super::joints::path::JointPath;
 use super::moves::Programmed;
 use super::nearest::{Found, Place, Search};
@@ -25,10 +24,11 @@ const BLOCK: usize = 4096;
 /// clear, and a search for each would take very long.
 const MOST_ASTRAY: u32 = 64;
 
-/// Steps of Newton's method from a guess, and the length of the last one, in mm: the error after it is about the square of
-/// that over a radius of curvature.
+/// Steps of Newton's method from a guess, and the length of the last one, in mm, where nothing is known of C''. Where that is
+/// bounded the error of the place after a step of du is no more than 3/2 |C''| du², which may be so much, in mm.
 const MOST_GUESSES: usize = 6;
 const SETTLED: f64 = 1e-7;
+const MOST_ERROR: f64 = 1e-3 * PLACE_TOLERANCE;
 
 /// Steps towards the nearest place of a phase.
 const MOST_STEPS: usize = 12;
@@ -49,17 +49,14 @@ pub struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     /// What the setpoints are of.
-    pub fn columns<const M: usize>(&self, limits: &'a Limits<M>) -> Box<dyn Columns<M> + 'a> {
-        match self.joints {
-            Some(joints) => Box::new(JointColumns::new(joints, limits)),
-            None => Box::new(Axes::new(&self.path, limits)),
-        }
+    pub fn columns<const M: usize>(&self, limits: &'a Limits<M>) -> Columns<'a, M> {
+        Columns::new(&self.path, limits, self.joints)
     }
 
     /// Distance of a setpoint from the start or the end of a piece, less rounding.
     pub fn distance_from_end<const M: usize>(
         &self,
-        columns: &mut dyn Columns<M>,
+        columns: &mut Columns<M>,
         (piece, at_end): (usize, bool),
         q: &[f64; M],
     ) -> f64 {
@@ -81,7 +78,7 @@ impl<'a> Plan<'a> {
         let mut columns = self.columns(limits);
         let away = |run: usize, row: &Row<M>| {
             let end = (self.path.runs[run] as usize).checked_sub(1);
-            self.distance_from_end(&mut *columns, end.map_or((0, false), |piece| (piece, true)), &row.q)
+            self.distance_from_end(&mut columns, end.map_or((0, false), |piece| (piece, true)), &row.q)
         };
         profile.extend(&self.path, limits.period, rows, away, clock);
     }
@@ -133,7 +130,7 @@ struct Finder<'a, const M: usize> {
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
     /// Where there is no profile that has them.
-    columns: Option<Box<dyn Columns<M> + 'a>>,
+    columns: Option<Columns<'a, M>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
 }
@@ -149,10 +146,10 @@ impl<'a, const M: usize> Finder<'a, M> {
         Self { plan, limits, profile, columns, reach }
     }
 
-    fn columns(&mut self) -> &mut dyn Columns<M> {
+    fn columns(&mut self) -> &mut Columns<'a, M> {
         match (&mut self.profile, &mut self.columns) {
-            (Some(profile), _) => &mut *profile.columns,
-            (_, Some(columns)) => &mut **columns,
+            (Some(profile), _) => &mut profile.columns,
+            (_, Some(columns)) => columns,
             _ => unreachable!("one of both has them"),
         }
     }
@@ -181,7 +178,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         let close = PLACE_TOLERANCE + rounding;
         let guess = known
             .filter(|_| self.profile.is_some())
-            .and_then(|before| self.guess(from, before.nearest.step, &row.q, rounding));
+            .and_then(|before| self.guess(from, before.nearest.next_step, &row.q, rounding));
         let mut judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));
             (late - rounding).max(0.0)
@@ -195,10 +192,17 @@ impl<'a, const M: usize> Finder<'a, M> {
             None => self.by_time(from, row, rounding),
         };
         let place = found.place;
-        let step = if place.piece == from.piece { place.u - from.u } else { 0.0 };
+        // The parameter of every piece is in mm.
+        let passed = if place.piece == from.piece { 0.0 } else { path.width[from.piece] };
+        let step = passed + place.u - from.u;
+        let next_step = match known.map(|before| before.nearest.step) {
+            Some(before) if before > 0.0 => (2.0 * step - before).max(0.0),
+            _ => step,
+        };
         let late = if found.error.is_finite() { found.error } else { 0.0 };
         let off = found.distance - rounding;
-        let mut nearest = Nearest { place, step, magnitude, off, late, allowed, ..Nearest::default() };
+        let mut nearest =
+            Nearest { place, step, next_step, magnitude, off, late, allowed, ..Nearest::default() };
         if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
             nearest.velocity = here.velocity;
@@ -220,13 +224,14 @@ impl<'a, const M: usize> Finder<'a, M> {
                 if piece > from.piece + 1 || piece == path.len() {
                     return None;
                 }
-                u = 0.0;
+                u = (u - path.width[piece - 1]).min(path.width[piece]);
             }
+            let bend = columns.bend(piece);
             let [away, slope] = columns.toward(piece, u, q);
             let (square, along) = (inner(&slope, &slope), inner(&away, &slope));
             let (du, beside_sq) = (along / square, inner(&away, &away) - along * along / square);
             u += du;
-            if du.abs() * square.sqrt() <= SETTLED {
+            if du.abs() * square.sqrt() <= SETTLED || 1.5 * bend * du * du <= MOST_ERROR {
                 let least = if piece == from.piece { from.u } else { 0.0 };
                 let distance = beside_sq.max(0.0).sqrt();
                 u = settled(u, [0.0, path.width[piece]], rounding / square.sqrt());
@@ -243,7 +248,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             return Found { place: from, distance: f64::INFINITY, error: f64::INFINITY };
         };
         let (piece, ends, mut u) = profile.phase_at(row.t);
-        let columns = &mut *profile.columns;
+        let columns = &mut profile.columns;
         let [mut away, mut slope] = columns.toward(piece, u, &row.q);
         for _ in 0..MOST_STEPS {
             let square = inner(&slope, &slope);

@@ -39,6 +39,12 @@ pub fn inner<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     sum
 }
 
+/// The products by axis.
+#[inline(always)]
+pub fn times<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+    vector_of(|k| a[k] * b[k])
+}
+
 /// From `a` to `b`.
 #[inline(always)]
 pub fn from_to<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {

@@ -6,7 +6,7 @@ use super::formula::{Formula, Jet};
 use crate::columns::Place;
 use crate::curve::{Curve, Followed};
 use crate::station::{Rounded, Station};
-use crate::vectors::{curvature, length};
+use crate::vectors::{curvature, length, times};
 use crate::{EPS, ROUNDINGS};
 
 pub const TURN: f64 = 360.0;
@@ -130,10 +130,6 @@ impl JointPath<'_> {
             curve,
         }
     }
-}
-
-fn times<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
-    std::array::from_fn(|k| a[k] * b[k])
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

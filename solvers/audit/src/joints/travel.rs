@@ -5,8 +5,8 @@
 
 use std::rc::Rc;
 
-use super::columns::JointColumns;
 use super::path::{JointPath, Piece, TURN};
+use crate::columns::Columns;
 use crate::nearest::Place;
 use crate::phase_motion::ROUNDING;
 use crate::phases::Phases;
@@ -27,15 +27,14 @@ pub fn audit_travel<const M: usize>(
     starts: &[f64],
     limits: &Limits<M>,
 ) -> Tally<M> {
-    let (mut tally, mut columns) = (Tally::default(), JointColumns::new(of, limits));
-    let (mut work, path) = (of.work(), &of.path);
+    let (mut tally, mut work, path) = (Tally::default(), of.work(), &of.path);
     let nowhere = (f64::NAN, Place { piece: 0, u: 0.0 });
     let mut spans: [Span; M] = [[nowhere; 2]; M];
     let mut turns = [f64::NAN; M];
     // The last piece and its end, as the kinematics says and continuous.
     let mut last: Option<(Rc<Piece<M>>, [f64; M], [f64; M])> = None;
     for number in 0..path.len() {
-        let piece = columns.piece(number);
+        let piece = Rc::new(of.piece(number));
         let intervals = INTERVALS * piece.curve.turns();
         for i in 0..=intervals {
             let u = piece.width * (i as f64 / intervals as f64);
@@ -63,7 +62,7 @@ pub fn audit_travel<const M: usize>(
     }
     let clock = ProfileClock { phases, starts, run_starts: &[] };
     let mut reader =
-        phases.fits(path, of.joints).then(|| Reader::new(&clock, Box::new(JointColumns::new(of, limits))));
+        phases.fits(path, of.joints).then(|| Reader::new(&clock, Columns::new(path, limits, Some(of))));
     for k in 0..of.joints {
         let [lower, upper] = limits.travel[k];
         let [least, most] = spans[k];

@@ -53,8 +53,8 @@ enum Between {
 }
 
 /// Where and when a phase is, and the limits that hold there.
-pub struct Looker<'a, const M: usize> {
-    pub columns: &'a mut dyn Columns<M>,
+pub struct Looker<'a, 'b, const M: usize> {
+    pub columns: &'a mut Columns<'b, M>,
     pub piece: usize,
     pub motion: &'a PhaseByLength<M>,
     pub curve: &'a Curve<M>,
@@ -66,7 +66,7 @@ pub struct Looker<'a, const M: usize> {
     pub line: i32,
 }
 
-impl<const M: usize> Looker<'_, M> {
+impl<const M: usize> Looker<'_, '_, M> {
     /// Looks at a phase between two parameters, at which it has been looked.
     pub fn phase(&mut self, u: [f64; 2], ends: [Option<&Look<M>>; 2], tally: &mut Tally<M>) {
         // At most 1, as speeds are positive; a profile of rubbish has any numbers.
@@ -238,7 +238,6 @@ const RATES: [Check; 3] = [Check::Velocity, Check::Acceleration, Check::Jerk];
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::columns::Axes;
     use crate::curve::{Followed, Pieces};
     use crate::phases::{Phases, FEED, SPEED_CUBIC};
     use crate::vectors::length;
@@ -267,7 +266,7 @@ mod tests {
             let u = [from, from + 0.2 * width * (0.1 + 0.9 * cut[1])];
             let (kind, speeds) = if flat { (FEED, [speeds[0]; 2]) } else { (SPEED_CUBIC, speeds) };
             let (mut limits, free) = (Limits::none(), Limits::none());
-            let mut columns = Axes::new(&path, &free);
+            let mut columns = Columns::new(&path, &free, None);
             let curve = columns.curve(0).clone();
             let p = [0, 1].map(|i| (speeds[i] / length(&curve.derivative(u[i]))).powi(2));
             let (kind, value) = ([kind], [speeds[0] * speeds[0]]);
@@ -291,7 +290,7 @@ mod tests {
             (limits.jerk, limits.judges_jerk) = (jerk, true);
             let mut tally = Tally::default();
             let (feeds, covered) = ([f64::INFINITY; FEEDS], curve.turns() as f64 * (u[1] - u[0]) / width);
-            let (columns, motion, curve, limits) = (&mut columns as &mut dyn Columns<2>, &motion, &*curve, &limits);
+            let (columns, motion, curve, limits) = (&mut columns, &motion, &*curve, &limits);
             let mut looker =
                 Looker { columns, piece: 0, motion, curve, limits, feeds, covered, start: 0.0, line: 1 };
             let ends = u.map(|u| looker.look(u, &mut tally));
