@@ -4,8 +4,8 @@
 //! place of the path is at least its distance from the path: where it is small enough, the nearest place need not be searched.
 
 use super::curve::{Curves, Pieces};
-use super::nearest::Place;
-use super::vectors::{from_to, inner, length};
+use super::nearest::{step_towards, Place};
+use super::vectors::{from_to, length};
 
 /// Steps towards the nearest place; points come mostly in the order of the path, so that two are usual.
 const MOST_STEPS: usize = 8;
@@ -19,6 +19,11 @@ pub struct ClosePlaces<'a, const M: usize> {
 impl<'a, const M: usize> ClosePlaces<'a, M> {
     pub fn new(pieces: Pieces<'a>) -> Self {
         Self { curves: Curves::new(pieces), place: Place { piece: 0, u: 0.0 } }
+    }
+
+    /// The last place.
+    pub fn place(&self) -> Place {
+        self.place
     }
 
     /// The next search starts at this place.
@@ -38,37 +43,37 @@ impl<'a, const M: usize> ClosePlaces<'a, M> {
         q: &[f64; M],
         [least, most]: [usize; 2],
         close: impl Fn(usize) -> [f64; 2],
-    ) -> Option<(usize, f64)> {
-        let Place { mut piece, mut u } = self.place;
-        if piece < least || piece > most {
-            (piece, u) = (least, 0.0);
-        }
-        let mut nearest = (piece, f64::INFINITY);
+    ) -> Option<(Place, f64)> {
+        let mut place = if self.is_on([least, most]) { self.place } else { Place { piece: least, u: 0.0 } };
+        let (mut nearest, mut came_from) = ((place, f64::INFINITY), None);
         for _ in 0..MOST_STEPS {
-            let curve = self.curves.get(piece);
-            let ([point, tangent], width) = (curve.place(u), curve.width());
+            let [point, slope] = self.curves.get(place.piece).place(place.u);
             let away = from_to(&point, q);
             let distance = length(&away);
-            self.place = Place { piece, u };
             if distance < nearest.1 {
-                nearest = (piece, distance);
+                nearest = (place, distance);
             }
-            if distance <= close(piece)[0] {
+            if distance <= close(place.piece)[0] {
                 break;
             }
-            let next = u + inner(&away, &tangent) / inner(&tangent, &tangent);
-            if next > width && u == width && piece < most {
-                (piece, u) = (piece + 1, 0.0);
-            } else if next < 0.0 && u == 0.0 && piece > least {
-                piece -= 1;
-                u = self.curves.get(piece).width();
-            } else if next.is_nan() || next.clamp(0.0, width) == u {
-                break;
-            } else {
-                u = next.clamp(0.0, width);
+            let mut next = place.moved(step_towards(&away, &slope), self.curves.pieces.width, [least, most]);
+            if next.piece != place.piece {
+                // From one piece to another and back: where they meet is the nearest place.
+                if came_from == Some(next.piece) {
+                    let u =
+                        if next.piece < place.piece { 0.0 } else { self.curves.pieces.width[place.piece] };
+                    next = Place { u, ..place };
+                } else {
+                    came_from = Some(place.piece);
+                }
             }
+            if next == place {
+                break;
+            }
+            place = next;
         }
-        (nearest.1 <= close(nearest.0)[1]).then_some(nearest)
+        self.place = nearest.0;
+        (nearest.1 <= close(nearest.0.piece)[1]).then_some(nearest)
     }
 }
 
@@ -101,7 +106,7 @@ mod tests {
         let mut places = ClosePlaces::new(pieces);
         for (q, piece) in [([0.3, 0.01], 0), ([2.4, 0.01], 2), ([0.7, 0.0], 0), ([3.01, 0.6], 3)] {
             let (found, distance) = places.find(&q, [0, 3], |_| [0.0100001; 2]).unwrap();
-            assert!(found == piece && distance <= 0.0100001, "{q:?}: {found}, {distance}");
+            assert!(found.piece == piece && distance <= 0.0100001, "{q:?}: {found:?}, {distance}");
         }
         assert!(places.find(&[0.3, 0.01], [2, 3], |_| [0.5; 2]).is_none());
         assert!(places.find(&[0.3, 1.0], [0, 3], |_| [0.5; 2]).is_none());

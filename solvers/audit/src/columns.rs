@@ -1,7 +1,7 @@
 //! What limits are about, as functions of the parameter u of the pieces of a path: its axes, or joints that the recorded kinematics
 //! makes of them (`joints::columns`). What differs between the two is here: the checks of a profile and of setpoints are the same.
 
-use std::sync::Arc;
+use std::rc::Rc;
 
 use super::curve::{Curve, Curves, Followed};
 use super::joints::columns::JointColumns;
@@ -66,7 +66,7 @@ impl<'a, const M: usize> Columns<'a, M> {
     }
 
     /// The tool's path on a piece, and what each of its axes counts in its length.
-    pub fn curve(&mut self, piece: usize) -> &Arc<Curve<M>> {
+    pub fn curve(&mut self, piece: usize) -> &Rc<Curve<M>> {
         self.curves.get(piece)
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
 
-use std::sync::Arc;
+use std::rc::Rc;
 
 use super::hodographs::Hodographs;
 use super::polygon::Polygon;
@@ -156,8 +156,8 @@ impl Pieces<'_> {
 
 /// Pieces made ready one after the other: the last two are kept.
 pub struct Curves<'a, const M: usize> {
-    pieces: Pieces<'a>,
-    kept: [Option<(usize, Arc<Curve<M>>)>; 2],
+    pub pieces: Pieces<'a>,
+    kept: [Option<(usize, Rc<Curve<M>>)>; 2],
 }
 
 impl<'a, const M: usize> Curves<'a, M> {
@@ -165,15 +165,15 @@ impl<'a, const M: usize> Curves<'a, M> {
         Self { pieces, kept: [None, None] }
     }
 
-    pub fn get(&mut self, i: usize) -> &Arc<Curve<M>> {
+    pub fn get(&mut self, i: usize) -> &Rc<Curve<M>> {
         let is_kept =
-            |kept: &Option<(usize, Arc<Curve<M>>)>| matches!(kept, Some((number, _)) if *number == i);
+            |kept: &Option<(usize, Rc<Curve<M>>)>| matches!(kept, Some((number, _)) if *number == i);
         let place = self.kept.iter().position(is_kept).unwrap_or_else(|| {
             self.kept.swap(0, 1);
             self.kept[0] = None;
             0
         });
-        let (_, curve) = self.kept[place].get_or_insert_with(|| (i, Arc::new(self.pieces.curve(i))));
+        let (_, curve) = self.kept[place].get_or_insert_with(|| (i, Rc::new(self.pieces.curve(i))));
         curve
     }
 }

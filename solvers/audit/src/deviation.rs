@@ -129,10 +129,21 @@ pub(crate) fn audit_deviation<const M: usize>(
         }
     });
     let from_program = parallel::tally(program.len(), BLOCK, &|block, tally| {
-        let mut close = ClosePlaces::new(path.pieces);
+        let mut follow = Follow { path, close: ClosePlaces::new(path.pieces), last: None };
         for m in block {
             tell(seen, m);
-            move_to_pieces(path, program, (m, followers[m]), &times, &mut close, tally);
+            let (programmed, line) = (program.get(m), program.line[m]);
+            if !programmed.is_motion() {
+                continue;
+            }
+            let (first, last) = followers[m];
+            match path.len().checked_sub(1) {
+                None => tally.offer(Check::Deviation, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, line),
+                Some(end) => {
+                    let pieces = (first.min(end), last.min(end));
+                    follow.measure((&programmed, line), pieces, times[pieces.0], tally);
+                }
+            }
         }
     });
     let mut ends = Tally::default();
@@ -232,61 +243,99 @@ fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
     ranges
 }
 
-fn move_to_pieces<const M: usize>(
-    path: &Followed,
-    program: &Programmed,
-    (m, (first, last)): (usize, Followers),
-    times: &[f64],
-    close: &mut ClosePlaces<M>,
-    tally: &mut Tally<M>,
-) {
-    let programmed: Move<M> = program.get(m);
-    if !programmed.is_motion() {
-        return;
+/// Measures places of moves, one after the other, against the pieces that follow them.
+struct Follow<'a, const M: usize> {
+    path: &'a Followed<'a>,
+    close: ClosePlaces<'a, M>,
+    /// The point measured last, the place that is near it, and its distance from there, less rounding.
+    last: Option<([f64; M], Place, f64)>,
+}
+
+impl<const M: usize> Follow<'_, M> {
+    fn tolerance(&self, piece: usize) -> f64 {
+        self.path.tolerance[piece].max(GAP_TOLERANCE)
     }
-    let line = program.line[m];
-    if path.is_empty() {
-        tally.offer(Check::Deviation, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, line);
-        return;
-    }
-    let (first, last) = (first.min(path.len() - 1), last.min(path.len() - 1));
-    let (least, most) = (first.saturating_sub(1), (last + 1).min(path.len() - 1));
-    let places = programmed.places();
-    let rounding = ROUNDINGS * EPS * magnitude(&programmed.to);
-    let mut expected = first;
-    for i in 0..=places {
-        let q = programmed.at(i as f64 / places as f64);
-        // The nearest piece counts, measured by its own tolerance.
-        let mut nearest = (f64::INFINITY, f64::INFINITY, GAP_TOLERANCE);
-        let (enough, tolerance_of) =
-            (settled(tally), |piece: usize| path.tolerance[piece].max(GAP_TOLERANCE));
-        if let Some((piece, away)) =
-            close.find(&q, [least, most], |piece| [enough * tolerance_of(piece) + rounding; 2])
-        {
-            tally.offer(Check::Deviation, 0, away - rounding, tolerance_of(piece), times[first], line);
-            expected = piece;
-            continue;
+
+    /// A move that the pieces from `first` to `last` follow.
+    fn measure(
+        &mut self,
+        (programmed, line): (&Move<M>, i32),
+        (first, last): Followers,
+        time: f64,
+        tally: &mut Tally<M>,
+    ) {
+        let pieces = [first.saturating_sub(1), (last + 1).min(self.path.len() - 1)];
+        let places = programmed.places();
+        let rounding = ROUNDINGS * EPS * magnitude(&programmed.to);
+        let at = |own: &mut Self, i: usize, tally: &mut Tally<M>| {
+            let q = programmed.at(i as f64 / places as f64);
+            own.place(q, pieces, (time, line, rounding), tally)
+        };
+        let (from, away) = at(self, 0, tally);
+        if programmed.is_straight() {
+            let (to, away_there) = at(self, places, tally);
+            // The chord between both places is no farther from the move than its ends are, and the piece from its chord than this.
+            let sagitta = 0.125 * self.close.curves.get(to.piece).bounds()[0] * (to.u - from.u).powi(2);
+            let most = away.max(away_there) + sagitta;
+            if from.piece == to.piece && most <= settled(tally) * self.tolerance(to.piece) {
+                tally.samples += 2;
+                return;
+            }
+            self.close.start_at(from);
         }
-        for piece in outwards(expected, least, most) {
-            let tolerance = tolerance_of(piece);
-            let beyond = nearest.0 * tolerance + rounding;
-            if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond {
-                continue;
-            }
-            let (u, distance) = nearest_on_piece(close.curves.get(piece), &q);
-            let away = distance - rounding;
-            if away / tolerance < nearest.0 {
-                nearest = (away / tolerance, away, tolerance);
-                close.start_at(Place { piece, u });
-                expected = piece;
-            }
-            if nearest.0 <= enough {
-                break;
-            }
+        for i in 1..=places {
+            at(self, i, tally);
         }
-        tally.offer(Check::Deviation, 0, nearest.1, nearest.2, times[first], line);
+        tally.samples += places as u64 + 1;
     }
-    tally.samples += places as u64 + 1;
+
+    /// A place that is near a point of a move.
+    fn place(
+        &mut self,
+        q: [f64; M],
+        [least, most]: [usize; 2],
+        (time, line, rounding): (f64, i32, f64),
+        tally: &mut Tally<M>,
+    ) -> (Place, f64) {
+        // Most moves begin where one has ended.
+        let known =
+            self.last.filter(|(point, place, _)| *point == q && (least..=most).contains(&place.piece));
+        if let Some((_, place, away)) = known {
+            return (place, away);
+        }
+        let enough = settled(tally);
+        let (path, expected) = (self.path, self.close.place().piece);
+        let tolerance_of = |piece: usize| path.tolerance[piece].max(GAP_TOLERANCE);
+        let close = |piece: usize| [enough * tolerance_of(piece) + rounding; 2];
+        let (place, away) = match self.close.find(&q, [least, most], close) {
+            Some((place, distance)) => (place, distance - rounding),
+            None => {
+                // The nearest piece counts, measured by its own tolerance.
+                let mut nearest = (f64::INFINITY, Place { piece: least, u: 0.0 }, f64::INFINITY);
+                for piece in outwards(expected.clamp(least, most), least, most) {
+                    let tolerance = tolerance_of(piece);
+                    let beyond = nearest.0 * tolerance + rounding;
+                    if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond
+                    {
+                        continue;
+                    }
+                    let (u, distance) = nearest_on_piece(self.close.curves.get(piece), &q);
+                    let away = distance - rounding;
+                    if away / tolerance < nearest.0 {
+                        nearest = (away / tolerance, Place { piece, u }, away);
+                    }
+                    if nearest.0 <= enough {
+                        break;
+                    }
+                }
+                self.close.start_at(nearest.1);
+                (nearest.1, nearest.2)
+            }
+        };
+        tally.offer(Check::Deviation, 0, away, tolerance_of(place.piece), time, line);
+        self.last = Some((q, place, away));
+        (place, away)
+    }
 }
 
 /// When the tool enters each piece, and when it leaves the last one, in s.
@@ -313,6 +362,7 @@ fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {
 mod tests {
     use super::*;
     use crate::curve::Pieces;
+    use crate::moves::Shape;
     use crate::FEEDS;
 
     /// Two pieces of degree 2 along X, with numbers that may be none.
@@ -346,6 +396,29 @@ mod tests {
             assert!(numbers(3.0, &[1.0, 1.0, 1.0, 1.0, bad, 1.0], 2.0) > 1.0);
         }
         assert!(numbers(3.0, &[1.0, 1.0, 1.0, 1.0, -1.0, 1.0], 2.0) > 1.0);
+    }
+
+    #[test]
+    fn where_a_piece_is_off_a_straight_move_between_its_ends_is_measured() {
+        // From (0, 0) to (4, 0), half-way 0.5 beside the move.
+        let pieces = Pieces {
+            axes: 2,
+            stride: 2,
+            control: &[0.0, 0.0, 2.0, 1.0, 4.0, 0.0],
+            weights: &[],
+            offsets: &[0, 3],
+            width: &[4.0],
+        };
+        let path = Followed { tolerance: &[1.0], ..Followed::of_one(pieces) };
+        let programmed = Move { from: [0.0, 0.0], to: [4.0, 0.0], shape: Shape::Line };
+        for (known, found) in [(0.3, 0.5), (0.7, 0.7)] {
+            let mut tally = Tally::<2>::default();
+            tally.offer(Check::Deviation, 0, known, 1.0, 0.0, 0);
+            let mut follow = Follow { path: &path, close: ClosePlaces::new(pieces), last: None };
+            follow.measure((&programmed, 1), (0, 0), 0.0, &mut tally);
+            let ratio = tally.get(Check::Deviation, 0).ratio;
+            assert!((ratio - found).abs() < 1e-12, "{known}: {ratio}");
+        }
     }
 
     #[test]

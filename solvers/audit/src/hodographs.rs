@@ -9,6 +9,22 @@ use super::vectors::{inner, vector_of};
 /// Coefficients of a function of the piece, times binomials.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];
 
+/// n over i.
+const BINOMIALS: [[f64; MOST + 1]; MOST + 1] = {
+    let mut rows = [[0.0; MOST + 1]; MOST + 1];
+    let mut n = 0;
+    while n <= MOST {
+        rows[n][0] = 1.0;
+        let mut i = 1;
+        while i <= n {
+            rows[n][i] = rows[n - 1][i - 1] + rows[n - 1][i];
+            i += 1;
+        }
+        n += 1;
+    }
+    rows
+};
+
 #[derive(Clone, Debug)]
 pub struct Hodographs<const M: usize> {
     start: [f64; M],
@@ -160,16 +176,17 @@ fn derive<const M: usize>(
     let mut squares = [0.0_f64; 5];
     for order in 0..orders.min(degree + 1) {
         let count = degree - order;
-        let mut binomial = 1.0;
         for i in 0..=count {
-            if let Some(found) = found.get_mut(order) {
-                found[i] = vector_of(|k| binomial * rows[i][k]);
-            }
             squares[order] = squares[order].max(inner(&rows[i], &rows[i]));
-            binomial *= (count - i) as f64 / (i + 1) as f64;
         }
+        if let Some(found) = found.get_mut(order) {
+            for i in 0..=count {
+                found[i] = vector_of(|k| BINOMIALS[count][i] * rows[i][k]);
+            }
+        }
+        let scale = count as f64;
         for i in 0..count {
-            rows[i] = vector_of(|k| count as f64 * (rows[i + 1][k] - rows[i][k]));
+            rows[i] = vector_of(|k| scale * (rows[i + 1][k] - rows[i][k]));
         }
     }
     squares.map(f64::sqrt)

@@ -144,7 +144,12 @@ impl<const M: usize> Move<'_, M> {
 
     /// Whether the move goes anywhere.
     pub fn is_motion(&self) -> bool {
-        self.from != self.to || !matches!(self.shape, Shape::Line)
+        self.from != self.to || !self.is_straight()
+    }
+
+    /// Whether it goes straight from one end to the other.
+    pub fn is_straight(&self) -> bool {
+        matches!(self.shape, Shape::Line)
     }
 
     /// How many even places show the shape of the move: more on arcs and splines.
@@ -175,8 +180,8 @@ impl<const M: usize> Move<'_, M> {
             Shape::Arc(arc) => self.distance_to_arc(arc, q, enough[0]),
             Shape::Spline { pieces, first, last } => {
                 let found = close.as_mut().and_then(|close| close.find(q, [*first, *last], |_| enough));
-                if let Some((piece, away)) = found {
-                    *expected = piece;
+                if let Some((place, away)) = found {
+                    *expected = place.piece;
                     return away;
                 }
                 let (mut least, mut nearest) = (f64::INFINITY, 0.0);

@@ -1,7 +1,10 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
 use super::curve::{Curve, Followed};
-use super::vectors::distance;
+use super::vectors::{distance, inner};
+
+/// Pieces that one step passes: where a piece has no direction steps are of any length.
+const MOST_PASSED: usize = 8;
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,6 +12,32 @@ pub struct Place {
     pub piece: usize,
     /// Local parameter in mm.
     pub u: f64,
+}
+
+impl Place {
+    /// The place a step of u on, where pieces have these widths: what is left of the step on one goes on on the next one, in mm as
+    /// well, no farther than the pieces from `least` to `most` and the next few. A step that is not a number is none.
+    #[inline]
+    pub fn moved(self, step: f64, width: &[f64], [least, most]: [usize; 2]) -> Self {
+        let Self { mut piece, mut u } = self;
+        let (least, most) = (least.max(piece.saturating_sub(MOST_PASSED)), most.min(piece + MOST_PASSED));
+        u += if step.is_nan() { 0.0 } else { step };
+        while u > width[piece] && piece < most {
+            u -= width[piece];
+            piece += 1;
+        }
+        while u < 0.0 && piece > least {
+            piece -= 1;
+            u += width[piece];
+        }
+        Self { piece, u: u.max(0.0).min(width[piece]) }
+    }
+}
+
+/// The step of u by Newton's method towards the place nearest to a point, from one that is `away` from it and has this slope.
+#[inline]
+pub fn step_towards<const M: usize>(away: &[f64; M], slope: &[f64; M]) -> f64 {
+    inner(away, slope) / inner(slope, slope)
 }
 
 /// The first local minimum of the distance at or after `from`: its parameter and distance, and whether the
@@ -192,6 +221,16 @@ mod tests {
 
     fn next(from: Place, q: [f64; 2], judge: impl FnMut(Place) -> f64) -> Found {
         Search { path: &THERE_AND_BACK, reach: 20.0, close: 1e-9, judge, allowed: 1e-9 }.next_place(from, &q)
+    }
+
+    #[test]
+    fn a_step_goes_on_over_the_ends_of_pieces() {
+        let (place, width) = (Place { piece: 1, u: 2.0 }, [3.0; 5]);
+        let moved = |step: f64| place.moved(step, &width, [0, 3]);
+        assert_eq!(moved(0.5), Place { piece: 1, u: 2.5 });
+        assert_eq!([moved(5.0), moved(-3.0)], [Place { piece: 3, u: 1.0 }, Place { piece: 0, u: 2.0 }]);
+        assert_eq!([moved(99.0), moved(-99.0)], [Place { piece: 3, u: 3.0 }, Place { piece: 0, u: 0.0 }]);
+        assert_eq!(moved(f64::NAN), place);
     }
 
     #[test]

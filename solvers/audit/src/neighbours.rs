@@ -56,8 +56,7 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         points: impl Iterator<Item = [f64; M]> + Clone,
         enough: f64,
     ) -> Option<f64> {
-        let mut straight =
-            self.moves.iter().filter(|(_, programmed)| matches!(programmed.shape, Shape::Line));
+        let mut straight = self.moves.iter().filter(|(_, programmed)| programmed.is_straight());
         straight.find_map(|(_, programmed)| {
             let away = |q: [f64; M]| {
                 Some(programmed.distance(&q, &mut 0, [0.0; 2], None)).filter(|away| *away <= enough)

@@ -3,7 +3,7 @@
 //! Speed v, acceleration a and jerk j along the path come from the length (`speed_by_length`), the length from Kronrod's rule
 //! over |C'|; the rates of the axes from both and the place (`station`).
 
-use std::sync::Arc;
+use std::rc::Rc;
 
 use super::curve::Curve;
 use super::quadrature::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
@@ -42,7 +42,7 @@ pub struct Bulge {
 /// A phase ready to be evaluated at any u.
 #[derive(Clone)]
 pub struct PhaseByLength<const M: usize> {
-    curve: Arc<Curve<M>>,
+    curve: Rc<Curve<M>>,
     /// What each axis counts in the length.
     scale: [f64; M],
     u: [f64; 2],
@@ -58,7 +58,7 @@ pub struct PhaseByLength<const M: usize> {
 impl<const M: usize> PhaseByLength<M> {
     /// Between two parameters, with the speed that `speed` makes of the whole length; lengths and times count from the anchor.
     pub fn new(
-        curve: Arc<Curve<M>>,
+        curve: Rc<Curve<M>>,
         scale: [f64; M],
         u: [f64; 2],
         anchored_at_end: bool,
@@ -212,7 +212,7 @@ mod tests {
     fn at_rest_where_the_tangent_vanishes_the_length_starts_with_the_cube_of_the_time() {
         // x = u³ by s = t³: u̇ = 1, but at u = 0 both v and C' vanish.
         let points = [[0.0; 2], [0.0; 2], [0.0; 2], [1.0, 0.0]];
-        let curve = Arc::new(Curve::new(crate::polygon::Polygon::new(points.into_iter(), &[]), 1.0));
+        let curve = Rc::new(Curve::new(crate::polygon::Polygon::new(points.into_iter(), &[]), 1.0));
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
         let speed = |_| SpeedByLength::Jerk { start, duration: 1.0 };
         let phase = PhaseByLength::new(curve, [1.0; 2], [0.0, 1.0], false, 1.0, speed);
@@ -227,7 +227,7 @@ mod tests {
     #[test]
     fn nothing_between_two_places_is_farther_from_the_straight_line_than_its_bound() {
         let points = [[0.0, 0.0], [1.0, 0.3], [2.0, 0.9], [3.2, 0.8], [4.0, 0.1], [5.0, 0.4]];
-        let curve = Arc::new(Curve::new(crate::polygon::Polygon::new(points.into_iter(), &[]), 5.0));
+        let curve = Rc::new(Curve::new(crate::polygon::Polygon::new(points.into_iter(), &[]), 5.0));
         let speeds: [fn(f64) -> SpeedByLength; 4] = [
             |_| SpeedByLength::Constant { speed: 3.0 },
             |length| SpeedByLength::cubic([9.0, 4.0], [1.0, 2.0], length),

@@ -58,10 +58,13 @@ pub fn audit_profile<'a, const M: usize>(
     let phases = of.phases;
     let inside = parallel::tally(phases.len(), BLOCK, &|block, tally| {
         let mut columns = columns();
+        let good = |i: usize| phases.has_good_numbers(i, columns.count());
+        let mut is_good = block.start > 0 && good(block.start - 1);
         for i in block {
             tell(seen, i);
-            of.phase(i, &mut columns, tally);
-            if i > 0 && phases.runs.binary_search(&(i as i64)).is_err() {
+            let was_good = std::mem::replace(&mut is_good, of.phase(i, &mut columns, tally));
+            // What has no good numbers is reported with the phase itself.
+            if i > 0 && was_good && is_good && phases.runs.binary_search(&(i as i64)).is_err() {
                 of.joint([i - 1, i], &mut columns, tally);
             }
         }
@@ -72,19 +75,20 @@ pub fn audit_profile<'a, const M: usize>(
 }
 
 impl<const M: usize> Audited<'_, M> {
-    fn phase(&self, i: usize, columns: &mut Columns<M>, tally: &mut Tally<M>) {
+    /// A phase; whether its numbers, taken alone, can be measured.
+    fn phase(&self, i: usize, columns: &mut Columns<M>, tally: &mut Tally<M>) -> bool {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
         let line = columns.path.line_of(piece);
         if !phases.has_good_numbers(i, columns.count()) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
-            return;
+            return false;
         }
         let width = columns.path.width[piece];
         let u = [phases.u0[i], phases.u1[i]];
         if u[1] <= u[0] || u[0] < 0.0 || u[1] > width * (1.0 + ROUNDINGS * EPS) {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
-            return;
+            return true;
         }
         let width_rounding = EPS * width / (u[1] - u[0]);
         let by_length = phases.by_length(i, columns);
@@ -107,8 +111,8 @@ impl<const M: usize> Audited<'_, M> {
                 start,
                 line,
             };
-            let looks = u.map(|u| looker.look(u, tally));
-            let ends = looks.each_ref().map(Option::as_ref);
+            let (from, to) = (looker.look(u[0], tally), looker.look(u[1], tally));
+            let ends = [from.as_ref(), to.as_ref()];
             looker.phase(u, ends, tally);
             self.ends_by_length(i, ends, columns, line, tally);
             [motion.time(), 0.0]
@@ -138,6 +142,7 @@ impl<const M: usize> Audited<'_, M> {
             elapsed
         };
         self.duration(i, elapsed, width_rounding, line, tally);
+        true
     }
 
     /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share
@@ -191,15 +196,8 @@ impl<const M: usize> Audited<'_, M> {
         for (y, state) in ends.iter().enumerate() {
             let side = usize::from((y == 1) != motion.anchored_at_end);
             let speeds = [state.root_p, [self.phases.p0[i], self.phases.p1[i]][side].sqrt()];
-            // Where the column that governs the phase stands, the law tells no other one's velocity: p is the recorded one.
-            if speeds[0] != speeds[1] {
-                let (rates, rounding) = (&state.place.slope.value, &state.velocity.rounding);
-                self.recorded_end([i, side], (speeds, rates, rounding), 1.0, columns, line, tally);
-            } else {
-                for k in 0..columns.count() {
-                    tally.offer(Check::Jump, k, 0.0, self.negligible(i, k, columns), self.starts[i], line);
-                }
-            }
+            let (rates, rounding) = (&state.place.slope.value, &state.velocity.rounding);
+            self.recorded_end([i, side], (speeds, rates, rounding), 1.0, columns, line, tally);
         }
     }
 
@@ -220,10 +218,14 @@ impl<const M: usize> Audited<'_, M> {
         for k in 0..columns.count() {
             let rate = rates[k].abs();
             let [slow, fast] = [speeds[0].min(speeds[1]), speeds[0].max(speeds[1])].map(|speed| rate * speed);
-            let gained = 2.0 * self.limits.acceleration.greatest(k) * way * rate;
-            let reached = (slow * slow + gained).sqrt().max(slow);
-            let jump = fast - reached - rounding[k];
-            tally.offer(Check::Jump, k, jump, self.negligible(i, k, columns), time, line);
+            let (most, negligible) = (fast - slow - rounding[k], self.negligible(i, k, columns));
+            if most > 0.0 && !tally.is_passed(Check::Jump, k, most, negligible) {
+                let gained = 2.0 * self.limits.acceleration.greatest(k) * way * rate;
+                let reached = (slow * slow + gained).sqrt().max(slow);
+                tally.offer(Check::Jump, k, fast - reached - rounding[k], negligible, time, line);
+            } else {
+                tally.offer(Check::Jump, k, most, negligible, time, line);
+            }
         }
     }
 
@@ -265,12 +267,19 @@ impl<const M: usize> Audited<'_, M> {
     /// The change from one phase to the next: no jump of the speed, and of the velocities only at corners.
     fn joint(&self, [i, j]: [usize; 2], columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let phases = self.phases;
-        if [i, j].iter().any(|&phase| !phases.has_good_numbers(phase, columns.count())) {
-            return; // reported with the phase itself
-        }
         let pieces = [i, j].map(|phase| phases.piece[phase] as usize);
         let [before, after] = pieces;
         let (time, line) = (self.starts[j], columns.path.line_of(after));
+        if self.limits.judges_jerk && [i, j].iter().all(|&phase| phases.is_by_length(phase, columns)) {
+            self.jerks(columns).joint([i, j], columns, line, tally);
+        }
+        if before == after && phases.u1[i] == phases.u0[j] && phases.p1[i] == phases.p0[j] {
+            // One place, and one speed there.
+            for k in 0..columns.count() {
+                tally.offer(Check::Jump, k, 0.0, self.negligible(j, k, columns), time, line);
+            }
+            return;
+        }
         let states = [[i, 1], [j, 0]].map(|end| {
             let (mut place, root_p) = self.end(end, columns);
             // Between two pieces the control points' own rounding turns the tangent.
@@ -278,9 +287,6 @@ impl<const M: usize> Audited<'_, M> {
             place.slope.rounding = vector_of(|k| place.slope.rounding[k] + turned);
             State::new(place, root_p, 0.0)
         });
-        if self.limits.judges_jerk && [i, j].iter().all(|&phase| phases.is_by_length(phase, columns)) {
-            self.jerks(columns).joint([i, j], columns, line, tally);
-        }
         let [from, to] = states.each_ref().map(|state| &state.velocity);
         let at_corner = if before == after { 0.0 } else { 1.0 };
         for k in 0..columns.count() {

@@ -8,7 +8,7 @@ use super::columns::Columns;
 use super::curve::Followed;
 use super::joints::path::JointPath;
 use super::moves::Programmed;
-use super::nearest::{Found, Place, Search};
+use super::nearest::{step_towards, Found, Place, Search};
 use super::parallel;
 use super::phase_motion::ROUNDING;
 use super::profile_clock::ProfileClock;
@@ -213,31 +213,29 @@ impl<'a, const M: usize> Finder<'a, M> {
         nearest
     }
 
-    /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead, on the same piece or the
-    /// next one; none where that does not converge ahead of `from` or is not close.
+    /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead; none where that does not converge ahead of `from` or is not close.
     fn guess(&mut self, from: Place, step: f64, q: &[f64; M], rounding: f64) -> Option<(Place, f64)> {
-        let (mut piece, mut u) = (from.piece, from.u + step);
         let (path, columns) = (&self.plan.path, self.columns());
+        let pieces = [from.piece, path.len() - 1];
+        let mut place = from.moved(step, path.width, pieces);
         for _ in 0..MOST_GUESSES {
-            if u > path.width[piece] {
-                piece += 1;
-                if piece > from.piece + 1 || piece == path.len() {
-                    return None;
-                }
-                u = (u - path.width[piece - 1]).min(path.width[piece]);
-            }
-            let bend = columns.bend(piece);
-            let [away, slope] = columns.toward(piece, u, q);
-            let (square, along) = (inner(&slope, &slope), inner(&away, &slope));
-            let (du, beside_sq) = (along / square, inner(&away, &away) - along * along / square);
-            u += du;
-            if du.abs() * square.sqrt() <= SETTLED || 1.5 * bend * du * du <= MOST_ERROR {
+            let Place { piece, u } = place;
+            let ([away, slope], bend) = (columns.toward(piece, u, q), columns.bend(piece));
+            let (du, size) = (step_towards(&away, &slope), length(&slope));
+            if du.abs() * size <= SETTLED || 1.5 * bend * du * du <= MOST_ERROR {
                 let least = if piece == from.piece { from.u } else { 0.0 };
-                let distance = beside_sq.max(0.0).sqrt();
-                u = settled(u, [0.0, path.width[piece]], rounding / square.sqrt());
+                let distance = (inner(&away, &away) - (du * size).powi(2)).max(0.0).sqrt();
+                let u = settled(u + du, [0.0, path.width[piece]], rounding / size);
                 let good = least <= u && u <= path.width[piece] && distance <= PLACE_TOLERANCE + rounding;
-                return good.then_some((Place { piece, u }, distance));
+                if good {
+                    return Some((Place { piece, u }, distance));
+                }
             }
+            let next = place.moved(du, path.width, pieces);
+            if next == place {
+                break;
+            }
+            place = next;
         }
         None
     }
@@ -251,11 +249,10 @@ impl<'a, const M: usize> Finder<'a, M> {
         let columns = &mut profile.columns;
         let [mut away, mut slope] = columns.toward(piece, u, &row.q);
         for _ in 0..MOST_STEPS {
-            let square = inner(&slope, &slope);
-            let step = inner(&away, &slope) / square;
+            let step = step_towards(&away, &slope);
             let next = (u + if step.is_nan() { 0.0 } else { step }).clamp(ends[0], ends[1]);
             // Steps below the rounding of the place would change the time next to rest.
-            if step.abs() * square.sqrt() <= rounding || next == u {
+            if step.abs() * length(&slope) <= rounding || next == u {
                 break;
             }
             let there = columns.toward(piece, next, &row.q);

@@ -1,7 +1,6 @@
 //! Joints that are not the path's axes, as columns by the parameter of the tool's path: see `columns`.
 
 use std::rc::Rc;
-use std::sync::Arc;
 
 use super::path::{JointPath, Piece, Work};
 use crate::columns::Place;
@@ -35,7 +34,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     }
 
     /// A piece of the path, on its curve.
-    pub fn piece(&mut self, number: usize, curve: &Arc<Curve<M>>) -> Rc<Piece<'a, M>> {
+    pub fn piece(&mut self, number: usize, curve: &Rc<Curve<M>>) -> Rc<Piece<'a, M>> {
         let is_here = |kept: &Option<Rc<Piece<M>>>| kept.as_ref().is_some_and(|piece| piece.number == number);
         if !is_here(&self.pieces[0]) {
             self.pieces.swap(0, 1);
@@ -54,7 +53,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         self.of.scale()
     }
 
-    pub fn place(&mut self, curve: &Arc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
+    pub fn place(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
         let last = self.last.filter(|place| place.piece == piece && place.u == u);
         let known = last.or_else(|| self.known(piece, u).map(|(place, _)| *place));
         let place = known.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.work));
@@ -62,7 +61,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         place
     }
 
-    pub fn station(&mut self, curve: &Arc<Curve<M>>, piece: usize, u: f64) -> Station<M> {
+    pub fn station(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Station<M> {
         if let Some((_, station)) = self.known(piece, u) {
             return *station;
         }
@@ -72,7 +71,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         found.1
     }
 
-    pub fn way(&mut self, curve: &Arc<Curve<M>>, from: &Place<M>, to: &Place<M>) -> Rounded<M> {
+    pub fn way(&mut self, curve: &Rc<Curve<M>>, from: &Place<M>, to: &Place<M>) -> Rounded<M> {
         let value = self.piece(from.piece, curve).between(&from.position.value, &to.position.value, None);
         Rounded { value, rounding: vector_of(|k| from.position.rounding[k] + to.position.rounding[k]) }
     }
@@ -88,7 +87,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         last.between(a, b, Some(&first))
     }
 
-    pub fn toward(&mut self, curve: &Arc<Curve<M>>, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
+    pub fn toward(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
         let place = self.place(curve, piece, u);
         [self.piece(piece, curve).between(&place.position.value, q, None), place.slope.value]
     }

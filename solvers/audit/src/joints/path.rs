@@ -1,6 +1,6 @@
 //! Positions of the joints and their derivatives at places of the path of the tool's tip, by the formula of the kinematics.
 
-use std::sync::Arc;
+use std::rc::Rc;
 
 use super::formula::{Formula, Jet};
 use crate::columns::Place;
@@ -51,7 +51,7 @@ pub struct Piece<'a, const M: usize> {
     pub run: usize,
     pub line: i32,
     pub width: f64,
-    pub curve: Arc<Curve<M>>,
+    pub curve: Rc<Curve<M>>,
     words: &'a Words,
     /// The axes whose motion the feed limits, 1 or 0: X, Y, Z where these move, else the others.
     pub counts: [f64; M],
@@ -96,11 +96,11 @@ impl JointPath<'_> {
 
     /// A piece ready to be measured.
     pub fn piece<const M: usize>(&self, number: usize) -> Piece<'_, M> {
-        self.piece_on(number, Arc::new(self.path.curve::<M>(number)))
+        self.piece_on(number, Rc::new(self.path.curve::<M>(number)))
     }
 
     /// The same where its curve is at hand.
-    pub(super) fn piece_on<const M: usize>(&self, number: usize, curve: Arc<Curve<M>>) -> Piece<'_, M> {
+    pub(super) fn piece_on<const M: usize>(&self, number: usize, curve: Rc<Curve<M>>) -> Piece<'_, M> {
         let run = self.run_of(number);
         let words = &self.words[self.words_of[run]];
         let flag = |flags: &[bool], k: usize| flags.get(k).copied().unwrap_or(false);
