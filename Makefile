@@ -11,7 +11,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Modules that are compiled in each start of Python, instead of once, would take a tenth of a second each time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test native lint clippy page wheel docs bench campaign clean cargo
+.PHONY: demo test native lint clippy collected page wheel docs bench campaign clean cargo
 
 demo: $(VENV)/built $(PAGE)
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
@@ -19,8 +19,7 @@ demo: $(VENV)/built $(PAGE)
 	@echo "The report is out/vase/report.html"
 
 # Half of the time tests wait for the services and programs that they start: two of them share a processor.
-test: native lint $(PAGE)
-	$(BIN)/python -m mypy.stubtest feedplan._solvers
+test: native lint collected $(PAGE)
 	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN)))
 
 # They need no Python. They come first: the module links what has been compiled for them.
@@ -31,12 +30,17 @@ lint: clippy $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest feedplan._solvers
 	$(BIN)/lint-imports
 	cargo fmt --all --check --manifest-path solvers/Cargo.toml
 
 # It generates no code and waits for none: it runs beside the builds, in a folder of its own, at a lower priority.
 clippy: cargo
 	$(CARGO)/lint nice cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+
+# The tests are compiled here once, and not by each process that runs them.
+collected: $(VENV)/dev
+	@$(BIN)/pytest --collect-only --quiet --quiet >/dev/null
 
 page: $(PAGE)
 

@@ -15,7 +15,7 @@ NAME = "methods"
 EXACT = "bang-bang"
 # Most pieces for slow methods, which take minutes for more pieces.
 MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100, "ruckig": 100}
-QUICK = ("lemniscate", "spline-10")
+QUICK = ("spline-10",)
 # Relative accuracy and time limit [s] of solvers on meshes.
 ACCURACY, TIME_LIMIT = 1e-3, 10.0
 

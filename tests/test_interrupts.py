@@ -57,7 +57,7 @@ def machine() -> Machine:
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Long enough for several reports of progress in each stage."""
     place = tmp_path_factory.mktemp("wave") / "wave.ngc"
-    place.write_text(wave(20_000), encoding="ascii")
+    place.write_text(wave(8_000), encoding="ascii")
     return place
 
 
@@ -65,7 +65,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def long_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Long enough for reports of progress while reading."""
     place = tmp_path_factory.mktemp("wave") / "long.ngc"
-    place.write_text(wave(1_000_000), encoding="ascii")
+    place.write_text(wave(300_000), encoding="ascii")
     return place
 
 
@@ -179,7 +179,7 @@ def spent(work: Callable[[], Any], until: float = 0.0) -> float:
 def test_a_signal_ends_native_work_long_before_it_is_done(file: Path, machine: Machine) -> None:
     path = build_path(read_program(file, machine), machine, corners=Corners.SMOOTH)
     problem = build_problem(path, machine)
-    longer = read_gcode(wave(400_000), machine)
+    longer = read_gcode(wave(160_000), machine)
     for work in (
         lambda: build_path(longer, machine, corners=Corners.SMOOTH),
         lambda: planner("jerk-limited")(problem),

@@ -1,6 +1,6 @@
 /* Uses the page of the service as a person does, and writes what it sees as JSON:
    node page/test/page.mjs ADDRESS PROGRAM FOLDER [TOKEN]
-   Pictures and downloads go into the folder. */
+   Downloads go into the folder; with FEEDPLAN_PICTURES in the environment pictures too, in full size. */
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { basename, join } from "node:path";
@@ -9,6 +9,8 @@ import { chromium } from "playwright-core";
 const [, , address, program, folder, token] = process.argv;
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+// Pixels are computed by the processor: without pictures a quarter of them will do.
+const PICTURES = Boolean(process.env.FEEDPLAN_PICTURES), SCALE = PICTURES ? 1 : 0.5;
 const WIDE = { width: 1440, height: 1000 }, TABLET = { width: 1024, height: 1366 };
 const MACHINE = `name = "mine"  # the one in the hall
 controller = { type = "grbl", junction_deviation = 0.03 }
@@ -22,7 +24,7 @@ axes = [
 const facts = { requests: [], errors: [] };
 
 const browser = await chromium.launch({ executablePath: CHROMIUM, args: SOFTWARE, timeout: 180_000 });
-const page = await browser.newPage({ viewport: WIDE, acceptDownloads: true });
+const page = await browser.newPage({ viewport: WIDE, deviceScaleFactor: 0.5, acceptDownloads: true });
 page.setDefaultTimeout(60_000);
 page.on("request", (request) => facts.requests.push({ url: request.url(), hasToken: "authorization" in request.headers() }));
 page.on("pageerror", (error) => facts.errors.push(error.stack));
@@ -61,7 +63,7 @@ const coloured = (selector) => page.evaluate((place) => {
 const text = (selector) => page.locator(selector).textContent();
 const settled = () => page.waitForTimeout(300);
 const jobs = () => page.evaluate(async (given) => (await (await fetch("/v1/jobs", { headers: given ? { Authorization: `Bearer ${given}` } : {} })).json()).jobs, token ?? "");
-const picture = (name) => page.screenshot({ path: join(folder, `${name}.png`) });
+const picture = async (name) => PICTURES && page.screenshot({ path: join(folder, `${name}.png`) });
 
 // A machine file as people write them: comments, a table within a line, dotted and quoted keys.
 await page.locator("summary").first().click();
@@ -219,11 +221,14 @@ for (const id of ["save-setpoints", "save-report", "save-program"]) {
   facts.downloads.push(download.suggestedFilename());
 }
 
-// Dark, and on a tablet; nothing is wider than the page.
-await page.emulateMedia({ colorScheme: "dark" });
-await settled();
-await picture("dark");
-await page.emulateMedia({ colorScheme: "light" });
+if (PICTURES) {
+  await page.emulateMedia({ colorScheme: "dark" });
+  await settled();
+  await picture("dark");
+  await page.emulateMedia({ colorScheme: "light" });
+}
+
+// On a tablet nothing is wider than the page.
 await page.setViewportSize(TABLET);
 await settled();
 await picture("tablet");

@@ -36,7 +36,7 @@ def long_program(folder: Path) -> Path:
 
 
 def test_a_cluster_gives_the_files_of_this_computer(cluster: LocalCluster, tmp_path: Path) -> None:
-    programs = write(tmp_path, 12)
+    programs = write(tmp_path, 3)
     caller, bad = tmp_path / "caller.ngc", tmp_path / "bad.ngc"
     caller.write_text("G21 G90 F600 T1 M6 G43 H1\nO<pocket> call\n#1=99\nM98 P[#1+1]\nG1 Z1\nM2\n")
     (tmp_path / "pocket.ngc").write_text("O<pocket> sub\nG1 X5\nO<pocket> endsub\nM2\n")
@@ -57,19 +57,19 @@ def test_a_cluster_gives_the_files_of_this_computer(cluster: LocalCluster, tmp_p
         if one["error"] is None:
             folder = one["folder"]
             assert content(tmp_path / "here" / folder) == content(tmp_path / "there" / folder)
-    assert sum(row["error"] is None for row in rows(tmp_path / "there")) == 26
+    assert sum(row["error"] is None for row in rows(tmp_path / "there")) == 8
     cluster.wait_until_idle()
 
 
 def test_a_killed_worker_loses_no_plan(cluster: LocalCluster, tmp_path: Path) -> None:
-    programs = write(tmp_path / "in", 60)
+    programs = write(tmp_path / "in", 30)
     out = tmp_path / "out"
     process = start(*programs, "-o", out, *cluster.options)
     wait_for(lambda: out.exists() and len(list(out.iterdir())) > 3)
     cluster.kill_a_worker()
     done = end(process)
     assert (done.code, done.told) == (0, "")
-    assert len({row["folder"] for row in rows(out)}) == 60
+    assert len({row["folder"] for row in rows(out)}) == 30
     assert all((out / row["folder"] / "plan.json").exists() for row in rows(out))
 
 
