@@ -145,7 +145,10 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
     fn off_ends(&self, squares: [f64; 2]) -> [f64; 2] {
         let Phase { law, u0, u1, .. } = self.phase;
         let of_length = || {
-            let middle = self.path.square(law, 0.5 * (u0 + u1));
+            let middle = match self.measure {
+                Measure::Length { total, .. } => (total / (u1 - u0)).powi(2),
+                _ => self.path.square(law, 0.5 * (u0 + u1)),
+            };
             squares.map(|square| if square <= SLOW * middle { OFF_CUSP * (u1 - u0) } else { 0.0 })
         };
         match (&self.measure, &self.clock) {
@@ -187,10 +190,10 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
             return self.at(phase.u1);
         }
         let step = period / phase.duration;
-        let (part, clock_work) = match &self.clock {
-            Clock::Even(even) => (even.part(self.counts_from_start(done), done, left), Located::default()),
-            Clock::Jerk(jerk) => (jerk.part(done, left), Located::default()),
-            Clock::Cubic(cubic) => cubic.part(done, JERK_STEP_ERROR * step),
+        let (part, error) = match &self.clock {
+            Clock::Even(even) => (even.part(self.counts_from_start(done), done, left), 0.0),
+            Clock::Jerk(jerk) => (jerk.part(done, left), 0.0),
+            Clock::Cubic(cubic) => cubic.part(done, left),
             Clock::Line(line) => {
                 let found = line.place(&self.path, done, left, STEP_ERROR * step);
                 return State { pace: self.pace_of_line(line, found.u, t), ..state_of(found) };
@@ -200,15 +203,10 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         let pace = match &self.clock {
             Clock::Even(even) => even.pace(done, left, t),
             Clock::Jerk(jerk) => jerk.pace(done, left),
-            Clock::Cubic(cubic) => cubic.pace(clock_work.u, t),
+            Clock::Cubic(cubic) => cubic.pace(part, t),
             Clock::Line(_) => unreachable!("a speed line has returned"),
         };
-        State {
-            pace,
-            iterations: found.iterations.max(clock_work.iterations),
-            error: found.miss + clock_work.miss,
-            ..state_of(found)
-        }
+        State { pace, error: found.miss + error, ..state_of(found) }
     }
 
     /// Whether the part of the measure is counted from the start of the phase: always from the side where it grows slower.

@@ -19,7 +19,7 @@ use feedplan_planner::phases::Phase;
 /// C' vanishes at an end where |C'|² is below this part of that in the middle of the phase.
 pub const SLOW: f64 = 1e-8;
 /// Tables of lengths are built for this part of the phase's piece; a phase may be a small part of it.
-const ERROR: f64 = 0.125 * tolerance::TABLE;
+pub const ERROR: f64 = 0.125 * tolerance::TABLE;
 
 /// Whose length a law is about.
 #[derive(Clone, Debug)]
@@ -211,14 +211,22 @@ impl<const M: usize> Speeds<M> {
         }
     }
 
-    /// Over the root of v².
-    fn rate(&self, foot: f64, line: Line) -> Rate<'_, M> {
-        let source = match self {
+    /// The values alone.
+    fn source(&self) -> Source<'_, M> {
+        match self {
             Self::Tip { square, width } => Source::Tip(Tip { square, width: *width }),
             Self::Axes { coefficients, width } => {
-                let speed = Speed::new(coefficients.hodograph(), coefficients.denominator(), *width);
-                Source::Own(if foot.is_nan() { speed.without_foot() } else { speed.with_foot(foot) })
+                Source::Own(Speed::new(coefficients.hodograph(), coefficients.denominator(), *width))
             }
+        }
+    }
+
+    /// Over the root of v², with the bounds that tables are built by.
+    fn rate(&self, foot: f64, line: Line) -> Rate<'_, M> {
+        let source = match self.source() {
+            Source::Own(speed) if foot.is_nan() => Source::Own(speed.without_foot()),
+            Source::Own(speed) => Source::Own(speed.with_foot(foot)),
+            tip => tip,
         };
         Rate { source, line, foot }
     }
@@ -259,7 +267,8 @@ impl<const M: usize> Lengths<M> {
     }
 
     fn table(&self) -> Table<'_, Rate<'_, M>> {
-        Table { f: self.speeds.rate(self.foot, Line::ONE), nodes: &self.nodes }
+        let f = Rate { source: self.speeds.source(), line: Line::ONE, foot: self.foot };
+        Table { f, nodes: &self.nodes }
     }
 }
 
