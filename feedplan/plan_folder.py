@@ -63,7 +63,6 @@ def write_plan(
     from feedplan.report.figures import SetpointFigures, chart_data
     from feedplan.report.page import FILE as REPORT_FILE
     from feedplan.report.page import write_report
-    from feedplan.report.tool_motion import tool_motion
     from feedplan.report.tool_path import MANY_POINTS, POINTS
 
     formats = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")  # type: ignore[assignment]
@@ -87,7 +86,8 @@ def write_plan(
         (part(share, 0.0, SAMPLED), SAMPLED) if plan.audited else (of_stage(progress, "audit"), 0.0)
     )
     tell(reading, 0.0)
-    motion = tool_motion(plan.problem, part(reading, 0.0, LENGTHS))
+    motion = plan.problem.tool_motion
+    tell(reading, LENGTHS)
     setpoints = plan.setpoints()
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period, setpoints.events)

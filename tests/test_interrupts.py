@@ -57,7 +57,7 @@ def machine() -> Machine:
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Long enough for several reports of progress in each stage."""
     place = tmp_path_factory.mktemp("wave") / "wave.ngc"
-    place.write_text(wave(8_000), encoding="ascii")
+    place.write_text(wave(20_000), encoding="ascii")
     return place
 
 

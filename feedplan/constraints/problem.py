@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from feedplan._solvers import Problem as NativeProblem
 from feedplan.arguments import not_negative, number
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.geometry.corners import Corners
@@ -170,7 +171,7 @@ class Problem:
         return NativeProblem(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name not in ("native", "tool_motion")}
+        return {own.name: getattr(self, own.name) for own in fields(self)}
 
     @property
     def curve(self) -> CompositeCurve:
@@ -211,6 +212,11 @@ class Problem:
     def _uncut(self) -> Cut:
         count = len(self.path)
         return self.cut or Cut(self.path.curve, np.arange(count), np.tile([0.0, 1.0], (count, 1)))
+
+    @cached_property
+    def tool_motion(self) -> ToolMotion:
+        """The tool's motion along the path, with its length."""
+        return ToolMotion.along(self.path, self.way_units)
 
     @cached_property
     def way_curve(self) -> CompositeCurve | None:

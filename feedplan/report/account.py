@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from feedplan.constraints.problem import Problem
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.progress import Listener, part, tell
 from feedplan.report.activity import Activity, activity
 from feedplan.report.losses import Share, SlowLine, slowest_lines, time_per_limit
 from feedplan.report.stops import Stops, stops_by_cause
-from feedplan.report.tool_motion import ToolMotion, tool_motion
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def account(
     progress: Listener | None = None,
 ) -> Account:
     """The account of a profile on its path; `jerk` is true if the profile's method limits jerk."""
-    path, motion = problem.path, tool_motion(problem, part(progress, 0.0, 0.5))
+    path, motion = problem.path, problem.tool_motion
     lengths = motion.lengths
     tell(progress, 0.5)
     time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))

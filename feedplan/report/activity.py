@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem, feed_square
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
 from feedplan.report.limits import chord_speed, parameter_speed
-from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]

@@ -10,13 +10,13 @@ import numpy as np
 
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 from feedplan.report.account import Account
 from feedplan.report.activity import Activity
 from feedplan.report.limits import drawn_phases, limit_samples, samples_per_phase
 from feedplan.report.reduce import Envelope
-from feedplan.report.tool_motion import ToolMotion
 from feedplan.report.tool_path import POINTS, ToolPath
 from feedplan.setpoints import SetpointChunk
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
 from feedplan.constraints.problem import Problem, feed_square
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
-from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedplan.constraints.problem import Problem
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.report.activity import Activity
-from feedplan.report.tool_motion import ToolMotion
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
+from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.report.activity import Activity, path_position
 from feedplan.report.limits import parameter_speed
 from feedplan.report.reduce import Polyline
-from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import SetpointChunk
 
 # Most points of the tool path in a report.

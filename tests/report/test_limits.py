@@ -14,11 +14,10 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.report.limits import LimitSamples, limit_curve, limit_samples
-from feedplan.report.tool_motion import tool_motion
 
 
 def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
-    blocks = list(limit_samples(problem, profile, tool_motion(problem)))
+    blocks = list(limit_samples(problem, profile, problem.tool_motion))
     names = ("length", "speed", "acceleration", "feed", "velocity", "chord", "phase")
     return LimitSamples(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 

@@ -13,15 +13,14 @@ from feedplan.report.activity import NONE, activity
 from feedplan.report.losses import Share, SlowLine
 from feedplan.report.losses import slowest_lines as slowest_of
 from feedplan.report.losses import time_per_limit as time_of
-from feedplan.report.tool_motion import tool_motion
 
 
 def time_per_limit(problem: Any, profile: SpeedProfile) -> list[Share]:
-    return time_of(problem, activity(problem, profile, tool_motion(problem), False))
+    return time_of(problem, activity(problem, profile, problem.tool_motion, False))
 
 
 def slowest_lines(problem: Any, profile: SpeedProfile, count: int = 20) -> list[SlowLine]:
-    motion = tool_motion(problem)
+    motion = problem.tool_motion
     return slowest_of(problem, profile, motion, activity(problem, profile, motion, False), count)
 
 

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
+from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
-from feedplan.progress import Listener, tell
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +42,18 @@ class ToolMotion:
     table: CurveLength | None
     share: Floats | None
     turns: NDArray[np.bool_]
-    units: tuple[str, str] = ("mm", "deg")
+    units: tuple[str, str]
+
+    @classmethod
+    def along(cls, path: Path, units: tuple[str, str]) -> ToolMotion:
+        """The tool's motion along a path."""
+        curve, share = path.curve, None
+        turns = np.zeros(len(curve), dtype=bool)
+        if not set(path.axes) <= set(_GROUPS[0]):
+            share, turns = _counted(path)
+            weights = np.repeat(share, np.diff(curve.offsets), axis=0)
+            curve = replace(curve, control_points=curve.control_points * weights)
+        return cls(curve, CurveLength(curve) if len(curve) else None, share, turns, units)
 
     @property
     def unit(self) -> str:
@@ -77,24 +87,9 @@ class ToolMotion:
         return np.zeros(len(u)) if self.table is None else self.table.length(piece, u)
 
 
-def tool_motion(problem: Problem, progress: Listener | None = None) -> ToolMotion:
-    """The tool's motion along a problem's path, computed once and kept with the problem."""
-    kept: ToolMotion | None = vars(problem).get("tool_motion")
-    if kept is None:
-        kept = vars(problem)["tool_motion"] = _tool_motion(problem, progress)
-    tell(progress, 1.0)
-    return kept
-
-
-def _tool_motion(problem: Problem, progress: Listener | None) -> ToolMotion:
-    def motion(curve: CompositeCurve, share: Floats | None, turns: NDArray[np.bool_]) -> ToolMotion:
-        table = CurveLength(curve, progress=progress) if len(curve) else None
-        return ToolMotion(curve, table, share, turns, problem.way_units)
-
-    curve, axes = problem.path.curve, problem.path.axes
-    if set(axes) <= set(_GROUPS[0]):
-        return motion(curve, None, np.zeros(len(curve), dtype=bool))
-    points, first = curve.control_points, curve.offsets[:-1]
+def _counted(path: Path) -> tuple[Floats, NDArray[np.bool_]]:
+    """`ToolMotion.share` and `ToolMotion.turns` of a path with other axes than X, Y, Z."""
+    axes, points, first = path.axes, path.curve.control_points, path.curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
     rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
     lead = np.array([[name in group for name in axes] for group in _GROUPS])
@@ -102,6 +97,4 @@ def _tool_motion(problem: Problem, progress: Listener | None) -> ToolMotion:
     moves = ((extent > rounding)[:, None, :] & member).any(axis=2)
     counts = np.where(moves.any(axis=1), moves.argmax(axis=1), len(_GROUPS))
     scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
-    share = member[counts] * scale
-    points = points * np.repeat(share, np.diff(curve.offsets), axis=0)
-    return motion(replace(curve, control_points=points), share, counts == len(_GROUPS))
+    return member[counts] * scale, counts == len(_GROUPS)
