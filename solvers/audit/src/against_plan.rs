@@ -21,12 +21,14 @@ pub struct Comparison<'a, const M: usize> {
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
+    /// At most how far the piece is from one straight move, where no setpoint close to it changes the tally.
+    beside: Option<f64>,
 }
 
 impl<'a, const M: usize> Comparison<'a, M> {
     pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let columns = plan.columns(limits);
-        Self { plan, limits, columns, near: Neighbours::default(), piece: None }
+        Self { plan, limits, columns, near: Neighbours::default(), piece: None, beside: None }
     }
 
     /// What one setpoint shows: its distance from path and program, and what it records.
@@ -36,13 +38,20 @@ impl<'a, const M: usize> Comparison<'a, M> {
         tally.offer(Check::Place, 0, nearest.late, nearest.allowed, time, line);
         let (path, piece) = (&self.plan.path, nearest.place.piece);
         if let Some(program) = &self.plan.program {
+            let limit = path.tolerance[piece] + PLACE_TOLERANCE;
+            let enough = settled(tally) * limit;
             if self.piece != Some(piece) {
                 self.near.replace(program, window(path, piece, program.len()));
                 self.piece = Some(piece);
+                let points = path.rows(piece).map(|row| path.point(row));
+                self.beside = self.near.straight_beside(points, enough);
             }
-            let limit = path.tolerance[piece] + PLACE_TOLERANCE;
-            let away = self.near.distance(&row.q, [settled(tally) * limit + rounding; 2]);
-            tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
+            let is_beside =
+                nearest.is_good() && self.beside.is_some_and(|most| most + PLACE_TOLERANCE <= enough);
+            if !is_beside {
+                let away = self.near.distance(&row.q, [enough + rounding; 2]);
+                tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
+            }
         }
         if nearest.is_good() {
             self.recorded(row, rounding, tally);
@@ -64,16 +73,18 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 let off = (recorded[k] - velocity.value[k]).abs();
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
-                if !tally.is_passed(Check::RecordedVelocity, k, off, limit) {
-                    // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
-                    let unknown =
-                        2.0 * (limits.acceleration.greatest(k) * away).sqrt() + velocity.rounding[k];
+                // Over a way of `away`, to a turn and back from it, no velocity changes by more than the root of this.
+                let unknown_sq = 4.0 * limits.acceleration.greatest(k) * away;
+                if off * off <= unknown_sq {
+                    tally.offer(Check::RecordedVelocity, k, 0.0, limit, row.t, row.line);
+                } else {
+                    let unknown = unknown_sq.sqrt() + velocity.rounding[k];
                     tally.offer(Check::RecordedVelocity, k, off - unknown, limit, row.t, row.line);
                 }
             }
         }
-        if row.acceleration.is_some() && self.columns.are_axes() {
-            for k in 0..M {
+        if row.acceleration.is_some() {
+            for k in 0..self.columns.count() {
                 let limit = ACCELERATION_SHARE * limits.acceleration.least(k);
                 tally.offer(
                     Check::RecordedAcceleration,

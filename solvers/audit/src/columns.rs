@@ -41,9 +41,6 @@ pub struct Columns<'a, const M: usize> {
     pub path: Followed<'a>,
     pub limits: &'a Limits<M>,
     curves: Curves<'a, M>,
-    /// The last two stations of axes: a phase begins where the one before ends.
-    kept: [Option<(usize, Station<M>)>; 2],
-    older: usize,
     joints: Option<Box<JointColumns<'a, M>>>,
 }
 
@@ -51,7 +48,7 @@ impl<'a, const M: usize> Columns<'a, M> {
     /// The axes of a path, or the joints on it.
     pub fn new(path: &Followed<'a>, limits: &'a Limits<M>, joints: Option<&'a JointPath<'a>>) -> Self {
         let joints = joints.map(|of| Box::new(JointColumns::new(of)));
-        Self { path: *path, limits, curves: Curves::new(path.pieces), kept: [None, None], older: 0, joints }
+        Self { path: *path, limits, curves: Curves::new(path.pieces), joints }
     }
 
     /// Number of columns.
@@ -89,18 +86,11 @@ impl<'a, const M: usize> Columns<'a, M> {
 
     /// The same with derivatives by the length of the path; none where the piece has no direction.
     pub fn station(&mut self, piece: usize, u: f64) -> Option<Station<M>> {
-        if let Some(joints) = &mut self.joints {
-            return Some(joints.station(self.curves.get(piece), piece, u));
+        let curve = self.curves.get(piece);
+        match &mut self.joints {
+            Some(joints) => Some(joints.station(curve, piece, u)),
+            None => Station::new(curve, u),
         }
-        for (number, station) in self.kept.iter().flatten() {
-            if *number == piece && station.u == u {
-                return Some(*station);
-            }
-        }
-        let station = Station::new(self.curves.get(piece), u)?;
-        self.kept[self.older] = Some((piece, station));
-        self.older = 1 - self.older;
-        Some(station)
     }
 
     /// The way of each column from one place of a piece to another.
@@ -194,11 +184,11 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// The greatest |C''| of the columns on a piece; infinite where it is not known.
+    /// The greatest second derivative of the columns by u on a piece, of joints about; infinite where it is not known.
     pub fn bend(&mut self, piece: usize) -> f64 {
-        match self.are_axes() {
-            true => self.curves.get(piece).bounds()[0],
-            false => f64::INFINITY,
+        match &self.joints {
+            Some(joints) => joints.bend(piece),
+            None => self.curves.get(piece).bounds()[0],
         }
     }
 

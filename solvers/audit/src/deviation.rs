@@ -37,7 +37,7 @@ pub(crate) fn audit_path<const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let times = entry_times(path, phases);
-    parallel::tally(path.len(), BLOCK, &|block, tally| {
+    parallel::tally(&Tally::default(), path.len(), BLOCK, &|block, tally| {
         for i in block {
             tell(seen, i);
             let (time, line) = (times[i], path.line[i]);
@@ -121,14 +121,14 @@ pub(crate) fn audit_deviation<const M: usize>(
 ) -> Tally<M> {
     let times = entry_times(path, phases);
     let followers = followers(path, program.len());
-    let from_path = parallel::tally(path.len(), BLOCK, &|block, tally| {
+    let from_path = parallel::tally(&Tally::default(), path.len(), BLOCK, &|block, tally| {
         let mut near = Neighbours::default();
         for i in block {
             tell(seen, i);
             piece_to_moves(path, program, (&followers, &mut near), (i, times[i]), tally);
         }
     });
-    let from_program = parallel::tally(program.len(), BLOCK, &|block, tally| {
+    let from_program = parallel::tally(&from_path, program.len(), BLOCK, &|block, tally| {
         let mut follow = Follow { path, close: ClosePlaces::new(path.pieces), last: None };
         for m in block {
             tell(seen, m);

@@ -33,7 +33,7 @@ pub struct Passage<const M: usize> {
     pub doubt: f64,
     pub velocity: Rounded<M>,
     /// Where it follows from the place at once: on phases by length; any where the path has no direction.
-    acceleration: Option<Rounded<M>>,
+    pub acceleration: Option<Rounded<M>>,
 }
 
 impl<const M: usize> Motion<M> {

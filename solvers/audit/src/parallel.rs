@@ -22,13 +22,14 @@ pub fn each_part<T: Send>(items: &mut [T], size: usize, work: &(dyn Fn(usize, &m
     });
 }
 
-/// What `work` finds in blocks of so many of `count` things, in their order.
+/// What `work` finds in blocks of so many of `count` things, in their order, beside what is known.
 pub fn tally<const M: usize>(
+    known: &Tally<M>,
     count: usize,
     size: usize,
     work: &(dyn Fn(Range<usize>, &mut Tally<M>) + Sync),
 ) -> Tally<M> {
-    let mut found = vec![Tally::default(); count.div_ceil(size)];
+    let mut found = vec![Tally { samples: 0, ..known.clone() }; count.div_ceil(size)];
     each_part(&mut found, 1, &|number, part| {
         work(number * size..((number + 1) * size).min(count), &mut part[0]);
     });

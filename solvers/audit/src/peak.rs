@@ -3,10 +3,16 @@
 /// A peak above the places by less than this part is left out.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// Of a share with its sign at three places, each as far from the next: where it has a peak, up or down, that may be beyond all
-/// three and the `worst` so far, from −1 at the first place to 1 at the last.
+/// A share at a vertex, and where that is: from −1 at the first place to 1 at the last.
+pub struct Peak {
+    pub at: f64,
+    pub top: f64,
+}
+
+/// Of a share with its sign at three places, each as far from the next: the peak, up or down, that it may have beyond all three and
+/// the `worst` so far.
 #[inline(always)]
-pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<f64> {
+pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<Peak> {
     let (bend, slope) = (2.0 * b - a - c, c - a);
     if slope.abs() >= 2.0 * bend.abs() {
         return None;
@@ -15,7 +21,16 @@ pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<f64> {
     let most = a.abs().max(b.abs()).max(c.abs()).max(worst);
     // The true peak may be beyond the vertex: the third order shows the more, the more the three bend.
     let missed = bend * bend / most;
-    (top.abs() + missed > (1.0 + NEGLIGIBLE) * most).then_some(0.5 * slope / bend)
+    let peak = Peak { at: 0.5 * slope / bend, top };
+    (top.abs() + missed > (1.0 + NEGLIGIBLE) * most).then_some(peak)
+}
+
+impl Peak {
+    /// Whether the share beside the peak may be beyond the `worst` so far, where it is `found` at the vertex: about as far from that as
+    /// the parabola has been.
+    pub fn may_pass(&self, found: f64, worst: f64) -> bool {
+        found.abs() + (found - self.top).abs() > (1.0 + NEGLIGIBLE) * worst
+    }
 }
 
 #[cfg(test)]
@@ -26,11 +41,13 @@ mod tests {
     fn the_peak_of_a_parabola_is_its_vertex() {
         let of = |f: fn(f64) -> f64| [f(-1.0), f(0.0), f(1.0)];
         let top = of(|x| 1.0 - 0.01 * (x - 0.3).powi(2));
-        assert!((peak(top, 0.0).unwrap() - 0.3).abs() < 1e-13);
+        assert!((peak(top, 0.0).unwrap().at - 0.3).abs() < 1e-13);
+        let found = peak(top, 0.0).unwrap();
+        assert!(!found.may_pass(1.0, 1.001) && found.may_pass(1.0, 0.999) && found.may_pass(0.99, 0.999));
         assert!(peak(top, 1.0 + 1e-4).is_some(), "the third order may raise it as much");
-        assert_eq!(peak(top, 1.001), None);
-        assert_eq!(peak(of(|_| 1.0), 0.0), None);
-        assert_eq!(peak(of(|x| -1.0 - 0.01 * x * x), 0.0), None, "it is less than an end");
-        assert_eq!(peak(of(|x| 1.0 - 0.01 * (x - 3.0).powi(2)), 0.0), None, "it is beyond the places");
+        assert!(peak(top, 1.001).is_none());
+        assert!(peak(of(|_| 1.0), 0.0).is_none());
+        assert!(peak(of(|x| -1.0 - 0.01 * x * x), 0.0).is_none(), "it is less than an end");
+        assert!(peak(of(|x| 1.0 - 0.01 * (x - 3.0).powi(2)), 0.0).is_none(), "it is beyond the places");
     }
 }

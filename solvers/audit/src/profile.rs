@@ -13,6 +13,7 @@ use super::phase_jerk::Jerks;
 use super::phase_motion::{self, PhaseMotion, State};
 use super::phase_order::PhaseOrder;
 use super::phases::Phases;
+use super::station::Station;
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 use by_length::{Look, Looker};
@@ -56,13 +57,13 @@ pub fn audit_profile<'a, const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let phases = of.phases;
-    let inside = parallel::tally(phases.len(), BLOCK, &|block, tally| {
+    let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
         let mut columns = columns();
         let good = |i: usize| phases.has_good_numbers(i, columns.count());
-        let mut is_good = block.start > 0 && good(block.start - 1);
+        let (mut is_good, mut last) = (block.start > 0 && good(block.start - 1), None);
         for i in block {
             tell(seen, i);
-            let was_good = std::mem::replace(&mut is_good, of.phase(i, &mut columns, tally));
+            let was_good = std::mem::replace(&mut is_good, of.phase(i, &mut columns, &mut last, tally));
             // What has no good numbers is reported with the phase itself.
             if i > 0 && was_good && is_good && phases.runs.binary_search(&(i as i64)).is_err() {
                 of.joint([i - 1, i], &mut columns, tally);
@@ -75,8 +76,15 @@ pub fn audit_profile<'a, const M: usize>(
 }
 
 impl<const M: usize> Audited<'_, M> {
-    /// A phase; whether its numbers, taken alone, can be measured.
-    fn phase(&self, i: usize, columns: &mut Columns<M>, tally: &mut Tally<M>) -> bool {
+    /// A phase; whether its numbers, taken alone, can be measured. `last` is the station at the end of the one before, with its
+    /// piece.
+    fn phase(
+        &self,
+        i: usize,
+        columns: &mut Columns<M>,
+        last: &mut Option<(usize, Station<M>)>,
+        tally: &mut Tally<M>,
+    ) -> bool {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
         let line = columns.path.line_of(piece);
@@ -111,7 +119,12 @@ impl<const M: usize> Audited<'_, M> {
                 start,
                 line,
             };
-            let (from, to) = (looker.look(u[0], tally), looker.look(u[1], tally));
+            let from = match last.filter(|(number, station)| *number == piece && station.u == u[0]) {
+                Some((_, station)) => Some(looker.look_at(&station, tally)),
+                None => looker.look(u[0], tally),
+            };
+            let to = looker.look(u[1], tally);
+            *last = to.as_ref().map(|look| (piece, look.station));
             let ends = [from.as_ref(), to.as_ref()];
             looker.phase(u, ends, tally);
             self.ends_by_length(i, ends, columns, line, tally);

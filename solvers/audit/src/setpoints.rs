@@ -84,7 +84,7 @@ impl<const M: usize> Stream<M> {
             plan.find_nearest(&self.limits, &mut rows, old, seen);
         }
         let view = View { differences: self.differences(&rows), plan };
-        let found = parallel::tally(chunk.t.len(), BLOCK, &|block, tally| {
+        let found = parallel::tally(&self.tally, chunk.t.len(), BLOCK, &|block, tally| {
             seen(block.len());
             view.block(old + block.start..old + block.end, tally);
         });

@@ -140,8 +140,12 @@ fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
         return duration * (way / whole);
     }
     let (mut low, mut high) = (0.0, duration);
-    // From rest the time is as the cube root of the length; where the speed changes little, as the length.
-    let mut t = (duration * (way / whole).cbrt()).min(way / start.v);
+    // Where the speed changes little the time is as the length, from rest as its cube root.
+    let share = way / whole;
+    let mut t = match 2.0 * start.v * duration > whole {
+        true => duration * share,
+        false => (duration * share.cbrt()).min(way / start.v),
+    };
     for _ in 0..MOST_STEPS {
         let miss = start.way(t) - way;
         if miss > 0.0 {

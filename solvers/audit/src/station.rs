@@ -20,6 +20,17 @@ pub struct Rounded<const M: usize> {
     pub rounding: [f64; M],
 }
 
+/// Numbers and their errors by column, both times `scale`; an error that is not finite is as great as any number.
+#[inline(always)]
+fn scaled<const M: usize>(
+    scale: f64,
+    value: impl Fn(usize) -> f64,
+    error: impl Fn(usize) -> f64,
+) -> Rounded<M> {
+    let finite = |error: f64| if error.is_finite() { error } else { f64::MAX };
+    Rounded { value: vector_of(|k| scale * value(k)), rounding: vector_of(|k| finite(scale * error(k))) }
+}
+
 /// A place, and what is known there whatever the speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Station<const M: usize> {
@@ -102,28 +113,30 @@ impl<const M: usize> Station<M> {
         let (bend, size) = (3.0 * turn * turn - ddg * per, 3.0 * turn * turn + ddg.abs() * per);
         let bend_error = 6.0 * turn.abs() * turn_error + ddg_error * per;
         let unit = 2.0 * ROUNDINGS * EPS;
-        let rounded = |scale: f64, value: &dyn Fn(usize) -> f64, error: &dyn Fn(usize) -> f64| Rounded {
-            value: vector_of(|k| scale * value(k)),
-            rounding: vector_of(|k| {
-                Some(scale * error(k)).filter(|error| error.is_finite()).unwrap_or(f64::MAX)
-            }),
-        };
         let turn_size = turn.abs();
         Self {
             u,
             slope: g,
             tip,
             curvature,
-            first: rounded(per, &|k| q1[k], &|k| e1[k] + unit * q1[k].abs()),
-            second: rounded(per * per, &|k| q2[k] - q1[k] * turn, &|k| {
-                let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
-                wrong + unit * (q2[k].abs() + q1[k].abs() * turn_size)
-            }),
-            third: rounded(per * per * per, &|k| q3[k] - 3.0 * q2[k] * turn + q1[k] * bend, &|k| {
-                let wrong = e3[k] + 3.0 * (e2[k] * turn_size + q2[k].abs() * turn_error);
-                let terms = q3[k].abs() + 3.0 * q2[k].abs() * turn_size + q1[k].abs() * size;
-                wrong + e1[k] * size + q1[k].abs() * bend_error + unit * terms
-            }),
+            first: scaled(per, |k| q1[k], |k| e1[k] + unit * q1[k].abs()),
+            second: scaled(
+                per * per,
+                |k| q2[k] - q1[k] * turn,
+                |k| {
+                    let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
+                    wrong + unit * (q2[k].abs() + q1[k].abs() * turn_size)
+                },
+            ),
+            third: scaled(
+                per * per * per,
+                |k| q3[k] - 3.0 * q2[k] * turn + q1[k] * bend,
+                |k| {
+                    let wrong = e3[k] + 3.0 * (e2[k] * turn_size + q2[k].abs() * turn_error);
+                    let terms = q3[k].abs() + 3.0 * q2[k].abs() * turn_size + q1[k].abs() * size;
+                    wrong + e1[k] * size + q1[k].abs() * bend_error + unit * terms
+                },
+            ),
         }
     }
 

@@ -206,7 +206,9 @@ impl<'a, const M: usize> Finder<'a, M> {
         if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
             nearest.velocity = here.velocity;
-            if let Some(recorded) = row.acceleration.filter(|_| are_axes && nearest.is_good()) {
+            // Quotients of joints take as long as all else.
+            let is_known = (are_axes || here.acceleration.is_some()) && nearest.is_good();
+            if let Some(recorded) = row.acceleration.filter(|_| is_known) {
                 nearest.acceleration_off = profile.acceleration_off(&here, row.t, &recorded, limits);
             }
         }

@@ -6,7 +6,7 @@ use super::path::{JointPath, Piece, Work};
 use crate::columns::Place;
 use crate::curve::{Curve, Curves};
 use crate::station::{Rounded, Station};
-use crate::vectors::vector_of;
+use crate::vectors::{length, vector_of};
 use crate::FEEDS;
 
 /// Intervals for each degree of a phase that covers its whole piece, and the least number.
@@ -17,20 +17,23 @@ const LEAST: f64 = 2.0;
 /// other numbers.
 const SMOOTH: f64 = 1e-6;
 
+/// How many times greater a second derivative by u may be than that by the length at another place of the piece: so close that
+/// a place is not found but for a hundredth of what is allowed it would have to be ten times more.
+const BEND_GROWS: f64 = 4.0;
+
 pub struct JointColumns<'a, const M: usize> {
     of: &'a JointPath<'a>,
     work: Work,
     /// The last two pieces, the last one first.
     pieces: [Option<Rc<Piece<'a, M>>>; 2],
-    /// The last place, and the last two at which everything is known.
+    /// The last place, and the last station with its piece.
     last: Option<Place<M>>,
-    kept: [Option<(Place<M>, Station<M>)>; 2],
-    older: usize,
+    known: Option<(usize, Station<M>)>,
 }
 
 impl<'a, const M: usize> JointColumns<'a, M> {
     pub fn new(of: &'a JointPath<'a>) -> Self {
-        Self { of, work: of.work(), pieces: [None, None], last: None, kept: [None, None], older: 0 }
+        Self { of, work: of.work(), pieces: [None, None], last: None, known: None }
     }
 
     /// A piece of the path, on its curve.
@@ -45,30 +48,21 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         self.pieces[0].get_or_insert_with(|| Rc::new(self.of.piece_on(number, curve.clone()))).clone()
     }
 
-    fn known(&self, piece: usize, u: f64) -> Option<&(Place<M>, Station<M>)> {
-        self.kept.iter().flatten().find(|(place, _)| place.piece == piece && place.u == u)
-    }
-
     pub fn scale(&self) -> [f64; M] {
         self.of.scale()
     }
 
     pub fn place(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
         let last = self.last.filter(|place| place.piece == piece && place.u == u);
-        let known = last.or_else(|| self.known(piece, u).map(|(place, _)| *place));
-        let place = known.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.work));
+        let place = last.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.work));
         self.last = Some(place);
         place
     }
 
     pub fn station(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Station<M> {
-        if let Some((_, station)) = self.known(piece, u) {
-            return *station;
-        }
-        let found = self.piece(piece, curve).station(u, &mut self.work);
-        self.kept[self.older] = Some(found);
-        self.older = 1 - self.older;
-        found.1
+        let (place, station) = self.piece(piece, curve).station(u, &mut self.work);
+        (self.last, self.known) = (Some(place), Some((piece, station)));
+        station
     }
 
     pub fn way(&mut self, curve: &Rc<Curve<M>>, from: &Place<M>, to: &Place<M>) -> Rounded<M> {
@@ -90,6 +84,12 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     pub fn toward(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
         let place = self.place(curve, piece, u);
         [self.piece(piece, curve).between(&place.position.value, q, None), place.slope.value]
+    }
+
+    /// The second derivative by u where it was last looked at on a piece, which may be some times that elsewhere.
+    pub fn bend(&self, piece: usize) -> f64 {
+        let last = self.known.as_ref().filter(|(number, _)| *number == piece);
+        last.map_or(f64::INFINITY, |(_, at)| BEND_GROWS * length(&at.second.value) * at.slope * at.slope)
     }
 
     pub fn feeds(&self, piece: usize) -> [f64; FEEDS] {

@@ -7,6 +7,8 @@
 
 use std::f64::consts::PI;
 
+use crate::vectors::vector_of;
+
 /// Error of an elementary function, in roundings of its value.
 const ELEMENTARY: f64 = 4.0;
 
@@ -140,12 +142,14 @@ impl<const N: usize> Jet<N> {
     #[inline(always)]
     fn times_to(&self, other: &Self, terms: usize) -> Self {
         let mut jet = Self { value: [0.0; N], error: [0.0; N] };
+        let [size, other_size] = [self, other].map(|jet| jet.value.map(f64::abs));
+        // The rounding of a product and of its addition counts as an error of the second factor.
+        let other_error: [f64; N] = vector_of(|k| other.error[k] + 2.0 * other_size[k]);
         for k in 0..terms {
             for j in 0..=k {
-                let (a, b, many) = (self.value[j], other.value[k - j], BINOMIAL[k][j]);
-                jet.value[k] += many * a * b;
-                let errors = a.abs() * other.error[k - j] + self.error[j] * b.abs();
-                jet.error[k] += many * (errors + 2.0 * (a * b).abs());
+                let many = BINOMIAL[k][j];
+                jet.value[k] += many * (self.value[j] * other.value[k - j]);
+                jet.error[k] += many * (size[j] * other_error[k - j] + self.error[j] * other_size[k - j]);
             }
         }
         jet

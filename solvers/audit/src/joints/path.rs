@@ -158,11 +158,14 @@ impl<const M: usize> Piece<'_, M> {
 
     /// Curvature of the path in the axes whose motion the feed limits, if X, Y, Z are among these.
     pub fn curvature(&self, u: f64) -> f64 {
+        self.curvature_by(&self.curve.derivatives(u))
+    }
+
+    fn curvature_by(&self, [tangent, bend, _]: &[[f64; M]; 3]) -> f64 {
         if self.linear() == [0.0; M] {
             return 0.0;
         }
-        let [tangent, bend, _] = self.curve.derivatives(u);
-        curvature(&times(&self.counts, &tangent), &times(&self.counts, &bend))
+        curvature(&times(&self.counts, tangent), &times(&self.counts, bend))
     }
 
     /// Derivative by u of the way that the feed limits.
@@ -232,20 +235,15 @@ impl<const M: usize> Piece<'_, M> {
             value: [tip[k], slope[k]],
             error: [TIP_ROUNDINGS * self.size, TIP_ROUNDINGS * self.slope_size[k]],
         });
-        self.place_of(u, tip, slope, &work.slopes)
+        let joints = [0, 1].map(|order| self.joint_rows(&work.slopes, order));
+        self.place_of(u, tip, slope, joints)
     }
 
-    fn place_of<const N: usize>(&self, u: f64, tip: [f64; M], slope: [f64; M], table: &[Jet<N>]) -> Place<M> {
-        let way_slope = length(&times(&self.way_scale, &slope));
-        Place {
-            piece: self.number,
-            u,
-            tip,
-            position: self.joint_rows(table, 0),
-            slope: self.joint_rows(table, 1),
-            way_slope,
-            tip_slope: self.feed_slope_of(&tip, &slope),
-        }
+    fn place_of(&self, u: f64, tip: [f64; M], tip_slope: [f64; M], joints: [Rounded<M>; 2]) -> Place<M> {
+        let [position, slope] = joints;
+        let (way_slope, feed_slope) =
+            (length(&times(&self.way_scale, &tip_slope)), self.feed_slope_of(&tip, &tip_slope));
+        Place { piece: self.number, u, tip, position, slope, way_slope, tip_slope: feed_slope }
     }
 
     /// The place at u, and the first three derivatives of the joints by the length of the way.
@@ -264,7 +262,7 @@ impl<const M: usize> Piece<'_, M> {
         });
         // |C'|² by its axes.
         let mut square = Jet::<3>::constant(0.0);
-        for k in 0..M {
+        for k in (0..M).filter(|&k| self.way_scale[k] != 0.0) {
             let scale = self.way_scale[k];
             let axis = Jet::<3> {
                 value: std::array::from_fn(|order| scale * slopes[order][k]),
@@ -278,9 +276,9 @@ impl<const M: usize> Piece<'_, M> {
         }
         let way = square.root();
         let way: [_; 3] = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
-        let joints = [1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
-        let place = self.place_of(u, tip, slopes[0], &work.bends);
-        let tool = [place.tip_slope / way[0].0, self.curvature(u)];
+        let [position, joints @ ..] = [0, 1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
+        let place = self.place_of(u, tip, slopes[0], [position, joints[0]]);
+        let tool = [place.tip_slope / way[0].0, self.curvature_by(&slopes)];
         (place, Station::of_joints(u, &joints, way, tool))
     }
 

@@ -112,29 +112,42 @@ impl<const M: usize> Looker<'_, '_, M> {
         }
     }
 
-    /// Looks where parabolas through three even places say that a rate is greater than any so far, and beside it: one rate
-    /// after the other.
+    /// Looks where parabolas through three even places say that a rate is greater than any so far, and beside it where the parabola
+    /// is not close enough: one rate after the other.
     fn refine(&mut self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
-        let mut peaks = Vec::new();
         for (row, check) in RATES.into_iter().enumerate() {
-            for k in 0..M {
-                let uses = places.map(|look| look.used.rates[row][k]);
-                peaks.extend(peak(uses, tally.get(check, k).ratio));
+            for k in 0..self.columns.count() {
+                self.climb(places, (check, k), depth, |used| used.rates[row][k], tally);
             }
         }
         for i in 0..=FEEDS {
             let check = if i == FEEDS { Check::Chord } else { Check::Feed };
-            peaks.extend(peak(places.map(|look| look.used.tip[i]), tally.get(check, 0).ratio));
+            self.climb(places, (check, 0), depth, |used| used.tip[i], tally);
         }
+    }
+
+    /// The same for one rate.
+    fn climb(
+        &mut self,
+        places: [&Look<M>; 3],
+        (check, k): (Check, usize),
+        depth: u32,
+        rate: impl Fn(&Use<M>) -> f64,
+        tally: &mut Tally<M>,
+    ) {
+        let Some(peak) = peak(places.map(|look| rate(&look.used)), tally.get(check, k).ratio) else { return };
         let [first, middle, last] = places.map(|look| look.place.u);
-        for x in peaks {
-            let half = 0.5 * (last - first);
-            let centre = middle + x * half;
-            let side = CLOSER * half.min(centre - first).min(last - centre);
-            let around = [centre - side, centre, centre + side].map(|u| self.look(u, tally));
-            if let ([Some(a), Some(b), Some(c)], true) = (&around, depth < MOST_REFINED) {
-                self.refine([a, b, c], depth + 1, tally);
-            }
+        let half = 0.5 * (last - first);
+        let centre = middle + peak.at * half;
+        let worst = tally.get(check, k).ratio;
+        let Some(top) = self.look(centre, tally) else { return };
+        if depth == MOST_REFINED || !peak.may_pass(rate(&top.used), worst) {
+            return;
+        }
+        let side = CLOSER * half.min(centre - first).min(last - centre);
+        let beside = [centre - side, centre + side].map(|u| self.look(u, tally));
+        if let [Some(before), Some(after)] = &beside {
+            self.refine([before, &top, after], depth + 1, tally);
         }
     }
 
@@ -145,7 +158,7 @@ impl<const M: usize> Looker<'_, '_, M> {
     }
 
     /// Offers what a place shows.
-    fn look_at(&self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
+    pub fn look_at(&self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
         let (limits, line) = (self.limits, self.line);
         let place = self.motion.place(station.u);
         let pace = place.pace;
