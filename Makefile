@@ -18,9 +18,10 @@ demo: $(VENV)/built $(PAGE)
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
-# Half of the time tests wait for the services and programs that they start: two of them share a processor.
+# Half of the time tests wait for the services and programs that they start: two of them share a processor. The tests of a
+# file share its servers, clusters and browser, so one process runs them all.
 test: native lint collected $(PAGE)
-	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN)))
+	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile --no-loadscope-reorder
 
 # They need no Python. They come first: the module links what has been compiled for them.
 native: cargo

@@ -75,7 +75,7 @@ def test_both_schemes_close_in_on_the_exact_time_of_joints(name: str, seed: int)
     problem = random_problem(name, seed)
     exact = plan(problem).time
     # The pieces are cut already. One error may pass through zero on its way, both together do not.
-    meshes = [math.ceil(cells / len(problem.path)) for cells in (1000, 4000)]
+    meshes = [math.ceil(cells / len(problem.path)) for cells in (500, 2000)]
     coarse, fine = (
         max(
             abs(time_of(problem, cells, "collocation") / exact - 1),
