@@ -1,11 +1,11 @@
-"""How a path treats the corners of a program."""
+"""How a path treats the corners of a program, and which path a plan follows."""
 
 from __future__ import annotations
 
 from enum import Enum
 from typing import Literal, get_args
 
-# What a plan does with the tolerance: see `feedplan.plan`.
+# The path of the program alone, or one that is fitted to the speed of a plan: see `feedplan.plan`.
 FollowedPath = Literal["as-fitted", "fastest"]
 PATHS: tuple[FollowedPath, ...] = get_args(FollowedPath)
 

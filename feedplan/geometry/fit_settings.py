@@ -1,4 +1,4 @@
-"""How closely and how smoothly a path follows a program."""
+"""The settings of a path's fit: tolerances, the longest chord that is fitted, and where chains are broken."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from feedplan.errors import InputError
 class FitSettings:
     """How closely and how smoothly a program is followed.
 
-    - `default_tolerance` [mm] holds in G64 without P, and where a program has no path-control mode. Machining
-      tolerances leave a controller about a hundredth.
+    - `default_tolerance` [mm] holds in G64 without P, and where a program has no path-control mode. Parts
+      with tolerances of a tenth of a millimetre leave about a hundredth to the controller.
     - `exact_tolerance` [mm] is the tolerance of arcs in every mode, and of the exact path; lines and splines
       are exact. Half of it limits the distance of a circle through both ends from the programmed arc, whose
       ends are rounded: an arc beyond it is a spiral and becomes quadratics within the same distance. It

@@ -1,18 +1,10 @@
 //! Numbers of axes: those of random cases, and those that kernels are compiled for.
 
-/// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
+/// Runs an expression for one of `AXES`, known at run time: `for_axes!(count, M, expression)`.
 #[macro_export(local_inner_macros)]
 macro_rules! for_axes {
     ($count:expr, $m:ident, $call:expr) => {
         match $count {
-            4 => {
-                const $m: usize = 4;
-                $call
-            }
-            5 => {
-                const $m: usize = 5;
-                $call
-            }
             6 => {
                 const $m: usize = 6;
                 $call
@@ -22,7 +14,10 @@ macro_rules! for_axes {
     };
 }
 
-/// The numbers of axes of cases for the kernels of curves.
+/// The numbers of axes of cases: with 1 and 2 there are axes that rest.
+pub const AXES: [usize; 4] = [1, 2, 3, 6];
+
+/// Those for the kernels of curves.
 pub const FEW_AXES: [usize; 3] = [1, 2, 3];
 
 /// The number of axes that kernels are compiled for, as in the Python module.

@@ -183,15 +183,15 @@ impl Curve<2> for Nurbs {
         let mut rows: [[f64; 3]; 4] = [[0.0; 3]; 4];
         for order in 0..=3.min(p) {
             // Control points of the derivative, then de Boor's algorithm on them.
-            let mut d: Vec<[f64; 3]> = self.points[span - p..=span].to_vec();
+            let mut d = [[0.0; 3]; 8];
+            d[..=p].copy_from_slice(&self.points[span - p..=span]);
             for level in 1..=order {
                 let q = p - level + 1;
-                for i in 0..d.len() - 1 {
+                for i in 0..q {
                     let at = span - p + level + i;
                     let width = u[at + q] - u[at];
                     d[i] = std::array::from_fn(|k| q as f64 * (d[i + 1][k] - d[i][k]) / width);
                 }
-                d.pop();
             }
             let q = p - order;
             for level in 1..=q {

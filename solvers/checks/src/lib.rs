@@ -1,4 +1,5 @@
-//! Random planning problems and an audit of profiles that shares no formula with the planner.
+//! What tests of kernels share: random problems, curves and polylines, curves by their length, and an audit of profiles that
+//! shares no formula with the planner.
 
 mod audit;
 mod axes;
@@ -14,7 +15,7 @@ mod regular_path;
 pub mod wave;
 
 pub use audit::{audit, Audit};
-pub use axes::{padded, FEW_AXES, PADDED};
+pub use axes::{padded, AXES, FEW_AXES, PADDED};
 pub use campaign::seeds;
 pub use cases::{milder_case, random_case, Case, Random};
 pub use elevated::Elevated;

@@ -71,7 +71,7 @@ fn plan_jerk_limited<'py>(
 }
 
 /// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve::on_path::Cutting` (lengths,
-/// alike). The time limit is that of stretches left to the jerk-limited planner; see there.
+/// alike). The time limit is that of subruns left to the jerk-limited planner; see there.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None, progress=None))]
 fn plan_s_curve<'py>(
@@ -95,8 +95,8 @@ fn plan_s_curve<'py>(
     })
 }
 
-/// The segments that `plan_s_curve` plans on: offsets of the stretches, then (n,) length, speed, acceleration, jerk,
-/// junction, piece, u. A stretch without segments is not for it.
+/// The segments that `plan_s_curve` plans on: offsets of the subruns, then (n,) length, speed, acceleration, jerk,
+/// junction, piece, u. A subrun without segments is not for it.
 #[pyfunction]
 fn path_segments<'py>(
     py: Python<'py>,
@@ -125,8 +125,8 @@ fn path_segments<'py>(
     })
 }
 
-/// The profile of sections of constant jerk, (n, 5) rows of duration, position along the stretch, speed,
-/// acceleration, jerk at their starts; those of stretch i from `offsets[i]` on. A stretch without any is planned by the
+/// The profile of sections of constant jerk, (n, 5) rows of duration, position along the subrun, speed,
+/// acceleration, jerk at their starts; those of subrun i from `offsets[i]` on. A subrun without any is planned by the
 /// jerk-limited planner.
 #[pyfunction]
 fn profile_of_sections<'py>(

@@ -205,7 +205,7 @@ const FLOW: [&str; 40] = [
 ];
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(ProptestConfig::with_cases(1000))]
 
     /// Lines of program flow and of compensated paths in any order; few of them make a program.
     #[test]

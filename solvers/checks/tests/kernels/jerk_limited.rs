@@ -211,7 +211,7 @@ fn the_trefoil_is_optimal_and_holds_all_limits() {
 fn the_butterfly_holds_all_limits_near_its_bound() {
     let nurbs = Nurbs::butterfly();
     let parameters = nurbs.parameters();
-    let gap = assert_curve(&ByLength::new(nurbs, &parameters, 20), 3.376);
+    let gap = assert_curve(&ByLength::new(nurbs, &parameters, 8), 3.376);
     assert!(gap < 0.016, "{gap}");
 }
 
@@ -255,7 +255,7 @@ fn random_case(seed: u64) -> (Bends, [f64; 3]) {
 #[test]
 fn random_paths_hold_all_limits() {
     let mut stopped = 0;
-    for seed in seeds(40) {
+    for seed in seeds(24) {
         let (path, limits) = random_case(seed);
         let problem = problem(&path, limits);
         let plan = plan(&problem, &proving()).unwrap_or_else(|fault| panic!("seed {seed}: {fault:?}"));
@@ -265,7 +265,7 @@ fn random_paths_hold_all_limits() {
         assert!(least <= plan.time * (1.0 + 1e-9), "seed {seed}: {least} s proven, {} s planned", plan.time);
         stopped += usize::from(!plan.converged);
     }
-    assert!(stopped <= 3, "{stopped} paths did not converge");
+    assert!(stopped <= 2, "{stopped} paths did not converge");
 }
 
 /// All limits hold, and no plan is slower than with the lesser limits of both directions.
@@ -297,7 +297,7 @@ fn every_iteration_leaves_a_valid_plan() {
     let path = infinity();
     let problem = problem(&path, FAST);
     let mut best = f64::INFINITY;
-    for max_iterations in (0..40).step_by(3) {
+    for max_iterations in (0..40).step_by(5) {
         let effort = Effort { max_iterations, ..Effort::default() };
         let plan = plan(&problem, &effort).expect("there is a first plan");
         assert_held(&problem, &plan.profile);

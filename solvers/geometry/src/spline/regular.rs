@@ -5,92 +5,20 @@
 //! the same places as the lines of degree 1 between its turns. In the cusp of a curved piece the curvature is unbounded, and
 //! the tool rests: the piece and its run end there.
 
+mod cusp_ends;
+mod lines;
+mod pieces;
+
 use std::ops::Range;
 
-use super::bezier::{point, split};
-use super::cusps::{piece_cusps, rests_at_ends};
-use super::{CompositeCurve, Piece, MAX_HODOGRAPH};
-use crate::polynomial::Polynomial;
-use crate::quadratic::{dot, norm, sub};
-use crate::tolerance::{AT_END, CUSP, ROUNDING, SAME_DIRECTION};
+use self::cusp_ends::{cut_in_cusps, joined_in_cusps};
+use self::lines::{form, Form, Straight};
+pub use self::pieces::Regular;
+use self::pieces::{is_smooth, near};
+use super::cusps::rests_at_ends;
+use super::{CompositeCurve, Piece};
+use crate::tolerance::ROUNDING;
 use crate::watch::Watch;
-
-/// The regular pieces of a curve.
-pub struct Regular<const M: usize> {
-    pub curve: CompositeCurve<M>,
-    /// For each piece, the first and the last of the given pieces that it goes along.
-    pub source: Vec<[usize; 2]>,
-    /// Whether a piece begins and ends in a cusp, where the tool rests.
-    pub rests: Vec<[bool; 2]>,
-    /// The pieces that each of the given ranges has become.
-    pub ranges: Vec<Range<usize>>,
-}
-
-impl<const M: usize> Regular<M> {
-    fn push(&mut self, source: [usize; 2], piece: &Piece<M>, rounding: f64) {
-        self.curve.push(piece.control, piece.weights, piece.width);
-        let last = self.curve.len() - 1;
-        // A piece without length before this one may have been left out.
-        if last > 0 {
-            let end = self.curve.control[self.curve.offsets[last] - 1];
-            let start = &mut self.curve.control_mut(last)[0];
-            if near(&end, start, rounding) {
-                *start = end;
-            }
-        }
-        self.source.push(source);
-    }
-}
-
-/// The form of a piece.
-enum Form<const M: usize> {
-    /// Its start, its turns and its end.
-    Straight(Vec<LinePoint<M>>),
-    Curved,
-    /// It has no length.
-    Point,
-}
-
-/// A point of a straight piece, or of neighbours on one line.
-#[derive(Clone, Copy)]
-struct LinePoint<const M: usize> {
-    point: [f64; M],
-    /// The parameter from the start of the first of them.
-    u: f64,
-    /// The pieces before and after it.
-    pieces: [usize; 2],
-}
-
-/// The line through some points.
-struct Line<const M: usize> {
-    origin: [f64; M],
-    direction: [f64; M],
-    length: f64,
-}
-
-impl<const M: usize> Line<M> {
-    /// Through two of the points that are far apart; None if all are equal.
-    fn through(points: impl Iterator<Item = [f64; M]> + Clone) -> Option<Self> {
-        let farthest = |from: &[f64; M]| {
-            let apart = |point: &[f64; M]| norm(&sub(point, from));
-            points.clone().max_by(|a, b| apart(a).total_cmp(&apart(b)))
-        };
-        let origin = farthest(&points.clone().next()?)?;
-        let way = sub(&farthest(&origin)?, &origin);
-        let length = norm(&way);
-        (length > 0.0).then(|| Self { origin, direction: way.map(|x| x / length), length })
-    }
-
-    fn along(&self, point: &[f64; M]) -> f64 {
-        dot(&sub(point, &self.origin), &self.direction)
-    }
-
-    /// Whether a point is on it, up to rounding.
-    fn contains(&self, point: &[f64; M], rounding: f64) -> bool {
-        let (offset, along) = (sub(point, &self.origin), self.along(point));
-        norm(&std::array::from_fn::<f64, M, _>(|k| offset[k] - along * self.direction[k])) <= rounding
-    }
-}
 
 /// The regular pieces of a curve, of each range of its pieces by itself.
 ///
@@ -141,131 +69,6 @@ pub fn regular<const M: usize>(
     out
 }
 
-/// The form of piece `i`.
-fn form<const M: usize>(i: usize, piece: &Piece<M>, rounding: f64) -> Form<M> {
-    let control = piece.control;
-    let Some(line) = Line::through(control.iter().copied()).filter(|line| line.length > rounding) else {
-        return Form::Point;
-    };
-    if !control.iter().all(|point| line.contains(point, rounding)) {
-        return Form::Curved;
-    }
-    let at = |u: f64, point: [f64; M]| LinePoint { point, u, pieces: [i, i] };
-    let mut points = vec![at(0.0, control[0])];
-    if piece.degree() > 1 {
-        let turn = |u: f64| at(u, point(piece, u));
-        rate(piece, |point| line.along(point)).sign_changes(&mut |t| points.push(turn(t * piece.width)));
-    }
-    points.push(at(piece.width, control[control.len() - 1]));
-    Form::Straight(points)
-}
-
-/// The points of neighbours on one line.
-struct Straight<const M: usize> {
-    points: Vec<LinePoint<M>>,
-    line: Option<Line<M>>,
-}
-
-impl<const M: usize> Default for Straight<M> {
-    fn default() -> Self {
-        Self { points: vec![], line: None }
-    }
-}
-
-impl<const M: usize> Straight<M> {
-    /// Adds a straight piece if it begins at the last point and is on the same line; false if not.
-    fn extend(&mut self, next: &[LinePoint<M>], rounding: f64) -> bool {
-        let Some((line, end)) = self.line.as_ref().zip(self.points.last().copied()) else {
-            self.points.extend_from_slice(next);
-            self.line = Line::through(next.iter().map(|place| place.point));
-            return true;
-        };
-        if !near(&end.point, &next[0].point, rounding) {
-            return false;
-        }
-        let points = || self.points.iter().chain(next).map(|place| place.point);
-        // Beyond twice the length of the known line its direction may be wrong: it is computed again.
-        let known = |place: &LinePoint<M>| {
-            let reached = line.along(&place.point);
-            line.contains(&place.point, rounding) && reached.abs() <= 2.0 * line.length
-        };
-        if !next.iter().all(known) {
-            let Some(line) =
-                Line::through(points()).filter(|line| points().all(|p| line.contains(&p, rounding)))
-            else {
-                return false;
-            };
-            self.line = Some(line);
-        }
-        if let Some(joint) = self.points.last_mut() {
-            joint.pieces[1] = next[0].pieces[1];
-        }
-        self.points.extend(next[1..].iter().map(|place| LinePoint { u: end.u + place.u, ..*place }));
-        true
-    }
-
-    /// Appends the lines from turn to turn to `out`, and removes all points.
-    fn finish(&mut self, rounding: f64, out: &mut Regular<M>) {
-        let (Some(line), mut points) = (self.line.take(), std::mem::take(&mut self.points)) else { return };
-        let along = |place: &LinePoint<M>| line.along(&place.point);
-        drop_rounding(&mut points, along, rounding);
-        let turns = |i: usize| {
-            let inside = i > 0 && i + 1 < points.len();
-            !inside
-                || (along(&points[i]) - along(&points[i - 1])) * (along(&points[i + 1]) - along(&points[i]))
-                    < 0.0
-        };
-        let ends: Vec<LinePoint<M>> = (0..points.len()).filter(|&i| turns(i)).map(|i| points[i]).collect();
-        for pair in ends.windows(2) {
-            let control = [pair[0].point, pair[1].point];
-            let piece = Piece { control: &control, weights: &[], width: pair[1].u - pair[0].u };
-            out.push([pair[0].pieces[1], pair[1].pieces[0]], &piece, rounding);
-        }
-    }
-}
-
-/// The derivative, or on rational pieces its numerator, of a linear function of the points.
-fn rate<const M: usize>(
-    piece: &Piece<M>,
-    along: impl Fn(&[f64; M]) -> f64,
-) -> Polynomial<{ MAX_HODOGRAPH + 1 }> {
-    let weight = |i: usize| if piece.is_rational() { piece.weights[i] / piece.weights[0] } else { 1.0 };
-    let start = along(&piece.control[0]);
-    let form = |of: &dyn Fn(usize) -> f64| Polynomial::from_bernstein((0..piece.control.len()).map(of));
-    let values = form(&|i| weight(i) * (along(&piece.control[i]) - start));
-    if piece.is_rational() {
-        values.wronskian(&form(&weight))
-    } else {
-        values.derivative()
-    }
-}
-
-/// Removes turns between which the path is no longer than rounding, the shortest first. Both ends stay where they are.
-fn drop_rounding<T>(points: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f64) {
-    loop {
-        let way = |i: usize| (along(&points[i + 1]) - along(&points[i])).abs();
-        let Some(shortest) = (0..points.len() - 1).min_by(|&i, &j| way(i).total_cmp(&way(j))) else { return };
-        if way(shortest) > rounding {
-            return;
-        }
-        let last = points.len() - 1;
-        let step = |i: usize| along(&points[i + 1]) - along(&points[i]);
-        match shortest {
-            // Two turns between which the path is rounding: it goes on in the same direction.
-            i if i > 0 && i + 1 < last && step(i - 1) * step(i + 1) > 0.0 => drop(points.drain(i..i + 2)),
-            // Two points of one turn.
-            i if i > 0 && i + 1 < last => drop(points.remove(i)),
-            // All of the path is rounding.
-            _ if last == 1 => drop(points.drain(..)),
-            0 => drop(points.remove(1)),
-            i => drop(points.remove(i)),
-        }
-        if points.is_empty() {
-            return;
-        }
-    }
-}
-
 /// Keeps pieces as they are if as a line they would meet a neighbour in a corner that is smooth now: they are so short that
 /// their directions are rounding.
 fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Form<M>)], rounding: f64) {
@@ -293,109 +96,11 @@ fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Form<M>)], roundi
     }
 }
 
-impl<const M: usize> Form<M> {
-    /// Its first line, or with `at_end` its last; None if it is not straight.
-    fn edge(&self, at_end: bool) -> Option<[f64; M]> {
-        let Self::Straight(points) = self else { return None };
-        let i = if at_end { points.len() - 2 } else { 0 };
-        Some(sub(&points[i + 1].point, &points[i].point))
-    }
-}
-
-/// Whether two edges have one direction, up to the rounding of their ends.
-fn is_smooth<const M: usize>(before: &[f64; M], after: &[f64; M], rounding: f64) -> bool {
-    let (own, others) = (norm(before), norm(after));
-    let turn = norm(&std::array::from_fn::<f64, M, _>(|k| after[k] / others - before[k] / own));
-    turn <= SAME_DIRECTION + rounding / own.min(others)
-}
-
-fn near<const M: usize>(a: &[f64; M], b: &[f64; M], rounding: f64) -> bool {
-    norm(&sub(a, b)) <= rounding
-}
-
-/// Appends a curved piece, cut in its cusps.
-fn cut_in_cusps<const M: usize>(source: usize, piece: &Piece<M>, rounding: f64, out: &mut Regular<M>) {
-    let cusps = piece_cusps(piece, CUSP);
-    let inside = cusps.iter().filter(|t| (AT_END..=1.0 - AT_END).contains(*t));
-    let cuts: Vec<f64> = inside.map(|t| t * piece.width).collect();
-    if cuts.is_empty() {
-        return out.push([source; 2], piece, rounding);
-    }
-    let mut parts = CompositeCurve::default();
-    split(piece, &cuts, &mut parts);
-    for part in parts.pieces().filter(|part| part.extent().0 > rounding) {
-        out.push([source; 2], &part, rounding);
-    }
-}
-
-/// The same curve with the control points next to a cusp moved into it, on both sides, so that C' is exactly 0 there. Pieces
-/// that become straight by this become lines.
-fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64) -> CompositeCurve<M> {
-    let sides = |piece| [false, true].map(|at_end| turns_in_cusp(&piece, at_end, rounding));
-    let sides: Vec<[Option<bool>; 2]> = curve.pieces().map(sides).collect();
-    let mut out = CompositeCurve::default();
-    for (i, piece) in curve.pieces().enumerate() {
-        let before = i.checked_sub(1).and_then(|before| sides[before][1]);
-        let after = sides.get(i + 1).and_then(|after| after[0]);
-        let [start, end] = [(sides[i][0], before), (sides[i][1], after)]
-            .map(|(own, beside)| own.is_some_and(|turns| turns || beside == Some(true)));
-        if !start && !end {
-            out.push(piece.control, piece.weights, piece.width);
-            continue;
-        }
-        let mut control = piece.control.to_vec();
-        let reach = cusp_reach(&piece, rounding);
-        if start {
-            join_first(control.iter_mut(), reach);
-        }
-        if end {
-            join_first(control.iter_mut().rev(), reach);
-        }
-        let joined = Piece { control: &control, ..piece };
-        match form(i, &joined, rounding) {
-            Form::Straight(ends) if ends.len() == 2 => {
-                out.push(&[ends[0].point, ends[1].point], &[], piece.width);
-            }
-            _ => out.push(joined.control, joined.weights, joined.width),
-        }
-    }
-    out
-}
-
-/// The distance from an end of a piece within which the next control point makes a cusp. The path turns there within
-/// reach² over the length of the piece, which is rounding; and no point is moved by more than `CUSP` times the greatest
-/// coordinate.
-fn cusp_reach<const M: usize>(piece: &Piece<M>, rounding: f64) -> f64 {
-    let size = rounding / ROUNDING;
-    (rounding * piece.extent().0).sqrt().min(CUSP * size).max(rounding)
-}
-
-/// Whether the path turns in the cusp at an end of a piece, or its direction there is rounding; None if there is no cusp.
-fn turns_in_cusp<const M: usize>(piece: &Piece<M>, at_end: bool, rounding: f64) -> Option<bool> {
-    let (control, last, reach) = (piece.control, piece.degree(), cusp_reach(piece, rounding));
-    let away = |n: usize| match at_end {
-        false => sub(&control[n], &control[0]),
-        true => sub(&control[last - n], &control[last]),
-    };
-    let edge = away(1);
-    if norm(&edge) > reach {
-        return None;
-    }
-    let long = (2..=last).map(away).find(|edge| norm(edge) > reach)?;
-    Some(norm(&edge) <= rounding || !is_smooth(&edge, &long, rounding))
-}
-
-/// Moves the points that follow the first one within reach of it to it.
-fn join_first<'a, const M: usize>(mut points: impl Iterator<Item = &'a mut [f64; M]>, reach: f64) {
-    let Some(&mut first) = points.next() else { return };
-    for point in points.take_while(|point| near(point, &first, reach)) {
-        *point = first;
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::bezier::point;
     use super::*;
+    use crate::quadratic::{dot, norm, sub};
     use proptest::prelude::*;
 
     fn whole<const M: usize>(curve: &CompositeCurve<M>) -> Regular<M> {

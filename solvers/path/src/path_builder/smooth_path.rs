@@ -177,28 +177,26 @@ impl<const M: usize> Section<M> {
         let reversal = if motion.is_some() { tolerance::FITTED_REVERSAL } else { tolerance::REVERSAL };
         let chords = moves.chords(options, range)?;
         let count = chords.chords.len();
-        let turns_back = |i: usize| chords.turn(i) > reversal;
-        let stops = |i: usize| turns_back(i) || exact && !chords.meet(i);
+        let stops = |&end: &usize| end == count || chords.turn(end) > reversal || exact && !chords.meet(end);
+        let ends: Vec<usize> = (1..=count).into_par_iter().filter(stops).collect();
         let mut parts = vec![];
-        let mut first = 0;
-        for end in 1..=count {
-            if end == count || end - first >= LEAST_PART && stops(end) {
-                parts.push(first..end);
-                first = end;
-            }
+        let (mut first, mut left) = (0, &ends[..]);
+        while !left.is_empty() {
+            let short = left.partition_point(|&end| end < first + LEAST_PART);
+            let (own, others) = left.split_at((short + 1).min(left.len()));
+            parts.push((first, own));
+            (first, left) = (own[own.len() - 1], others);
         }
         let each = watch.each(count);
-        let part = |range: Range<usize>| {
+        let part = |(mut first, ends): (usize, &[usize])| {
             let mut part = Self::default();
-            let mut first = range.start;
-            for end in range.start + 1..=range.end {
-                if end < count && turns_back(end) && !exact {
+            for &end in ends {
+                // Other moves than exact ones stop where they turn back.
+                if end < count && !exact {
                     part.not_smooth.reversals.push(chords.chords[end - 1].last);
                 }
-                if end == range.end || stops(end) {
-                    part.append(&chords, first..end, &rules, each.part((end - first) as f64));
-                    first = end;
-                }
+                part.append(&chords, first..end, &rules, each.part((end - first) as f64));
+                first = end;
             }
             part
         };

@@ -1,0 +1,176 @@
+//! The length of a part by Gauss's rule of eight points, and its parameter by the length as a table: between two rows u(s) is
+//! the quintic with their u, u' and u''. Panels are halved until both are accurate.
+
+use super::derivatives::{piece, rate, speed_sq, speeds_sq};
+use feedplan_geometry::arc_length::{W, X};
+use feedplan_geometry::spline::bezier::derivatives;
+use feedplan_planner::problem::Problem;
+
+/// Accuracy of the quadrature of a panel, as a part of its length …
+const QUADRATURE: f64 = 1e-12;
+/// … and of the quintic half-way; the halves that are kept are 64 times as accurate. Near a sharp turn panels are as
+/// short as the turn, and the third derivatives need digits of that length.
+const QUINTIC: f64 = 1e-9;
+/// Greatest error of a quintic that is right half-way, over that of its rate half-way: by (t − ½)(t(1 − t))³.
+const ODD: f64 = 0.12;
+/// Panels shorter than this part of their piece are not halved.
+const SHORTEST: f64 = 1e-14;
+/// Relative rounding of tangents and parameters.
+const ROUNDING: f64 = 4e-15;
+/// Tables get about this many rows at most; beside a turn of 1e-10 of its piece some 700 are used.
+const MOST_ROWS: usize = 20_000;
+/// Panels are halved at most this often.
+const DEPTH: u32 = 48;
+/// Parts of a piece between the samples of its speed.
+const SAMPLES: usize = 8;
+
+/// The part of a piece between two parameters, without a cusp inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    pub piece: usize,
+    pub u: [f64; 2],
+}
+
+/// One row of a table: u, u' and u'' at a length s from the start of the part.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    pub s: f64,
+    pub u: f64,
+    rate: f64,
+    bend: f64,
+}
+
+/// The length between two parameters of piece `i`, by one Gauss rule of eight points.
+pub fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let below = speeds_sq(problem, i, X.map(|x| middle - x * half));
+    let above = speeds_sq(problem, i, X.map(|x| middle + x * half));
+    let [f0, f1, f2, f3] = std::array::from_fn(|lane| W[lane] * (below[lane].sqrt() + above[lane].sqrt()));
+    half * ((f0 + f2) + (f1 + f3))
+}
+
+/// The rows of a table around a length.
+pub fn around(rows: &[Row], s: f64) -> [&Row; 2] {
+    let i = rows[1..rows.len() - 1].partition_point(|row| row.s <= s);
+    [&rows[i], &rows[i + 1]]
+}
+
+impl Row {
+    fn new<const M: usize>(problem: &Problem<M>, i: usize, u: f64, s: f64) -> Self {
+        let [d, d1, _] = rate(problem, i, u, &derivatives(&piece(problem, i), u));
+        Self { s, u, rate: 1.0 / d.sqrt(), bend: -0.5 * d1 / (d * d) }
+    }
+
+    /// du/ds of the quintic at s.
+    fn rate_between(&self, next: &Self, s: f64) -> f64 {
+        let h = next.s - self.s;
+        let t = (s - self.s) / h;
+        let r = 1.0 - t;
+        30.0 * t * t * r * r * (next.u - self.u) / h
+            + self.rate * r * r * (1.0 + 2.0 * t - 15.0 * t * t)
+            + next.rate * t * t * (1.0 + 2.0 * r - 15.0 * r * r)
+            + 0.5
+                * h
+                * (self.bend * t * r * r * (2.0 * r - 3.0 * t) + next.bend * t * t * r * (3.0 * r - 2.0 * t))
+    }
+
+    /// u of the quintic at s between two rows.
+    #[inline]
+    pub fn parameter_at(&self, next: &Self, s: f64) -> f64 {
+        let h = next.s - self.s;
+        let t = if h > 0.0 { (s - self.s) / h } else { 0.0 };
+        let (r, t2) = (1.0 - t, t * t);
+        let r2 = r * r;
+        let left = self.u * (1.0 + 3.0 * t + 6.0 * t2)
+            + self.rate * h * t * (1.0 + 3.0 * t)
+            + 0.5 * self.bend * h * h * t2;
+        let right = next.u * (1.0 + 3.0 * r + 6.0 * r2) - next.rate * h * r * (1.0 + 3.0 * r)
+            + 0.5 * next.bend * h * h * r2;
+        let u = left * r2 * r + right * t2 * t;
+        // Next to a cusp the quintic may leave its range.
+        if u >= self.u && u <= next.u {
+            u
+        } else {
+            self.u + t * (next.u - self.u)
+        }
+    }
+}
+
+/// Halves the panels of a part until its quadrature is accurate, for its length, or its quintics too, for its table.
+pub struct Halving<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    part: &'a Part,
+    /// The length by one panel, and the greatest of some tangents.
+    whole: f64,
+    fastest: f64,
+}
+
+impl<'a, const M: usize> Halving<'a, M> {
+    pub fn new(problem: &'a Problem<'a, M>, part: &'a Part) -> Self {
+        let ([a, b], i) = (part.u, part.piece);
+        let at = |n: usize| a + (b - a) * n as f64 / SAMPLES as f64;
+        let inside = [[1, 2, 3, 4], [5, 6, 7, 8]].map(|some| speeds_sq(problem, i, some.map(at)));
+        let fastest = inside.into_iter().flatten().fold(speed_sq(problem, i, a), f64::max).sqrt();
+        Self { problem, part, whole: panel(problem, i, a, b), fastest }
+    }
+
+    /// The rounding of a length up to u: that of tangents is relative to the longest tangent, that of u to itself.
+    fn noise(&self, [a, b]: [f64; 2], rate: f64) -> f64 {
+        ROUNDING * ((b - a) * self.fastest + b / rate)
+    }
+
+    /// Whether the length of a panel by its halves is that by the whole, or too short to tell.
+    fn is_met(&self, length: f64, whole: f64, noise: f64) -> bool {
+        (length - whole).abs() <= QUADRATURE * length + noise || length <= SHORTEST * self.whole
+    }
+
+    /// The length of the part.
+    pub fn total(&self) -> f64 {
+        self.length(self.part.u, self.whole, 0)
+    }
+
+    /// The length between two parameters, with that of one panel.
+    fn length(&self, [a, b]: [f64; 2], whole: f64, depth: u32) -> f64 {
+        let middle = 0.5 * (a + b);
+        let halves = [[a, middle], [middle, b]];
+        let [left, right] = halves.map(|[a, b]| panel(self.problem, self.part.piece, a, b));
+        let length = left + right;
+        if depth == DEPTH || self.is_met(length, whole, self.noise([a, b], (b - a) / length)) {
+            return length;
+        }
+        self.length(halves[0], left, depth + 1) + self.length(halves[1], right, depth + 1)
+    }
+
+    /// The rows of the part, whose last one has the length.
+    pub fn table(&self) -> Vec<Row> {
+        let mut rows = vec![Row::new(self.problem, self.part.piece, self.part.u[0], 0.0)];
+        self.halve(&mut rows, self.part.u[1], self.whole, 0);
+        rows
+    }
+
+    /// Appends rows for the panel from the last row to b.
+    fn halve(&self, rows: &mut Vec<Row>, b: f64, whole: f64, depth: u32) {
+        let from = rows[rows.len() - 1];
+        let middle = 0.5 * (from.u + b);
+        let [left, right] =
+            [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.part.piece, a, b));
+        let half = Row::new(self.problem, self.part.piece, middle, from.s + left);
+        let end = Row::new(self.problem, self.part.piece, b, from.s + left + right);
+        // On a symmetric part the quintic is right half-way and wrong on both sides; only its rate shows this.
+        let odd = ODD * (end.s - from.s) * (from.rate_between(&end, half.s) - half.rate);
+        let mut miss = (from.parameter_at(&end, half.s) - middle).abs().max(odd.abs()) / half.rate;
+        let length = left + right;
+        if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {
+            miss = length;
+        }
+        let noise = self.noise([from.u, b], half.rate) + f64::EPSILON * end.s;
+        let met = self.is_met(length, whole, noise)
+            && (miss <= QUINTIC * length + noise || length <= SHORTEST * self.whole);
+        if met || rows.len() > MOST_ROWS || depth == DEPTH {
+            rows.extend([half, end]);
+        } else {
+            self.halve(rows, middle, left, depth + 1);
+            self.halve(rows, b, right, depth + 1);
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The phase at a time of a run, for times that mostly rise.
+
+use std::ops::Range;
+use std::rc::Rc;
+
+use super::path_data::PathData;
+use crate::phase_motion::{PhaseMotion, PiecePath};
+use feedplan_planner::phases::Phases;
+
+/// The phase at a time, kept from one setpoint to the next, and its piece, kept from one phase to the next.
+pub struct Cursor<'a, const M: usize> {
+    path: &'a PathData<M>,
+    phases: &'a Phases,
+    /// Time from the start of the phase's run.
+    starts: &'a [f64],
+    phase: usize,
+    piece: Option<(u32, Rc<PiecePath<'a, M>>)>,
+    motion: Option<(usize, PhaseMotion<'a, M>)>,
+}
+
+impl<'a, const M: usize> Cursor<'a, M> {
+    pub fn new(path: &'a PathData<M>, phases: &'a Phases, starts: &'a [f64]) -> Self {
+        Self { path, phases, starts, phase: usize::MAX, piece: None, motion: None }
+    }
+
+    /// The next search begins at this phase.
+    pub fn begin_at(&mut self, phase: usize) {
+        self.phase = phase;
+    }
+
+    /// Goes to the phase that contains the time, among those of a run.
+    pub fn seek(&mut self, run: &Range<usize>, time: f64) -> usize {
+        let starts = self.starts;
+        if !run.contains(&self.phase) || starts[self.phase] > time {
+            self.phase = run.start + starts[run.clone()].partition_point(|&start| start <= time) - 1;
+        }
+        while self.phase + 1 < run.end && starts[self.phase + 1] <= time {
+            self.phase += 1;
+        }
+        if self.motion.as_ref().is_none_or(|(phase, _)| *phase != self.phase) {
+            let phase = self.phases.get(self.phase).expect("all laws are known");
+            let piece = match self.piece.take() {
+                Some((number, piece)) if number == phase.piece => piece,
+                _ => Rc::new(self.path.piece(phase.piece as usize)),
+            };
+            self.piece = Some((phase.piece, piece.clone()));
+            self.motion = Some((self.phase, PhaseMotion::new(piece, &phase)));
+        }
+        self.phase
+    }
+
+    pub fn motion(&self) -> &PhaseMotion<'a, M> {
+        &self.motion.as_ref().expect("seek comes first").1
+    }
+}
