@@ -1,7 +1,7 @@
 //! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
 
 use super::columns::Columns;
-use super::deviation::{settled, window};
+use super::deviation::{enough, settled, window};
 use super::nearest::Place;
 use super::neighbours::Neighbours;
 use super::profile_reader::ACCELERATION_SHARE;
@@ -39,17 +39,17 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let (path, piece) = (&self.plan.path, nearest.place.piece);
         if let Some(program) = &self.plan.program {
             let limit = path.tolerance[piece] + PLACE_TOLERANCE;
-            let enough = settled(tally) * limit;
+            let (settled, unmeasured) = (settled(tally), settled(tally) * limit);
             if self.piece != Some(piece) {
                 self.near.replace(program, window(path, piece, program.len()));
                 self.piece = Some(piece);
                 let points = path.rows(piece).map(|row| path.point(row));
-                self.beside = self.near.straight_beside(points, enough);
+                self.beside = self.near.straight_beside(points, unmeasured);
             }
             let is_beside =
-                nearest.is_good() && self.beside.is_some_and(|most| most + PLACE_TOLERANCE <= enough);
+                nearest.is_good() && self.beside.is_some_and(|most| most + PLACE_TOLERANCE <= unmeasured);
             if !is_beside {
-                let away = self.near.distance(&row.q, [enough + rounding; 2]);
+                let away = self.near.distance(&row.q, enough(settled, limit, rounding));
                 tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
             }
         }

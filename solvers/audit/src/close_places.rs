@@ -32,7 +32,7 @@ impl<'a, const M: usize> ClosePlaces<'a, M> {
     }
 
     /// Whether the last place is on one of these pieces.
-    pub fn is_on(&self, [least, most]: [usize; 2]) -> bool {
+    fn is_on(&self, [least, most]: [usize; 2]) -> bool {
         (least..=most).contains(&self.place.piece)
     }
 

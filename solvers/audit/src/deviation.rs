@@ -23,6 +23,9 @@ const PLACES: usize = 8;
 /// 1.6 % of its greatest distance from a line.
 const NEAR: f64 = 0.95;
 
+/// Up to this share of the tolerance the distance from the nearest place of a few steps counts: it is never too small.
+const FAR_BELOW: f64 = 0.5;
+
 /// Where no more pieces follow a move they are all measured; of more, those whose boxes come near enough.
 const FEW: usize = 8;
 
@@ -175,6 +178,11 @@ pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
     tally.get(Check::Deviation, 0).ratio.max(0.0)
 }
 
+/// Distances that count as close where so much is allowed: for the first place, and for the nearest of a few steps.
+pub fn enough(settled: f64, allowed: f64, rounding: f64) -> [f64; 2] {
+    [settled, settled.max(FAR_BELOW)].map(|share| share * allowed + rounding)
+}
+
 fn piece_to_moves<'a, const M: usize>(
     path: &Followed,
     program: &Programmed<'a>,
@@ -195,14 +203,15 @@ fn piece_to_moves<'a, const M: usize>(
     let (width, places) = (curve.width(), PLACES * curve.turns());
     let rounding = ROUNDINGS * EPS * curve.magnitude();
     near.start_at(followers, piece);
-    let mut off = |t: f64, shares: [f64; 2]| {
-        near.distance(&curve.at(t * width), shares.map(|share| share * tolerance + rounding)) - rounding
+    let mut off = |t: f64, most: f64, tally: &Tally<M>| {
+        let [first, nearest] = enough(settled(tally), tolerance, rounding);
+        near.distance(&curve.at(t * width), [first.min(most), nearest]) - rounding
     };
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
     for i in 0..=places {
         let t = i as f64 / places as f64;
         // Where it comes near its tolerance the piece is looked at again.
-        let value = off(t, [settled(tally).min(NEAR), settled(tally)]);
+        let value = off(t, NEAR * tolerance, tally);
         tally.offer(Check::Deviation, 0, value, tolerance, time, line);
         if value > worst {
             (worst, worst_t) = (value, t);
@@ -213,7 +222,8 @@ fn piece_to_moves<'a, const M: usize>(
         let step = 1.0 / (places * PLACES) as f64;
         for i in 0..=2 * PLACES {
             let t = (worst_t + (i as f64 - PLACES as f64) * step).clamp(0.0, 1.0);
-            tally.offer(Check::Deviation, 0, off(t, [settled(tally); 2]), tolerance, time, line);
+            let value = off(t, f64::INFINITY, tally);
+            tally.offer(Check::Deviation, 0, value, tolerance, time, line);
         }
     }
 }
@@ -303,10 +313,10 @@ impl<const M: usize> Follow<'_, M> {
         if let Some((_, place, away)) = known {
             return (place, away);
         }
-        let enough = settled(tally);
+        let most_so_far = settled(tally);
         let (path, expected) = (self.path, self.close.place().piece);
         let tolerance_of = |piece: usize| path.tolerance[piece].max(GAP_TOLERANCE);
-        let close = |piece: usize| [enough * tolerance_of(piece) + rounding; 2];
+        let close = |piece: usize| enough(most_so_far, tolerance_of(piece), rounding);
         let (place, away) = match self.close.find(&q, [least, most], close) {
             Some((place, distance)) => (place, distance - rounding),
             None => {
@@ -324,7 +334,7 @@ impl<const M: usize> Follow<'_, M> {
                     if away / tolerance < nearest.0 {
                         nearest = (away / tolerance, Place { piece, u }, away);
                     }
-                    if nearest.0 <= enough {
+                    if nearest.0 <= most_so_far {
                         break;
                     }
                 }

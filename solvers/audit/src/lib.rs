@@ -306,10 +306,12 @@ impl<const M: usize> Sided<M> {
     /// The limit that holds for a value, by its sign.
     #[inline(always)]
     pub fn of(&self, axis: usize, value: f64) -> f64 {
+        // Both are read, so that no branch follows a sign that changes often.
+        let (positive, negative) = (self.positive[axis], self.negative[axis]);
         if value < 0.0 {
-            self.negative[axis]
+            negative
         } else {
-            self.positive[axis]
+            positive
         }
     }
 

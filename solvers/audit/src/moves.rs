@@ -165,44 +165,40 @@ impl<const M: usize> Move<'_, M> {
         }
     }
 
-    /// Distance of `q` from the nearest place of the move, in mm. The search ends at a place within the first distance of `enough`; of
-    /// a spline it starts at the piece `expected`, which becomes the nearest one, or at the last place that was `close`, and the
-    /// nearest place of a few steps counts within the second distance.
-    pub(super) fn distance(
-        &self,
-        q: &[f64; M],
-        expected: &mut usize,
-        enough: [f64; 2],
-        mut close: Option<&mut ClosePlaces<M>>,
-    ) -> f64 {
+    /// Distance of `q` from the nearest place of the move, in mm, or from a place within `enough`.
+    pub(super) fn distance(&self, q: &[f64; M], enough: f64) -> f64 {
         match &self.shape {
             Shape::Line => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
-            Shape::Arc(arc) => self.distance_to_arc(arc, q, enough[0]),
+            Shape::Arc(arc) => self.distance_to_arc(arc, q, enough),
             Shape::Spline { pieces, first, last } => {
-                let found = close.as_mut().and_then(|close| close.find(q, [*first, *last], |_| enough));
-                if let Some((place, away)) = found {
-                    *expected = place.piece;
-                    return away;
-                }
-                let (mut least, mut nearest) = (f64::INFINITY, 0.0);
-                for piece in outwards((*expected).clamp(*first, *last), *first, *last) {
-                    if pieces.distance_at_least(piece, q) > least {
-                        continue;
-                    }
-                    let (u, away) = nearest_on_piece(&pieces.curve::<M>(piece), q);
-                    if away < least {
-                        (least, nearest, *expected) = (away, u, piece);
-                    }
-                    if least <= enough[0] {
-                        break;
-                    }
-                }
-                if let Some(close) = close {
-                    close.start_at(Place { piece: *expected, u: nearest });
-                }
-                least
+                nearest_of(
+                    pieces,
+                    q,
+                    Place { piece: *first, u: 0.0 },
+                    (*first, *last),
+                    [enough, f64::INFINITY],
+                )
+                .1
             }
         }
+    }
+
+    /// The same, where a spline is searched from the last place on it, which becomes the next one, and the nearest place of a few
+    /// steps counts within the second distance of `enough`; what is beyond `least` need not be known.
+    pub(super) fn distance_from(
+        &self,
+        q: &[f64; M],
+        (last_place, close): (&mut Option<Place>, &mut ClosePlaces<M>),
+        enough: [f64; 2],
+        least: f64,
+    ) -> f64 {
+        let Shape::Spline { pieces, first, last } = &self.shape else { return self.distance(q, enough[0]) };
+        close.start_at(last_place.unwrap_or(Place { piece: *first, u: 0.0 }));
+        let found = close.find(q, [*first, *last], |_| enough);
+        let (place, away) = found
+            .unwrap_or_else(|| nearest_of(pieces, q, close.place(), (*first, *last), [enough[0], least]));
+        *last_place = Some(place);
+        away
     }
 
     /// Distance from the nearest of all local minima and both ends, or from a place within `enough`.
@@ -232,6 +228,31 @@ impl<const M: usize> Move<'_, M> {
     }
 }
 
+/// The place of some pieces that is nearest to `q`, or one within `enough`, and its distance, searched outwards from a place; that
+/// one, and `least`, where none is nearer than that.
+fn nearest_of<const M: usize>(
+    pieces: &Pieces,
+    q: &[f64; M],
+    from: Place,
+    (first, last): (usize, usize),
+    [enough, least]: [f64; 2],
+) -> (Place, f64) {
+    let mut nearest = (from, least);
+    for piece in outwards(from.piece.clamp(first, last), first, last) {
+        if pieces.distance_at_least(piece, q) > nearest.1 {
+            continue;
+        }
+        let (u, away) = nearest_on_piece(&pieces.curve::<M>(piece), q);
+        if away < nearest.1 {
+            nearest = (Place { piece, u }, away);
+        }
+        if nearest.1 <= enough {
+            break;
+        }
+    }
+    nearest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -241,7 +262,7 @@ mod tests {
 
     /// The distance from the nearest place.
     fn off<const M: usize>(programmed: &Move<M>, q: &[f64; M]) -> f64 {
-        programmed.distance(q, &mut 0, [0.0; 2], None)
+        programmed.distance(q, 0.0)
     }
 
     #[test]
@@ -277,18 +298,16 @@ mod tests {
         assert!(distance(&spline.at(0.75), &[6.0, 1.0]) < 1e-15);
         assert!((off(&spline, &[1.0, -2.0]) - 2.0).abs() < 1e-15);
         // Across the parabola at x = 6, where it rises at 45 degrees.
-        for expected in [0, 1, 7] {
-            assert!(
-                (spline.distance(&[7.0, 0.0], &mut { expected }, [0.0; 2], None) - 2.0_f64.sqrt()).abs()
-                    < 1e-12
-            );
-            let mut close = ClosePlaces::new(splines);
-            for enough in [0.0, 1.5, 0.0, 1.42] {
-                let away = spline.distance(&[7.0, 0.0], &mut { expected }, [enough; 2], Some(&mut close));
-                let most = enough.max(2.0_f64.sqrt() + 1e-12);
-                assert!((2.0_f64.sqrt() - 1e-12..=most).contains(&away), "{away}");
-            }
+        assert!((off(&spline, &[7.0, 0.0]) - 2.0_f64.sqrt()).abs() < 1e-12);
+        let (mut close, mut place) = (ClosePlaces::new(splines), None);
+        for enough in [0.0, 1.5, 0.0, 1.42] {
+            let from = (&mut place, &mut close);
+            let away = spline.distance_from(&[7.0, 0.0], from, [enough; 2], f64::INFINITY);
+            let most = enough.max(2.0_f64.sqrt() + 1e-12);
+            assert!((2.0_f64.sqrt() - 1e-12..=most).contains(&away), "{away}");
         }
+        // Nothing is nearer than that.
+        assert_eq!(spline.distance_from(&[7.0, 0.0], (&mut place, &mut close), [0.0; 2], 1.4), 1.4);
     }
 
     /// Helices about Z from radius 10, a quarter of a turn more than two or none: 9 mm up, 100 mm, not at all; some turn

@@ -7,14 +7,15 @@ use super::nearest::Place;
 /// First and last piece that follow a move.
 pub type Followers = (usize, usize);
 
+/// A move, and on splines the place that was nearest last.
+type Near<'a, const M: usize> = (usize, Move<'a, M>, Option<Place>);
+
 /// Some moves that places along a path are measured against, one after the other.
 #[derive(Default)]
 pub struct Neighbours<'a, const M: usize> {
-    moves: Vec<(usize, Move<'a, M>)>,
+    moves: Vec<Near<'a, M>>,
     /// The one nearest to the place before: mostly nearest to the next one too.
     nearest: usize,
-    /// Of each move the piece that was nearest last.
-    expected: Vec<usize>,
     /// Places on the splines, if there are any.
     close: Option<ClosePlaces<'a, M>>,
 }
@@ -22,29 +23,24 @@ pub struct Neighbours<'a, const M: usize> {
 impl<'a, const M: usize> Neighbours<'a, M> {
     /// Takes other moves.
     pub fn replace(&mut self, program: &Programmed<'a>, numbers: impl Iterator<Item = usize>) {
-        let known = self.moves.first().zip(self.expected.first()).map(|(first, piece)| (first.0, *piece));
         if self.close.is_none() && !program.splines.is_empty() {
             self.close = Some(ClosePlaces::new(program.splines));
         }
-        self.moves.clear();
-        self.moves.extend(numbers.map(|number| (number, program.get(number))));
+        let known = std::mem::take(&mut self.moves);
+        let place = |number: usize| known.iter().find(|near| near.0 == number).and_then(|near| near.2);
+        self.moves.extend(numbers.map(|number| (number, program.get(number), place(number))));
         self.nearest = 0;
-        self.expected.clear();
-        let expected = |number: usize| known.filter(|known| known.0 == number).map_or(0, |known| known.1);
-        self.expected.extend(self.moves.iter().map(|(number, _)| expected(*number)));
     }
 
     /// Expects the nearest place of a spline to be as far along it as `piece` is along the pieces that follow it, where no place of
     /// that spline is known.
     pub fn start_at(&mut self, followers: &[Followers], piece: usize) {
-        for ((number, programmed), expected) in self.moves.iter().zip(&mut self.expected) {
-            if let Shape::Spline { first, last, .. } = programmed.shape {
+        for (number, programmed, place) in &mut self.moves {
+            if let (Shape::Spline { first, last, .. }, None) = (programmed.shape, &place) {
                 let (from, to) = followers[*number];
                 let share = piece.saturating_sub(from) as f64 / (to + 1).saturating_sub(from).max(1) as f64;
-                *expected = (first + (share * (last + 1 - first) as f64) as usize).min(last);
-                if let Some(close) = self.close.as_mut().filter(|close| !close.is_on([first, last])) {
-                    close.start_at(Place { piece: *expected, u: 0.0 });
-                }
+                let piece = (first + (share * (last + 1 - first) as f64) as usize).min(last);
+                *place = Some(Place { piece, u: 0.0 });
             }
         }
     }
@@ -56,22 +52,26 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         points: impl Iterator<Item = [f64; M]> + Clone,
         enough: f64,
     ) -> Option<f64> {
-        let mut straight = self.moves.iter().filter(|(_, programmed)| programmed.is_straight());
-        straight.find_map(|(_, programmed)| {
-            let away = |q: [f64; M]| {
-                Some(programmed.distance(&q, &mut 0, [0.0; 2], None)).filter(|away| *away <= enough)
-            };
+        let mut straight = self.moves.iter().filter(|(_, programmed, _)| programmed.is_straight());
+        straight.find_map(|(_, programmed, _)| {
+            let away = |q: [f64; M]| Some(programmed.distance(&q, 0.0)).filter(|away| *away <= enough);
             points.clone().try_fold(0.0, |most: f64, q| Some(most.max(away(q)?)))
         })
     }
 
-    /// Distance of `q` from the nearest move, or from the first that is within the first of `enough`; see `Move::distance` for the
-    /// second. A NaN if there is one.
+    /// Distance of `q` from the nearest move, or from the first that is within the first of `enough`; see `Move::distance_from` for
+    /// the second. A NaN if there is one.
     pub fn distance(&mut self, q: &[f64; M], enough: [f64; 2]) -> f64 {
         let mut least = f64::INFINITY;
         let first = self.nearest;
         for m in (first..self.moves.len()).chain(0..first) {
-            let away = self.moves[m].1.distance(q, &mut self.expected[m], enough, self.close.as_mut());
+            let (_, programmed, place) = &mut self.moves[m];
+            let away = match &mut self.close {
+                Some(close) if !programmed.is_straight() => {
+                    programmed.distance_from(q, (place, close), enough, least)
+                }
+                _ => programmed.distance(q, enough[0]),
+            };
             if away.is_nan() {
                 return away;
             }

@@ -174,7 +174,9 @@ impl<const M: usize> Looker<'_, '_, M> {
         let mut offer = |check: Check, rate: &Rounded<M>, limit: [f64; M]| {
             let row = &mut used.rates[check as usize - Check::Velocity as usize];
             let value: [f64; M] = vector_of(|k| rate.value[k].abs() - rate.rounding[k]);
-            let share = |k: usize| if value[k] <= 0.0 { 0.0 } else { value[k] / limit[k] };
+            // Without a branch; axes beyond the machine's own have the limit 0.
+            let ratio: [f64; M] = vector_of(|k| value[k] / limit[k]);
+            let share = |k: usize| if value[k] <= 0.0 { 0.0 } else { ratio[k] };
             *row = vector_of(|k| share(k).copysign(rate.value[k]));
             for k in 0..M {
                 tally.offer_share(check, k, (value[k], limit[k], row[k].abs()), line, time);
