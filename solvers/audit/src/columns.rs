@@ -141,6 +141,14 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
+    /// Which feeds of a piece limit the speed along the path, or that of the tool of joints: they count all axes that move.
+    pub fn feeds_along(&mut self, piece: usize) -> [bool; FEEDS] {
+        let (are_axes, limits) = (self.are_axes(), self.limits);
+        let moves = self.curves.get(piece).derivative_size();
+        let counts = |feed: usize, k: usize| moves[k] == 0.0 || limits.feed_axes[feed][k] == 1.0;
+        std::array::from_fn(|feed| !are_axes || (0..limits.axes).all(|k| counts(feed, k)))
+    }
+
     /// The speed that a feed, or with `CHORD` the chord error, is about, and its error: from velocities of the columns, or that
     /// of the `tip`.
     pub fn speed(&self, feed: usize, velocity: &Rounded<M>, tip: [f64; 2]) -> [f64; 2] {

@@ -14,7 +14,9 @@ pub struct Peak {
 #[inline(always)]
 pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<Peak> {
     let (bend, slope) = (2.0 * b - a - c, c - a);
-    if slope.abs() >= 2.0 * bend.abs() {
+    // Neither the vertex nor what it may have missed adds more than half of `bend`, and all of it: most rates are far below.
+    let is_far_below = b.abs() + 1.5 * bend.abs() < worst;
+    if is_far_below || slope.abs() >= 2.0 * bend.abs() {
         return None;
     }
     let top = b + slope * slope / (8.0 * bend);

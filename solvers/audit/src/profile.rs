@@ -108,6 +108,7 @@ impl<const M: usize> Audited<'_, M> {
             let curve = columns.curve(piece).clone();
             let covered = curve.turns() as f64 * ((u[1] - u[0]) / width);
             let (limits, start, motion) = (self.limits, time, &motion);
+            let feeds_along = columns.feeds_along(piece);
             let mut looker = Looker {
                 columns: &mut *columns,
                 piece,
@@ -115,6 +116,7 @@ impl<const M: usize> Audited<'_, M> {
                 curve: &curve,
                 limits,
                 feeds,
+                feeds_along,
                 covered,
                 start,
                 line,

@@ -7,9 +7,9 @@
 //! * elsewhere a parabola through three places tells where a rate is greatest, and it is measured there.
 
 use crate::chord::chord_error;
-use crate::columns::{Columns, CHORD};
+use crate::columns::Columns;
 use crate::curve::Curve;
-use crate::peak::peak;
+use crate::peak::{peak, Peak};
 use crate::phase_by_length::{PhaseByLength, Place};
 use crate::phase_motion::ROUNDING;
 use crate::station::{Rounded, Station};
@@ -60,6 +60,7 @@ pub struct Looker<'a, 'b, const M: usize> {
     pub curve: &'a Curve<M>,
     pub limits: &'a Limits<M>,
     pub feeds: [f64; FEEDS],
+    pub feeds_along: [bool; FEEDS],
     /// The part of its piece that the phase covers, in degrees of it.
     pub covered: f64,
     pub start: f64,
@@ -117,29 +118,33 @@ impl<const M: usize> Looker<'_, '_, M> {
     fn refine(&mut self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
         for (row, check) in RATES.into_iter().enumerate() {
             for k in 0..self.columns.count() {
-                self.climb(places, (check, k), depth, |used| used.rates[row][k], tally);
+                let (rate, worst) = (|used: &Use<M>| used.rates[row][k], tally.get(check, k).ratio);
+                if let Some(peak) = peak(places.map(|look| rate(&look.used)), worst) {
+                    self.climb(places, (peak, worst), depth, &rate, tally);
+                }
             }
         }
         for i in 0..=FEEDS {
             let check = if i == FEEDS { Check::Chord } else { Check::Feed };
-            self.climb(places, (check, 0), depth, |used| used.tip[i], tally);
+            let (rate, worst) = (|used: &Use<M>| used.tip[i], tally.get(check, 0).ratio);
+            if let Some(peak) = peak(places.map(|look| rate(&look.used)), worst) {
+                self.climb(places, (peak, worst), depth, &rate, tally);
+            }
         }
     }
 
-    /// The same for one rate.
+    /// Looks at a peak of one rate beyond the `worst` so far, and beside it.
     fn climb(
         &mut self,
         places: [&Look<M>; 3],
-        (check, k): (Check, usize),
+        (peak, worst): (Peak, f64),
         depth: u32,
-        rate: impl Fn(&Use<M>) -> f64,
+        rate: &dyn Fn(&Use<M>) -> f64,
         tally: &mut Tally<M>,
     ) {
-        let Some(peak) = peak(places.map(|look| rate(&look.used)), tally.get(check, k).ratio) else { return };
         let [first, middle, last] = places.map(|look| look.place.u);
         let half = 0.5 * (last - first);
         let centre = middle + peak.at * half;
-        let worst = tally.get(check, k).ratio;
         let Some(top) = self.look(centre, tally) else { return };
         if depth == MOST_REFINED || !peak.may_pass(rate(&top.used), worst) {
             return;
@@ -190,14 +195,16 @@ impl<const M: usize> Looker<'_, '_, M> {
         }
         let tip = [pace.v, speed_rounding + ROUNDING * pace.v].map(|v| station.tip * v);
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let [speed, rounding] = self.columns.speed(feed, &velocity, tip);
+            let [speed, rounding] = match self.feeds_along[feed] {
+                true => tip,
+                false => self.columns.speed(feed, &velocity, tip),
+            };
             let speed = speed - rounding;
             used.tip[feed] = speed / limit;
             tally.offer_at(Check::Feed, 0, speed, limit, line, time);
         }
         if limits.chord_tolerance.is_finite() {
-            let [speed, rounding] = self.columns.speed(CHORD, &velocity, tip);
-            let error = chord_error((speed - rounding) * limits.period, station.curvature);
+            let error = chord_error((tip[0] - tip[1]) * limits.period, station.curvature);
             used.tip[FEEDS] = error / limits.chord_tolerance;
             tally.offer_at(Check::Chord, 0, error, limits.chord_tolerance, line, time);
         }
@@ -214,9 +221,10 @@ impl<const M: usize> Looker<'_, '_, M> {
             return Between::Unbounded;
         };
         let (mut is_certain, mut is_narrow) = (true, true);
-        let mut weigh = |check: Check, axis: usize, known: f64, more: f64| {
-            is_certain &= known + more <= tally.get(check, axis).ratio + PASS_EXCESS;
-            is_narrow &= more <= WIDE;
+        // By how much a rate may be greater than a use of its limit that is known.
+        let mut weigh = |check: Check, axis: usize, known: f64, more: f64, limit: f64| {
+            is_certain &= more <= (tally.get(check, axis).ratio + PASS_EXCESS - known) * limit;
+            is_narrow &= more <= WIDE * limit;
         };
         let judged = if limits.judges_jerk { 3 } else { 2 };
         let moves = self.curve.derivative_size();
@@ -224,20 +232,20 @@ impl<const M: usize> Looker<'_, '_, M> {
             let least = [limits.velocity.least(k), limits.acceleration.least(k), limits.jerk[k]];
             for (row, check) in RATES.into_iter().enumerate().take(judged) {
                 let [near, far] = ends.map(|used| used.rates[row][k].abs());
-                weigh(check, k, near.max(far), bulge.rates[row] / least[row]);
+                weigh(check, k, near.max(far), bulge.rates[row], least[row]);
             }
         }
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
             let [near, far] = ends.map(|used| used.tip[feed]);
             let known = near.max(far);
             // No share of the speed along the path is greater than that speed.
-            weigh(Check::Feed, 0, known, (bulge.rates[0] / limit).min(bulge.most_speed / limit - known));
+            weigh(Check::Feed, 0, known, bulge.rates[0].min(bulge.most_speed - known * limit), limit);
         }
         if limits.chord_tolerance.is_finite() {
             let curvature = from.station.curvature.max(to.station.curvature) + bulge.curvature;
-            let most = chord_error(bulge.most_speed * limits.period, curvature) / limits.chord_tolerance;
-            let [near, far] = ends.map(|used| used.tip[FEEDS]);
-            weigh(Check::Chord, 0, near.max(far), most - near.max(far));
+            let most = chord_error(bulge.most_speed * limits.period, curvature);
+            let ([near, far], limit) = (ends.map(|used| used.tip[FEEDS]), limits.chord_tolerance);
+            weigh(Check::Chord, 0, near.max(far), most - near.max(far) * limit, limit);
         }
         match () {
             () if is_certain => Between::Certain,
@@ -306,8 +314,9 @@ mod tests {
             let mut tally = Tally::default();
             let (feeds, covered) = ([f64::INFINITY; FEEDS], curve.turns() as f64 * (u[1] - u[0]) / width);
             let (columns, motion, curve, limits) = (&mut columns, &motion, &*curve, &limits);
+            let feeds_along = [true; FEEDS];
             let mut looker =
-                Looker { columns, piece: 0, motion, curve, limits, feeds, covered, start: 0.0, line: 1 };
+                Looker { columns, piece: 0, motion, curve, limits, feeds, feeds_along, covered, start: 0.0, line: 1 };
             let ends = u.map(|u| looker.look(u, &mut tally));
             looker.phase(u, ends.each_ref().map(Option::as_ref), &mut tally);
             for (row, check) in [Check::Velocity, Check::Acceleration, Check::Jerk].into_iter().enumerate() {

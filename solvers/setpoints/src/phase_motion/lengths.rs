@@ -41,6 +41,8 @@ pub struct PiecePath<'a, const M: usize> {
     foot: f64,
     /// Of the axes, of the feed, of the way.
     tables: [OnceCell<Lengths<M>>; 3],
+    /// A place, and the square of the length per u there.
+    last_square: [Cell<[f64; 2]>; 3],
 }
 
 const AXES: usize = 0;
@@ -54,7 +56,8 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         };
         let least = SLOW * square(0.5 * piece.width);
         let foot = [0.0, piece.width].into_iter().find(|&u| square(u) <= least).unwrap_or(f64::NAN);
-        Self { piece, feed, way, foot, tables: Default::default() }
+        let last_square = [const { Cell::new([f64::NAN; 2]) }; 3];
+        Self { piece, feed, way, foot, tables: Default::default(), last_square }
     }
 
     pub(super) fn piece(&self) -> &Piece<'a, M> {
@@ -155,7 +158,13 @@ impl<'a, const M: usize> PiecePath<'a, M> {
 
     /// Squares of the length per u at both ends of a phase.
     pub(super) fn end_squares(&self, phase: &Phase) -> [f64; 2] {
-        [phase.u0, phase.u1].map(|u| self.square(phase.law, u))
+        let (number, _) = self.counts(phase.law);
+        // Most phases begin where one has ended.
+        let [u, known] = self.last_square[number].get();
+        let first = if u == phase.u0 { known } else { self.square(phase.law, phase.u0) };
+        let last = self.square(phase.law, phase.u1);
+        self.last_square[number].set([phase.u1, last]);
+        [first, last]
     }
 
     /// The place a length of the axes ahead of u, within `tolerance` mm, by Newton–Raphson.
