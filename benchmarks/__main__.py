@@ -12,6 +12,7 @@ from rich.console import Console
 from benchmarks import (
     against_copp,
     against_toppra,
+    audit_cost,
     batch,
     certificate_cost,
     curve_cost,
@@ -37,6 +38,7 @@ BENCHMARKS = {
         planner_cost,
         curve_cost,
         certificate_cost,
+        audit_cost,
         against_toppra,
         against_copp,
         end_to_end,

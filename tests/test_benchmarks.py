@@ -36,6 +36,7 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
         "planner-cost",
         "curve-cost",
         "certificate-cost",
+        "audit-cost",
         "against-copp",
         "against-toppra",
         "end-to-end",
