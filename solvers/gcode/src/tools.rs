@@ -1,4 +1,4 @@
-//! The tool that T, M6 and M61 take from it.
+//! The tool table of a program: the entry of a tool number, and what T, M6 and M61 take from it.
 
 use super::block::Block;
 use super::fault::{fault, Outcome};

@@ -116,6 +116,10 @@ fn a_right_corner_is_symmetric_about_its_bisector() {
     // Its distance from the corner is at most the tolerance, and nearly that.
     let corner = points.iter().map(|p| distance(p, &[10.0, 0.0])).fold(f64::INFINITY, f64::min);
     assert!(corner > 0.08 && corner < 0.1, "{corner}");
+    // The corner is cut inside, and is no bend.
+    let offsets = &smooth.offsets;
+    assert!(offsets.inside > 0.09 && offsets.inside <= 0.1 && offsets.outside <= 0.1, "{offsets:?}");
+    assert_eq!(offsets.mean(), 0.0);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Parts of a phase.
+//! A place on a phase as a share of its whole measure: of its length, of its parameter or of the way of an axis.
 
 /// A share of the whole measure of a phase, counted from its start or from its end.
 #[derive(Clone, Copy, Debug)]
