@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::curve::{Curve, Curves, Followed};
 use super::joints::columns::JointColumns;
 use super::joints::path::JointPath;
-use super::station::{Rounded, Station};
+use super::station::{Place, Rounded, Station};
 use super::vectors::{from_to, length, vector_of};
 use super::{Limits, EPS, FEEDS, ROUNDINGS};
 
@@ -20,21 +20,6 @@ const SMOOTH: f64 = 1e-9;
 const PLACES: f64 = 5.0;
 const SPEEDS: f64 = 10.0;
 const LEAST: f64 = 4.0;
-
-/// A place of a piece: the columns and their slopes by u, each with a bound of its error; of positions beside the rounding of the
-/// greatest coordinate.
-#[derive(Clone, Copy, Debug)]
-pub struct Place<const M: usize> {
-    pub piece: usize,
-    pub u: f64,
-    /// The tool's place, in axes of the path.
-    pub tip: [f64; M],
-    pub position: Rounded<M>,
-    pub slope: Rounded<M>,
-    /// Derivatives by u of the length of the path and of the way of the tool that the feed limits.
-    pub way_slope: f64,
-    pub tip_slope: f64,
-}
 
 /// The columns of a path, evaluated at one place after the other.
 pub struct Columns<'a, const M: usize> {

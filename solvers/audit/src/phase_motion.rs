@@ -11,10 +11,10 @@
 //! acceleration a way Δq_k takes 2 Δq_k over the sum of its speeds at both ends; where p is linear in u, Δu takes 2 Δu over the sum
 //! of √p; where v² is linear in u the slope of the way is integrated over the variable in which v is linear.
 
-use super::columns::{Columns, Place};
+use super::columns::Columns;
 use super::phases::{Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE};
 use super::quadrature::{integral, MOST_HALVINGS};
-use super::station::Rounded;
+use super::station::{Place, Rounded};
 use super::vectors::{from_to, length, vector_of};
 use super::{EPS, ROUNDINGS};
 

@@ -7,13 +7,13 @@
 mod by_length;
 
 use super::chord::chord_error;
-use super::columns::{Columns, Place, CHORD};
+use super::columns::{Columns, CHORD};
 use super::parallel;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{self, PhaseMotion, State};
 use super::phase_order::PhaseOrder;
 use super::phases::Phases;
-use super::station::Station;
+use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 use by_length::{Look, Looker};
@@ -479,5 +479,31 @@ impl<const M: usize> Probe<'_, '_, M> {
     /// The program's time at a time from the anchor.
     fn clock(&self, elapsed: f64) -> f64 {
         self.start + if self.motion.anchored_at_end { self.duration - elapsed } else { elapsed }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::{Followed, Pieces};
+    use crate::phases::PATH_JERK;
+
+    #[test]
+    fn a_speed_that_goes_back_is_as_great_as_one_that_goes_on() {
+        // From rest at the end back to the start at a jerk of −6 for 1 s: −3 mm/s there.
+        let pieces = Pieces {
+            axes: 2,
+            stride: 2,
+            control: &[0.0, 0.0, 1.0, 0.0],
+            weights: &[],
+            offsets: &[0, 2],
+            width: &[1.0],
+        };
+        let feed = [2.0, f64::INFINITY, f64::INFINITY, f64::INFINITY];
+        let (path, limits) = (Followed { feed: &feed, ..Followed::of_one(pieces) }, Limits::<2>::none());
+        let phases = Phases::of_one(&[PATH_JERK], &[255], &[-6.0], &[0.0, 1.0], &[1.0, 0.0]);
+        let of = Audited { junction_speed: &[0.0; 2], phases: &phases, limits: &limits, starts: &[0.0, 1.0] };
+        let tally = audit_profile(&of, &|| Columns::new(&path, &limits, None), &|_| ());
+        assert!(tally.get(Check::Feed, 0).ratio > 1.4, "{:?}", tally.get(Check::Feed, 0));
     }
 }

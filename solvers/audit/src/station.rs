@@ -20,6 +20,21 @@ pub struct Rounded<const M: usize> {
     pub rounding: [f64; M],
 }
 
+/// A place of a piece: the columns and their slopes by u, each with a bound of its error; of positions beside the rounding of the
+/// greatest coordinate.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<const M: usize> {
+    pub piece: usize,
+    pub u: f64,
+    /// The tool's place, in axes of the path.
+    pub tip: [f64; M],
+    pub position: Rounded<M>,
+    pub slope: Rounded<M>,
+    /// Derivatives by u of the length of the path and of the way of the tool that the feed limits.
+    pub way_slope: f64,
+    pub tip_slope: f64,
+}
+
 /// Numbers and their errors by column, both times `scale`; an error that is not finite is as great as any number.
 #[inline(always)]
 fn scaled<const M: usize>(

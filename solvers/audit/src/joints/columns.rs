@@ -3,9 +3,8 @@
 use std::rc::Rc;
 
 use super::path::{JointPath, Piece, Work};
-use crate::columns::Place;
 use crate::curve::{Curve, Curves};
-use crate::station::{Rounded, Station};
+use crate::station::{Place, Rounded, Station};
 use crate::vectors::{length, vector_of};
 use crate::FEEDS;
 

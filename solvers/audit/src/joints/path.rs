@@ -3,9 +3,8 @@
 use std::rc::Rc;
 
 use super::formula::{Formula, Jet};
-use crate::columns::Place;
 use crate::curve::{Curve, Followed};
-use crate::station::{Rounded, Station};
+use crate::station::{Place, Rounded, Station};
 use crate::vectors::{curvature, length, times};
 use crate::{EPS, ROUNDINGS};
 
