@@ -13,13 +13,13 @@ use super::{Limits, EPS, FEEDS, ROUNDINGS};
 /// The speed that chord errors are about, beside those that feeds are about.
 pub const CHORD: usize = FEEDS;
 
-/// Pieces of axes that meet at a smaller angle than this, in rad, meet without a corner.
-const SMOOTH: f64 = 1e-9;
+/// Pieces of axes, and of joints, that meet at a smaller angle than this, in rad, meet without a corner: between two pieces the
+/// formula of joints is evaluated on other numbers.
+const SMOOTH: [f64; 2] = [1e-9, 1e-6];
 
-/// Intervals of a phase that covers its whole piece, for each degree, and of one from rest; and at least.
-const PLACES: f64 = 5.0;
-const SPEEDS: f64 = 10.0;
-const LEAST: f64 = 4.0;
+/// Intervals of a phase that covers its whole piece, for each degree, those of one from rest, and the least number; of axes, and of
+/// joints.
+const INTERVALS: [[f64; 3]; 2] = [[5.0, 10.0, 4.0], [3.0, 0.0, 2.0]];
 
 /// The columns of a path, evaluated at one place after the other.
 pub struct Columns<'a, const M: usize> {
@@ -53,7 +53,7 @@ impl<'a, const M: usize> Columns<'a, M> {
     }
 
     pub fn scale(&self) -> [f64; M] {
-        self.joints.as_ref().map_or([1.0; M], |joints| joints.scale())
+        self.joints.as_ref().map_or([1.0; M], |joints| joints.of.scale())
     }
 
     /// The place u of a piece.
@@ -121,7 +121,7 @@ impl<'a, const M: usize> Columns<'a, M> {
     /// The greatest speeds of a piece.
     pub fn feeds(&self, piece: usize) -> [f64; FEEDS] {
         match &self.joints {
-            Some(joints) => joints.feeds(piece),
+            Some(joints) => [joints.of.feed[piece], f64::INFINITY, f64::INFINITY, f64::INFINITY],
             None => self.path.feeds(piece),
         }
     }
@@ -213,10 +213,8 @@ impl<'a, const M: usize> Columns<'a, M> {
     /// Intervals on which the rates of a phase by length are followed that covers so many degrees of its piece and changes
     /// its speed by this part.
     pub fn intervals(&self, covered: f64, change: f64) -> f64 {
-        match &self.joints {
-            Some(joints) => joints.intervals(covered),
-            None => (PLACES * covered + SPEEDS * change).max(LEAST),
-        }
+        let [places, speeds, least] = INTERVALS[usize::from(!self.are_axes())];
+        (places * covered + speeds * change).max(least)
     }
 
     /// A time in s over which a jump of velocity may spread on a phase of this duration, in a servo period at least. Plans of
@@ -245,6 +243,6 @@ impl<'a, const M: usize> Columns<'a, M> {
 
     /// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
     pub fn smooth(&self) -> f64 {
-        self.joints.as_ref().map_or(SMOOTH, |joints| joints.smooth())
+        SMOOTH[usize::from(!self.are_axes())]
     }
 }

@@ -178,6 +178,11 @@ pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
     tally.get(Check::Deviation, 0).ratio.max(0.0)
 }
 
+/// How far a piece may be from the program, in mm.
+fn allowed(path: &Followed, piece: usize) -> f64 {
+    path.tolerance[piece].max(GAP_TOLERANCE)
+}
+
 /// Distances that count as close where so much is allowed: for the first place, and for the nearest of a few steps.
 pub fn enough(settled: f64, allowed: f64, rounding: f64) -> [f64; 2] {
     [settled, settled.max(FAR_BELOW)].map(|share| share * allowed + rounding)
@@ -190,7 +195,7 @@ fn piece_to_moves<'a, const M: usize>(
     (piece, time): (usize, f64),
     tally: &mut Tally<M>,
 ) {
-    let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
+    let (line, tolerance) = (path.line[piece], allowed(path, piece));
     near.replace(program, window(path, piece, program.len()));
     // A piece is within the convex hull of its control points: where these lie along one move, its places change nothing.
     let points = path.rows(piece).map(|row| path.point::<M>(row));
@@ -262,10 +267,6 @@ struct Follow<'a, const M: usize> {
 }
 
 impl<const M: usize> Follow<'_, M> {
-    fn tolerance(&self, piece: usize) -> f64 {
-        self.path.tolerance[piece].max(GAP_TOLERANCE)
-    }
-
     /// A move that the pieces from `first` to `last` follow.
     fn measure(
         &mut self,
@@ -287,7 +288,7 @@ impl<const M: usize> Follow<'_, M> {
             // The chord between both places is no farther from the move than its ends are, and the piece from its chord than this.
             let sagitta = 0.125 * self.close.curves.get(to.piece).bounds()[0] * (to.u - from.u).powi(2);
             let most = away.max(away_there) + sagitta;
-            if from.piece == to.piece && most <= settled(tally) * self.tolerance(to.piece) {
+            if from.piece == to.piece && most <= settled(tally) * allowed(self.path, to.piece) {
                 tally.samples += 2;
                 return;
             }
@@ -315,15 +316,14 @@ impl<const M: usize> Follow<'_, M> {
         }
         let most_so_far = settled(tally);
         let (path, expected) = (self.path, self.close.place().piece);
-        let tolerance_of = |piece: usize| path.tolerance[piece].max(GAP_TOLERANCE);
-        let close = |piece: usize| enough(most_so_far, tolerance_of(piece), rounding);
+        let close = |piece: usize| enough(most_so_far, allowed(path, piece), rounding);
         let (place, away) = match self.close.find(&q, [least, most], close) {
             Some((place, distance)) => (place, distance - rounding),
             None => {
                 // The nearest piece counts, measured by its own tolerance.
                 let mut nearest = (f64::INFINITY, Place { piece: least, u: 0.0 }, f64::INFINITY);
                 for piece in outwards(expected.clamp(least, most), least, most) {
-                    let tolerance = tolerance_of(piece);
+                    let tolerance = allowed(path, piece);
                     let beyond = nearest.0 * tolerance + rounding;
                     if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond
                     {
@@ -342,7 +342,7 @@ impl<const M: usize> Follow<'_, M> {
                 (nearest.1, nearest.2)
             }
         };
-        tally.offer(Check::Deviation, 0, away, tolerance_of(place.piece), time, line);
+        tally.offer(Check::Deviation, 0, away, allowed(path, place.piece), time, line);
         self.last = Some((q, place, away));
         (place, away)
     }

@@ -191,18 +191,6 @@ impl<const M: usize> Polygon<M> {
         other
     }
 
-    /// For each axis what the rounding of dC/dt is relative to.
-    pub fn slope_size(&self) -> [f64; M] {
-        let mut most = [0.0_f64; M];
-        for step in &self.steps[..self.degree] {
-            for k in 0..M {
-                most[k] = most[k].max(step[k].abs());
-            }
-        }
-        let scale = self.slope_scale();
-        most.map(|step| scale * step)
-    }
-
     /// How much the rounding of the control points is enlarged in dC/dt.
     pub fn slope_scale(&self) -> f64 {
         let weights = &self.weights[..=self.degree];

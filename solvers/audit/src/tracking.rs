@@ -215,7 +215,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         nearest
     }
 
-    /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead; none where that does not converge ahead of `from` or is not close.
+    /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead; none where that does not
+    /// converge ahead of `from` or is not close.
     fn guess(&mut self, from: Place, step: f64, q: &[f64; M], rounding: f64) -> Option<(Place, f64)> {
         let (path, columns) = (&self.plan.path, self.columns());
         let pieces = [from.piece, path.len() - 1];

@@ -6,22 +6,13 @@ use super::path::{JointPath, Piece, Work};
 use crate::curve::{Curve, Curves};
 use crate::station::{Place, Rounded, Station};
 use crate::vectors::{length, vector_of};
-use crate::FEEDS;
-
-/// Intervals for each degree of a phase that covers its whole piece, and the least number.
-const STEPS: f64 = 3.0;
-const LEAST: f64 = 2.0;
-
-/// Pieces that meet at a smaller angle than this, in rad, meet without a corner: between two pieces the formula is evaluated on
-/// other numbers.
-const SMOOTH: f64 = 1e-6;
 
 /// How many times greater a second derivative by u may be than that by the length at another place of the piece: so close that
 /// a place is not found but for a hundredth of what is allowed it would have to be ten times more.
 const BEND_GROWS: f64 = 4.0;
 
 pub struct JointColumns<'a, const M: usize> {
-    of: &'a JointPath<'a>,
+    pub of: &'a JointPath<'a>,
     work: Work,
     /// The last two pieces, the last one first.
     pieces: [Option<Rc<Piece<'a, M>>>; 2],
@@ -45,10 +36,6 @@ impl<'a, const M: usize> JointColumns<'a, M> {
             }
         }
         self.pieces[0].get_or_insert_with(|| Rc::new(self.of.piece_on(number, curve.clone()))).clone()
-    }
-
-    pub fn scale(&self) -> [f64; M] {
-        self.of.scale()
     }
 
     pub fn place(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
@@ -89,19 +76,5 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     pub fn bend(&self, piece: usize) -> f64 {
         let last = self.known.as_ref().filter(|(number, _)| *number == piece);
         last.map_or(f64::INFINITY, |(_, at)| BEND_GROWS * length(&at.second.value) * at.slope * at.slope)
-    }
-
-    pub fn feeds(&self, piece: usize) -> [f64; FEEDS] {
-        let mut feeds = [f64::INFINITY; FEEDS];
-        feeds[0] = self.of.feed[piece];
-        feeds
-    }
-
-    pub fn intervals(&self, covered: f64) -> f64 {
-        (STEPS * covered).max(LEAST)
-    }
-
-    pub fn smooth(&self) -> f64 {
-        SMOOTH
     }
 }

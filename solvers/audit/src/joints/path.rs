@@ -47,8 +47,6 @@ pub struct JointPath<'a> {
 /// A piece ready to be measured.
 pub struct Piece<'a, const M: usize> {
     pub number: usize,
-    pub run: usize,
-    pub line: i32,
     pub width: f64,
     pub curve: Rc<Curve<M>>,
     words: &'a Words,
@@ -57,12 +55,11 @@ pub struct Piece<'a, const M: usize> {
     /// Whether only the direction of the tool turns: then the feed limits the degrees that it turns.
     turns: bool,
     /// What each axis of the path counts in its length.
-    pub way_scale: [f64; M],
+    way_scale: [f64; M],
     xyz: [f64; M],
     ijk: [usize; 3],
     size: f64,
     slope_size: [f64; M],
-    joints: usize,
     start_size: f64,
 }
 
@@ -74,7 +71,7 @@ pub struct Work {
 }
 
 impl JointPath<'_> {
-    pub fn run_of(&self, piece: usize) -> usize {
+    fn run_of(&self, piece: usize) -> usize {
         self.path.runs.partition_point(|&first| first <= piece as i64) - 1
     }
 
@@ -113,8 +110,6 @@ impl JointPath<'_> {
         let number_of = |k: bool| if k { 1.0 } else { 0.0 };
         Piece {
             number,
-            run,
-            line: self.path.line[number],
             width: curve.width(),
             words,
             counts: std::array::from_fn(|k| number_of(k < axes && flag(self.xyz, k) == linear)),
@@ -124,7 +119,6 @@ impl JointPath<'_> {
             ijk: std::array::from_fn(|_| ijk.next().unwrap_or(0)),
             size: curve.magnitude(),
             slope_size: curve.derivative_size(),
-            joints: self.joints,
             start_size: first.iter().fold(0.0, |most, x| most.max(x.abs())),
             curve,
         }
@@ -216,15 +210,11 @@ impl<const M: usize> Piece<'_, M> {
         Rounded { value, rounding: error }
     }
 
-    /// Positions of the joints at a tip, angles as the kinematics gives them.
-    pub fn joints_at(&self, tip: &[f64; M], work: &mut Work) -> [f64; M] {
+    /// Positions of the joints, angles as the kinematics gives them.
+    pub fn at(&self, u: f64, work: &mut Work) -> [f64; M] {
+        let tip = self.curve.at(u);
         self.fill(&mut work.positions, |k| Jet { value: [tip[k]], error: [TIP_ROUNDINGS * self.size] });
         self.joint_rows(&work.positions, 0).value
-    }
-
-    /// Positions of the joints.
-    pub fn at(&self, u: f64, work: &mut Work) -> [f64; M] {
-        self.joints_at(&self.curve.at(u), work)
     }
 
     /// The place at u.
@@ -297,10 +287,5 @@ impl<const M: usize> Piece<'_, M> {
     /// The greatest coordinate of the first control point.
     pub fn start_size(&self) -> f64 {
         self.start_size
-    }
-
-    /// Number of joints.
-    pub fn joints(&self) -> usize {
-        self.joints
     }
 }
