@@ -28,6 +28,7 @@
 //! own; the predictor and corrector are those of Mehrotra (SIAM J. Optim. 2, 1992).
 
 mod band;
+mod coarse;
 mod constraints;
 mod exact;
 mod forms;

@@ -24,6 +24,7 @@ use std::ops::Range;
 
 use fearless_simd::{dispatch, Simd};
 
+use super::coarse;
 use super::constraints::{Constraints, RowLayout};
 use super::exact::Exact;
 use super::forms::{fall, pace, project};
@@ -152,7 +153,14 @@ pub fn part<const M: usize>(
             warm: start.warm,
             ..*effort
         };
-        if space.solve(planned.rows, ends, &mut x, &own).outcome == Outcome::Converged {
+        let from =
+            if start.warm { vec![(x, own)] } else { coarse::starts(planned.rows, ends, x, &own, space).0 };
+        x = vec![];
+        let converged = from.into_iter().any(|(near, own)| {
+            x = near;
+            space.solve(planned.rows, ends, &mut x, &own).outcome == Outcome::Converged
+        });
+        if converged {
             break;
         }
     }

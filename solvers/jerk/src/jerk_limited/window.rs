@@ -1,6 +1,7 @@
 //! One window solved to its optimum within all limits: the interior-point method at the collocation points, the check
 //! between them, and tighter limits on the intervals where the check shows an excess.
 
+use super::coarse;
 use super::constraints::Constraints;
 use super::exact::Exact;
 use super::hermite::duration;
@@ -70,7 +71,8 @@ impl<const M: usize> Window<M> {
         let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
         let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
-        let mut attempts = vec![(inside(x), rough)];
+        let (mut attempts, spent) = coarse::starts(&self.rows, ends, inside(x), &rough, space);
+        verdict.iterations = spent;
         let mut times = vec![0; self.rows.intervals.len()];
         for round in 0..ROUNDS {
             let Some((y, report)) = self.attempt(ends, attempts, space, &mut verdict.iterations) else {

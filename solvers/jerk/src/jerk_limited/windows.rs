@@ -31,8 +31,8 @@ const REACH: (f64, usize) = (11.0, 80);
 const EASE: usize = 20;
 /// Least travel time from cut to cut, in the same stop times.
 const LONG: f64 = 36.0;
-/// Windows in memory, for each thread.
-const BATCH: usize = 2;
+/// Windows that are solved before their plans are joined, for each thread.
+const BATCH: usize = 8;
 /// Windows are blended over that part of their overlap where they agree best, of this many parts, else of fewer.
 const BLENDS: [usize; 4] = [8, 4, 2, 1];
 /// Greatest use of a limit by a blend: a little more than that of a window.
