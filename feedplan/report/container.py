@@ -3,9 +3,11 @@
     4 bytes    length of the JSON, little-endian
     the JSON   with {"array": "f4", "at": 0, "count": 3} instead of each array; spaces up to a multiple
                of 4 bytes
-    arrays     little-endian, each at a multiple of 4 bytes from the end of the JSON
+    arrays     each at a multiple of 4 bytes from the end of the JSON: the first byte of each number,
+               little-endian, then the second byte of each, and so on
 
-`page/source/data.js` reads it.
+`page/source/data.js` reads it. The high bytes of neighbours are much alike, so that a compressed page is a
+quarter smaller than with each number's bytes together.
 """
 
 from __future__ import annotations
@@ -48,13 +50,14 @@ def contained(data: Mapping[str, Any]) -> bytes:
 
 def as_text(content: bytes) -> str:
     """Bytes, compressed and in base 64, for the text of a page."""
-    # Floats hardly shrink: level 6 would take twice the time for 1 % less.
+    # The low bytes of floats hardly shrink: level 6 would take twice the time for 1 % less.
     return base64.b64encode(zlib.compress(content, 1)).decode("ascii")
 
 
 def _in_memory(array: NDArray[Any]) -> bytes:
     with np.errstate(over="ignore"):
-        return array.astype(_KINDS[array.dtype.kind]).tobytes()
+        plain = np.ascontiguousarray(array, _KINDS[array.dtype.kind])
+    return plain.view(np.uint8).reshape(len(plain), plain.itemsize).T.tobytes()
 
 
 def _padded(content: bytes, letter: bytes) -> bytes:

@@ -61,7 +61,11 @@ const coloured = (selector) => page.evaluate((place) => {
   return { count, colours: colours.size };
 }, selector);
 const text = (selector) => page.locator(selector).textContent();
-const settled = () => page.waitForTimeout(300);
+// A busy machine draws late: two frames must follow the pause.
+const settled = async () => {
+  await page.waitForTimeout(300);
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+};
 const jobs = () => page.evaluate(async (given) => (await (await fetch("/v1/jobs", { headers: given ? { Authorization: `Bearer ${given}` } : {} })).json()).jobs, token ?? "");
 const picture = async (name) => PICTURES && page.screenshot({ path: join(folder, `${name}.png`) });
 

@@ -19,7 +19,9 @@ def unpacked(content: bytes) -> dict[str, Any]:
     def read(entry: dict[str, Any]) -> Any:
         if "array" not in entry:
             return entry
-        return np.frombuffer(content, kinds[entry["array"]], entry["count"], end + entry["at"])
+        kind, count = np.dtype(kinds[entry["array"]]), entry["count"]
+        planes = np.frombuffer(content, np.uint8, kind.itemsize * count, end + entry["at"])
+        return planes.reshape(kind.itemsize, count).T.copy().view(kind).reshape(count)
 
     data = json.loads(content[4:end], object_hook=read)
     assert isinstance(data, dict)
