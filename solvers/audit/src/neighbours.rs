@@ -26,8 +26,10 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         if self.close.is_none() && !program.splines.is_empty() {
             self.close = Some(ClosePlaces::new(program.splines));
         }
-        let known = std::mem::take(&mut self.moves);
-        let place = |number: usize| known.iter().find(|near| near.0 == number).and_then(|near| near.2);
+        let known: Vec<(usize, Place)> =
+            self.moves.iter().filter_map(|(number, _, place)| Some((*number, (*place)?))).collect();
+        let place = |number: usize| known.iter().find(|known| known.0 == number).map(|known| known.1);
+        self.moves.clear();
         self.moves.extend(numbers.map(|number| (number, program.get(number), place(number))));
         self.nearest = 0;
     }
