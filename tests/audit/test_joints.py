@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from feedplan import plan
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
@@ -272,6 +273,18 @@ def test_recorded_velocities_and_times_are_compared(case: Case) -> None:
     assert ("place", None) in broken(case.audit([rows(points, slice(3, None))]))
     nothing = replace(points, position=changed(points.position, row, math.nan))
     assert ("numbers", None) in broken(case.audit([nothing]))
+
+
+def test_recorded_accelerations_are_compared_where_jerk_is_limited() -> None:
+    text = "G21 G90 G43.4 H0\nG1 X10 Y5 A20 C30 F2000\nX25 Y0 A-10 C60\nM2\n"
+    planned = plan(text, Machine.load("trunnion-ac"), "jerk-limited")
+    points = planned.setpoints(1e-3).all()
+    row, k = np.unravel_index(np.abs(points.acceleration).argmax(), points.acceleration.shape)
+    wrong = changed(points.acceleration, row, lambda a: np.where(np.arange(5) == k, -a, a))
+    for acceleration, name in ((points.acceleration, None), (wrong, "recorded_acceleration")):
+        given = replace(points, acceleration=acceleration)
+        result = audit(planned.problem, planned.profile, planned.machine, planned.program, [given])
+        assert broken(result) == ({(name, points.axes[k])} if name else set())
 
 
 def rows(points: SetpointChunk, part: slice) -> SetpointChunk:
