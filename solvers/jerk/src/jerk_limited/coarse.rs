@@ -40,7 +40,7 @@ pub fn starts<'e, X: Model<M>, const M: usize>(
     let mut iterations = 0;
     if rows.intervals.len() >= FEWEST {
         let mut x = restrict(&far);
-        let coarse = coarse(rows, &far, &x);
+        let coarse = on_coarse_grid(rows, &far, &x);
         let report = space.solve(&coarse, ends, &mut x, &Effort { tolerance: GAP, ..*effort });
         iterations = report.iterations.div_ceil(GROUP);
         if report.outcome == Outcome::Converged {
@@ -57,7 +57,7 @@ pub fn starts<'e, X: Model<M>, const M: usize>(
 
 /// The constraints on the coarse grid, tightened where limits change between its collocation points: by what `far` uses more
 /// of them on the fine grid, and to the least of the speed limits if x, which is `far` on the coarse grid, leaves room.
-fn coarse<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64]) -> Constraints<M> {
+fn on_coarse_grid<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64]) -> Constraints<M> {
     let intervals = rows.intervals.chunks(GROUP).map(joined).collect();
     let mut coarse = Constraints { intervals, ..*rows };
     for (n, short) in rows.intervals.chunks(GROUP).enumerate() {
