@@ -24,7 +24,7 @@ axes = [
 const facts = { requests: [], errors: [] };
 
 const browser = await chromium.launch({ executablePath: CHROMIUM, args: SOFTWARE, timeout: 180_000 });
-const page = await browser.newPage({ viewport: WIDE, deviceScaleFactor: 0.5, acceptDownloads: true });
+const page = await browser.newPage({ viewport: WIDE, deviceScaleFactor: SCALE, acceptDownloads: true });
 page.setDefaultTimeout(60_000);
 page.on("request", (request) => facts.requests.push({ url: request.url(), hasToken: "authorization" in request.headers() }));
 page.on("pageerror", (error) => facts.errors.push(error.stack));

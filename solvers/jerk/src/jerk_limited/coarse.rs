@@ -46,9 +46,7 @@ pub fn starts<'e, X: Model<M>, const M: usize>(
         if report.outcome == Outcome::Converged {
             let near = prolong(&x, rows);
             let own = Effort { barrier: BARRIER, ..*effort };
-            let back =
-                |part: f64| near.iter().zip(&far).map(|(near, far)| near + part * (far - near)).collect();
-            starts.extend(BACK.map(|part| (back(part), own)));
+            starts.extend(BACK.map(|part| (hermite::blend(&far, &near, part), own)));
         }
     }
     starts.push((far, *effort));

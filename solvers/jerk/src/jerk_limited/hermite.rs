@@ -72,6 +72,11 @@ pub fn local(x: &[f64], n: usize, h: f64) -> [f64; 4] {
     [x[0], x[1] * h, x[2], x[3] * h]
 }
 
+/// y plus a part of the way to x.
+pub fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
+    x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
+}
+
 /// ∫ ds/√w over interval n, in s; infinite where w is not positive.
 pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
     dispatch!(Level::new(), simd => duration_on(simd, x, n, h))

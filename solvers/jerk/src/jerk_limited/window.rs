@@ -4,7 +4,7 @@
 use super::coarse;
 use super::constraints::Constraints;
 use super::exact::Exact;
-use super::hermite::duration;
+use super::hermite::{blend, duration};
 use super::interior_point::{Effort, Outcome, Report};
 use super::intersample_check::IntersampleCheck;
 use super::window_end::WindowEnd;
@@ -228,9 +228,4 @@ fn ways_back(ends: &[WindowEnd; 2], x: Vec<f64>) -> Vec<Vec<f64>> {
 /// A plan strictly within all limits, from one that keeps them.
 fn inside(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| INSIDE * x).collect()
-}
-
-/// y plus a part of the way to x.
-fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
-    x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
 }
