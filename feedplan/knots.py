@@ -12,7 +12,7 @@ from feedplan.arguments import number, positive
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
-from feedplan.setpoints import MAX_SETPOINTS, SetpointChunk, chunks, sampler
+from feedplan.setpoints import MAX_SETPOINTS, SetpointChunk, chunks
 
 # A run has so many steps at least, so that it shows how fast it goes.
 LEAST_STEPS = 2
@@ -32,7 +32,7 @@ class Knots:
     ) -> None:
         self.step = number(step, "the step", "a positive number", positive, "s")
         self.axes = problem.axes
-        self._sampler = sampler(problem, profile)
+        self._sampler = profile.sampler(problem)
         self._origin = problem.joint_origin
         self._ends_at_rest = problem.end_speed == 0.0
         begins, _, times = self._sampler.runs.T

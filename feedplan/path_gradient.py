@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from feedplan.constraints.problem import Problem, feed_square
 from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
-from feedplan.setpoints import sampler
 
 Array = NDArray[np.float64]
 
@@ -66,7 +65,7 @@ def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Array) -> P
     part = (np.arange(_CELLS)[:, None] + np.array(_PLACES)).ravel()
     u = (size[:, None] * part).ravel()
     width = size[piece] / len(_PLACES)
-    _, _, velocity, acceleration, jerk, *_ = sampler(problem, profile).along(piece.astype(np.uint32), u)
+    _, _, velocity, acceleration, jerk, *_ = profile.sampler(problem).along(piece.astype(np.uint32), u)
     _, slope, second, third = path.curve.evaluate(piece, u, 3)
     square = (slope**2).sum(axis=1)
     p = (velocity**2).sum(axis=1) / square

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import Profile
+from feedplan._solvers import Profile, Sampler
+from feedplan.constraints.problem import Problem
+from feedplan.lazy import cached_property
 from feedplan.native import OfNative
+from feedplan.progress import Listener, tell
 from feedplan.units import counted
 
 # The `axis` of a phase whose constant belongs to none.
@@ -112,3 +116,18 @@ class SpeedProfile(OfNative[Profile]):
         """Time of each run [s], shape (runs,)."""
         ends = np.concatenate(([0.0], np.cumsum(self.duration)))
         return np.asarray(np.diff(ends[self.runs]))
+
+    @cached_property
+    def _samplers(self) -> WeakKeyDictionary[Problem, Sampler]:
+        return WeakKeyDictionary()
+
+    def sampler(self, problem: Problem, progress: Listener | None = None) -> Sampler:
+        """The native reader of the motion along the problem's path, with setpoints at the problem's period.
+
+        It is made once for each problem; `progress` is told how far its laying out is. Raises InputError for
+        a profile of another path.
+        """
+        if problem not in self._samplers:
+            self._samplers[problem] = Sampler(problem, self, problem.period, progress)
+        tell(progress, 1.0)
+        return self._samplers[problem]

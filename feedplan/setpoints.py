@@ -17,7 +17,7 @@ from feedplan.curves.length import Interpolator as Interpolator
 from feedplan.errors import InputError
 from feedplan.events import Events, TimedEvents
 from feedplan.profile import SpeedProfile
-from feedplan.progress import Listener, tell
+from feedplan.progress import Listener
 from feedplan.units import counted
 
 # Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
@@ -90,7 +90,11 @@ class Setpoints:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
         most = whole(max_setpoints, "max_setpoints", "a whole number from 1")
-        self._sampler = sampler(problem, profile, period, progress)
+        self._sampler = (
+            profile.sampler(problem, progress)
+            if period == problem.period
+            else Sampler(problem, profile, period, progress)
+        )
         self._source = (problem, profile, period, interpolator, most, None, events)
         self._events = events
         if self.count > most:
@@ -220,21 +224,3 @@ def setpoints(
     setpoints than `max_setpoints`.
     """
     return Setpoints(problem, profile, period, interpolator, max_setpoints, progress, events)
-
-
-def sampler(
-    problem: Problem, profile: SpeedProfile, period: float | None = None, progress: Listener | None = None
-) -> Sampler:
-    """The native reader of a profile on its path, with the times of setpoints laid out every `period` [s].
-
-    That of the problem's own period, which is the one by default, is made once and kept with the profile, for
-    all that read the motion. Raises InputError as `setpoints`.
-    """
-    if period not in (None, problem.period):
-        return Sampler(problem, profile, period, progress)
-    kept: tuple[Problem, Sampler] | None = vars(profile).get("motion")
-    if kept is None or kept[0] is not problem:
-        kept = problem, Sampler(problem, profile, problem.period, progress)
-        vars(profile)["motion"] = kept
-    tell(progress, 1.0)
-    return kept[1]

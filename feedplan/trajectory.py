@@ -12,7 +12,6 @@ from feedplan.curves._arrays import within
 from feedplan.curves.length import CurveLength
 from feedplan.lazy import cached_property
 from feedplan.profile import SpeedProfile
-from feedplan.setpoints import sampler
 
 Array = NDArray[np.float64]
 
@@ -39,7 +38,7 @@ class Trajectory:
 
     def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
         self._problem, self._profile = problem, profile
-        self.sampler = sampler(problem, profile)
+        self.sampler = profile.sampler(problem)
         self.axes, self.unit = problem.axes, problem.unit
         self.duration = profile.time + problem.path.pauses
 

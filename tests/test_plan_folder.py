@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import feedplan
-from feedplan import setpoints
+from feedplan import profile, setpoints
 from feedplan._solvers import Sampler
 from feedplan.errors import InputError
 from feedplan.outputs import load_setpoints
@@ -63,7 +63,8 @@ class _Counted:
 def test_the_motion_is_laid_out_once_and_each_setpoint_computed_once(
     interpolator: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(setpoints, "Sampler", _Counted)
+    for module in (profile, setpoints):
+        monkeypatch.setattr(module, "Sampler", _Counted)
     monkeypatch.setattr(_Counted, "made", [])
     plan = feedplan.plan("G21 G90 G1 F600 X10\nY5 M8\nM2\n", "mill", interpolator=interpolator)
     stages: dict[str, list[float]] = {}

@@ -18,7 +18,6 @@ from feedplan.constraints.problem import Problem
 from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
-from feedplan.setpoints import sampler
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -134,7 +133,7 @@ def speeds_at(problem: Problem, profile: SpeedProfile, piece: Indices, u: Array)
 
     Speeds are 0 where the curve stands still."""
     path = problem.path
-    time, _, velocity, *_ = sampler(problem, profile).along(piece.astype(np.uint32), u)
+    time, _, velocity, *_ = profile.sampler(problem).along(piece.astype(np.uint32), u)
     slope = problem.curve.evaluate(piece, u, 1)[1]
     square = (slope**2).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -17,7 +17,6 @@ from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
 from feedplan.report.limits import chord_speed, parameter_speed
-from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +68,7 @@ def activity(
 ) -> Activity:
     """The activity of all limits; limits of jerk are included if `jerk` is true."""
     time, weight, run = _moments(problem, profile)
-    reader = sampler(problem, profile, progress=part(progress, 0.0, 0.6))
+    reader = profile.sampler(problem, part(progress, 0.0, 0.6))
     tell(progress, 0.6)
     states = reader.at(time)
     tell(progress, 0.8)

@@ -18,7 +18,6 @@ from feedplan.constraints.problem import Problem, feed_square
 from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
-from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +65,7 @@ def limit_samples(
     """Samples of the phases that have samples, computed for a block of phases at a time."""
     count = samples_per_phase(profile)
     drawn = drawn_phases(profile, motion)
-    states = sampler(problem, profile, progress=part(progress, 0.0, 0.2))
+    states = profile.sampler(problem, part(progress, 0.0, 0.2))
     report = part(progress, 0.2, 1.0)
     tell(report, 0.0)
     # Denser towards both ends: the speed changes most next to a stop.

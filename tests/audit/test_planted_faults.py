@@ -15,7 +15,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.machine.machine import Machine
 from feedplan.planning import Plan
 from feedplan.profile import SpeedProfile
-from feedplan.setpoints import SetpointChunk, sampler
+from feedplan.setpoints import SetpointChunk
 from tests.campaign import seeds
 
 FAULT = 1e-3
@@ -92,7 +92,7 @@ def test_a_limit_of_an_axis_below_its_greatest_use(plan: Plan, quantity: str) ->
     moving = np.flatnonzero(profile.duration > 1e-9)
     share = (np.arange(12) + 0.5) / 12
     u = profile.u0[moving, None] + (profile.u1 - profile.u0)[moving, None] * share
-    states = sampler(problem, profile).along(np.repeat(profile.piece[moving], 12), u.ravel())
+    states = profile.sampler(problem).along(np.repeat(profile.piece[moving], 12), u.ravel())
     most = np.abs(states[{"velocity": 2, "acceleration": 3, "jerk": 4}[quantity]]).max(axis=0)
     for k, axis in enumerate(problem.axes):
         if most[k] == 0.0:
@@ -119,7 +119,7 @@ def test_a_feed_below_the_speed_of_one_phase(plan: Plan, seed: int) -> None:
         u = np.linspace(profile.u0[i], profile.u1[i], 40)
         rows = np.full(40, piece, np.uint32)
         slope = np.linalg.norm(own.evaluate(rows, u, 1)[1], axis=1)
-        p = sampler(problem, profile).along(rows, u)
+        p = profile.sampler(problem).along(rows, u)
         speed = np.linalg.norm(p[2], axis=1)
         if problem.joints is None:
             least = float(speed.max()) / (1.0 + FAULT)
