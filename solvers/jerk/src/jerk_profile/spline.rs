@@ -35,37 +35,13 @@ impl JerkProfile {
         jerk_limits: &[f64; M],
         profile: &Profile,
     ) {
-        let (s, ends) = (&profile.s, profile.ends);
-        let last = s.len() - 1;
-        let ways = ways_between(problem, path, s);
-        // A ramp within one part has its own length between rounded parameters.
-        let ramp_way = |end: usize, from: f64, to: f64| {
-            let part = [0, path.parts.len() - 1][end];
-            (from < to && path.part(if end == 0 { to } else { from }) == part)
-                .then(|| Way::new(path, part, [from, to]))
-        };
-        let ramp_ways = [ramp_way(0, ends[0], s[0]), ramp_way(1, s[last], ends[1])];
+        let ways = ways_between(problem, path, &profile.s);
+        let ramp_ways = [0, 1].map(|end| Way::of_ramp(path, profile, end));
         let (mut states, meeting, off) = moved_states(profile, &ways, &ramp_ways);
-        if s[0] > ends[0] {
-            let length = ramp_ways[0].as_ref().map_or(s[0] - ends[0], |way| way.length);
-            let OnRamp { jerk, duration, ends: [from, to] } =
-                OnRamp::new(Ramp { length, ..profile.ramp(0) }, states[0].v);
-            states[0].a = to;
-            let ends = [State { s: ends[0], v: 0.0, a: from }, states[0]];
-            self.push_ramp(
-                problem,
-                path,
-                ramp_ways[0].as_ref(),
-                Movement { law: PhaseLaw::PathJerk, value: jerk, ends, duration },
-            );
-        }
-        let to_rest = (s[last] < ends[1]).then(|| {
-            let length = ramp_ways[1].as_ref().map_or(ends[1] - s[last], |way| way.length);
-            OnRamp::new(Ramp { length, ..profile.ramp(1) }, states[last].v)
+        let ramps = [0, 1].map(|end| {
+            movement_on_ramp(profile, end, ramp_ways[end].as_ref(), &mut states[[0, ways.len()][end]])
         });
-        if let Some(ramp) = &to_rest {
-            states[last].a = -ramp.ends[1];
-        }
+        self.push_ramp(problem, path, &ramp_ways[0], &ramps[0]);
         for (n, way) in ways.iter().enumerate() {
             problem.watch.check_at(n);
             let off = if n == meeting { off } else { 0.0 };
@@ -73,27 +49,20 @@ impl JerkProfile {
             let movement = movement_between(path, jerk_limits, way.part, (way.length, off), ends);
             self.push(problem, path.parts[way.part].piece, way.u, &movement);
         }
-        if let Some(OnRamp { jerk, duration, ends: [from, _] }) = to_rest {
-            let ends = [states[last], State { s: ends[1], v: 0.0, a: -from }];
-            self.push_ramp(
-                problem,
-                path,
-                ramp_ways[1].as_ref(),
-                Movement { law: PhaseLaw::PathJerk, value: jerk, ends, duration },
-            );
-        }
+        self.push_ramp(problem, path, &ramp_ways[1], &ramps[1]);
     }
 
     fn push_ramp<const M: usize>(
         &mut self,
         problem: &Problem<M>,
         path: &ArcLengthPath<M>,
-        way: Option<&Way>,
-        ramp: Movement,
+        way: &Option<Way>,
+        ramp: &Option<Movement>,
     ) {
-        match way {
-            Some(way) => self.push(problem, path.parts[way.part].piece, way.u, &ramp),
-            None => self.push_jerk(problem, path, ramp.ends, ramp.value, ramp.duration),
+        match (ramp, way) {
+            (Some(ramp), Some(way)) => self.push(problem, path.parts[way.part].piece, way.u, ramp),
+            (Some(ramp), None) => self.push_jerk(problem, path, ramp.ends, ramp.value, ramp.duration),
+            (None, _) => {}
         }
     }
 }
@@ -109,6 +78,14 @@ impl Way {
     fn new<const M: usize>(path: &ArcLengthPath<M>, part: usize, ends: [f64; 2]) -> Self {
         let u = ends.map(|s| path.locate(part, s));
         Self { part, u, length: path.length_between(part, u[0], u[1]) }
+    }
+
+    /// The way of the ramp at an end of a profile, if it has one and that lies within one part.
+    fn of_ramp<const M: usize>(path: &ArcLengthPath<M>, profile: &Profile, end: usize) -> Option<Self> {
+        let (s, ends) = (&profile.s, profile.ends);
+        let ways = [[ends[0], s[0]], [s[s.len() - 1], ends[1]]];
+        let (way, part) = (ways[end], [0, path.parts.len() - 1][end]);
+        (way[0] < way[1] && path.part(way[1 - end]) == part).then(|| Self::new(path, part, way))
     }
 }
 
@@ -131,25 +108,29 @@ fn ways_between<const M: usize>(problem: &Problem<M>, path: &ArcLengthPath<M>, s
     ways
 }
 
-/// The motion on a ramp from rest to a speed.
-struct OnRamp {
-    jerk: f64,
-    duration: f64,
-    /// The accelerations at both ends, up to rounding; those of the profile belong to the length before rounding.
-    ends: [f64; 2],
-}
-
-impl OnRamp {
-    /// At constant jerk, s = J t³/6 and v = J t²/2, so that t = 3 s/v; at constant acceleration t = 2 s/v.
-    fn new(ramp: Ramp, v: f64) -> Self {
-        let t = ramp.way() / v;
-        if ramp.power == Ramp::ACCELERATION {
-            Self { jerk: 0.0, duration: t, ends: [v / t; 2] }
-        } else {
-            let jerk = 2.0 * v / (t * t);
-            Self { jerk, duration: t, ends: [0.0, jerk * t] }
-        }
+/// The motion on the ramp at an end of a profile, if it has one: from rest to the state there, or from the state to rest.
+///
+/// The state takes the acceleration of the ramp, which differs by rounding from that of the profile: that one belongs to the
+/// length before rounding.
+fn movement_on_ramp(profile: &Profile, end: usize, way: Option<&Way>, state: &mut State) -> Option<Movement> {
+    let ramp = profile.ramp(end);
+    if ramp.length <= 0.0 {
+        return None;
     }
+    // At constant jerk, s = J t³/6 and v = J t²/2, so that t = 3 s/v; at constant acceleration t = 2 s/v.
+    let ramp = Ramp { length: way.map_or(ramp.length, |way| way.length), ..ramp };
+    let (v, duration) = (state.v, ramp.way() / state.v);
+    let (jerk, [from_rest, to_speed]) = if ramp.power == Ramp::ACCELERATION {
+        (0.0, [v / duration; 2])
+    } else {
+        let jerk = 2.0 * v / (duration * duration);
+        (jerk, [0.0, jerk * duration])
+    };
+    let sign = [1.0, -1.0][end];
+    state.a = sign * to_speed;
+    let rest = State { s: profile.ends[end], v: 0.0, a: sign * from_rest };
+    let ends = if end == 0 { [rest, *state] } else { [*state, rest] };
+    Some(Movement { law: PhaseLaw::PathJerk, value: jerk, ends, duration })
 }
 
 /// The states at the stations, moved to the positions that the ways between them give, from both ends of the profile;
@@ -163,11 +144,13 @@ fn moved_states(profile: &Profile, ways: &[Way], ramp_ways: &[Option<Way>; 2]) -
         miss - miss.clamp(-ABSORBED * way.length, ABSORBED * way.length)
     };
     let mut moved = vec![0.0; last + 1];
-    moved[0] = ramp_ways[0].as_ref().map_or(0.0, |way| added(0.0, way, s[0] - profile.ends[0]));
+    let at_end =
+        |end: usize| ramp_ways[end].as_ref().map_or(0.0, |way| added(0.0, way, profile.ramp(end).length));
+    moved[0] = at_end(0);
     for n in 0..meeting {
         moved[n + 1] = added(moved[n], &ways[n], s[n + 1] - s[n]);
     }
-    moved[last] = ramp_ways[1].as_ref().map_or(0.0, |way| -added(0.0, way, profile.ends[1] - s[last]));
+    moved[last] = -at_end(1);
     for n in (meeting + 1..last).rev() {
         moved[n] = -added(-moved[n + 1], &ways[n], s[n + 1] - s[n]);
     }
