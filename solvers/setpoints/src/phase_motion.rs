@@ -22,13 +22,14 @@
 mod axis_way;
 mod clock;
 mod lengths;
+mod pace;
 mod part;
 mod rate;
 
 use std::rc::Rc;
 
 use axis_way::AxisWay;
-use clock::{Clock, Cubic, Even, Jerk, Pace, SpeedLine};
+use clock::{Clock, Cubic, Even, Jerk, SpeedLine};
 use feedplan_geometry::inverse_length::Located;
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::derivatives;
@@ -37,6 +38,7 @@ use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phase;
 use lengths::SLOW;
 pub use lengths::{Counts, PiecePath};
+use pace::Pace;
 use part::Part;
 pub use rate::{TipSpeed, MAX_TIP};
 

@@ -1,0 +1,250 @@
+//! The time along a phase whose v² is a cubic polynomial of the length, never 0: the part x of the length as power series of
+//! the time, from the slower end.
+//!
+//! From (v²)' = 2 ẍ follows ẍ = P(x) with a quadratic P, whose series come term by term (Taylor's method for differential
+//! equations).
+
+use crate::phase_motion::lengths::ERROR;
+use crate::phase_motion::pace::{time_of_way, Pace};
+use crate::phase_motion::part::Part;
+use feedplan_planner::phases::Phase;
+
+/// Terms of a series of the length by time; it ends where two of them are no more than this part of the length.
+const MOST_TERMS: usize = 18;
+const NOTHING: f64 = 1e-18;
+/// 1/((k + 1)(k + 2)): what the term k of ẍ is in that of x.
+const PER_TERM: [f64; MOST_TERMS] = {
+    let (mut per, mut k) = ([0.0; MOST_TERMS], 0);
+    while k < MOST_TERMS {
+        per[k] = 1.0 / ((k + 1) * (k + 2)) as f64;
+        k += 1;
+    }
+    per
+};
+/// A series may end so far beyond the length, in parts of it: where the duration is that of the motion but for rounding.
+const OVER: f64 = 1e-3;
+/// Series are no shorter than this part of the duration, and no more than so many: speeds that are absurd have more.
+const SHORTEST: f64 = 1e-12;
+const MOST_PARTS: usize = 10_000;
+
+/// v² a cubic polynomial of the length.
+pub struct Cubic {
+    speed_sq: SpeedSq,
+    /// The slower end is the start.
+    from_start: bool,
+    parts: Vec<Series>,
+    /// The time of all the length, in the unit of the series.
+    total: f64,
+    error: f64,
+}
+
+impl Cubic {
+    pub fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Self {
+        let (from_start, speed_sq) = (speeds[0] <= speeds[1], SpeedSq::new(phase, speeds, length));
+        // Time runs back from the end.
+        let back = || SpeedSq::between([speeds[1], speeds[0]], [-phase.a1, -phase.a0], length);
+        let own = if from_start { speed_sq } else { back() };
+        let unit = if phase.duration > 0.0 { phase.duration } else { 2.0 * length / (speeds[0] + speeds[1]) };
+        let (mut parts, mut x, mut time, mut width, mut error) = (Vec::new(), 0.0, 0.0, 1.0, 0.0);
+        loop {
+            let series = Series::new(&own, time, x, width, unit / length);
+            let [end, slope] = series.at(1.0);
+            let fails = series.error > ERROR || slope <= 0.0 || end > 1.0 + OVER;
+            if fails && width > SHORTEST {
+                width *= 0.5;
+                continue;
+            }
+            error += series.error;
+            parts.push(series);
+            if end >= 1.0 - OVER || end.is_nan() || parts.len() == MOST_PARTS {
+                break;
+            }
+            (time, x, width) = (time + width, end, 2.0 * width);
+        }
+        let last = &parts[parts.len() - 1];
+        let total = last.from + last.width * last.time(1.0);
+        Self { speed_sq, from_start, parts, total, error }
+    }
+
+    /// Why nothing can follow a phase.
+    pub fn flaw(phase: &Phase, speeds: [f64; 2], length: f64) -> Option<&'static str> {
+        let moves = SpeedSq::new(phase, speeds, length).is_positive();
+        (!moves).then_some("loses all its speed on the way")
+    }
+
+    /// The part of the length when these parts of the duration are done and left, and its error.
+    pub fn part(&self, done: f64, left: f64) -> (Part, f64) {
+        let time = self.total * if self.from_start { done } else { left };
+        let number = self.parts[1..].partition_point(|part| part.from <= time);
+        let series = &self.parts[number];
+        let [share, _] = series.at((time - series.from) / series.width);
+        (Part { from_start: self.from_start, share: share.clamp(0.0, 1.0) }, self.error)
+    }
+
+    /// The motion at a part of the length, t seconds after the start.
+    pub fn pace(&self, part: Part, t: f64) -> Pace {
+        let x = if part.from_start { part.share } else { 1.0 - part.share };
+        let (length, [w, slope, bend]) = (self.speed_sq.length, self.speed_sq.derivatives(x));
+        let v = w.sqrt();
+        Pace { t, v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }
+    }
+
+    pub fn at_part(&self, part: Part, duration: f64) -> Pace {
+        let x = if part.from_start == self.from_start { part.share } else { 1.0 - part.share };
+        let number = self.parts[1..].partition_point(|part| part.x <= x);
+        let series = &self.parts[number];
+        let passed = (series.from + series.width * series.time(x)) / self.total;
+        let passed = passed.clamp(0.0, 1.0);
+        self.pace(part, duration * if self.from_start { passed } else { 1.0 - passed })
+    }
+}
+
+/// v² over the part x of the way in powers of x.
+#[derive(Clone, Copy, Debug)]
+struct SpeedSq {
+    c: [f64; 4],
+    length: f64,
+}
+
+impl SpeedSq {
+    fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Self {
+        Self::between(speeds, [phase.a0, phase.a1], length)
+    }
+
+    /// From v and a at both ends.
+    fn between(speeds: [f64; 2], a: [f64; 2], length: f64) -> Self {
+        let ([w0, w1], [slope0, slope1]) = (speeds.map(|v| v * v), a.map(|a| 2.0 * a * length));
+        let rise = w1 - w0;
+        Self { c: [w0, slope0, 3.0 * rise - 2.0 * slope0 - slope1, slope0 + slope1 - 2.0 * rise], length }
+    }
+
+    fn derivatives(&self, x: f64) -> [f64; 3] {
+        let [c0, c1, c2, c3] = self.c;
+        [c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3), 2.0 * c2 + 6.0 * x * c3]
+    }
+
+    /// Whether v² is above 0 all the way.
+    fn is_positive(&self) -> bool {
+        let [_, c1, c2, c3] = self.c;
+        // Where 3 c3 x² + 2 c2 x + c1 vanishes, without cancellation.
+        let root = (c2 * c2 - 3.0 * c1 * c3).max(0.0).sqrt();
+        let q = -(c2 + root.copysign(c2));
+        [0.0, 1.0, q / (3.0 * c3), c1 / q]
+            .iter()
+            .filter(|x| (0.0..=1.0).contains(*x))
+            .all(|&x| self.derivatives(x)[0] > 0.0)
+    }
+}
+
+/// The part of the length over a time, in powers of the part of that.
+struct Series {
+    /// When it begins and how long it lasts, in parts of some unit.
+    from: f64,
+    width: f64,
+    /// The part of the length at its start, and what is added to that.
+    x: f64,
+    terms: [f64; MOST_TERMS],
+    count: usize,
+    /// Proven bound of what the terms left out add.
+    error: f64,
+}
+
+impl Series {
+    /// `per` is the unit of time over the length.
+    fn new(speed_sq: &SpeedSq, from: f64, x: f64, width: f64, per: f64) -> Self {
+        let [w, slope, bend] = speed_sq.derivatives(x);
+        let scale = width * per;
+        let half = 0.5 * scale * scale;
+        // ẍ = p0 + p1 x + p2 x² about the start.
+        let [p0, p1, p2] = [half * slope, half * bend, half * 3.0 * speed_sq.c[3]];
+        let mut terms = [0.0; MOST_TERMS];
+        (terms[1], terms[2]) = (scale * w.sqrt(), 0.5 * p0);
+        let mut count = 3;
+        while count < MOST_TERMS && terms[count - 1].abs() + terms[count - 2].abs() > NOTHING {
+            let k = count - 2;
+            let square: f64 = (1..k).map(|i| terms[i] * terms[k - i]).sum();
+            terms[count] = (p1 * terms[k] + p2 * square) * PER_TERM[k];
+            count += 1;
+        }
+        // The series misses the equation by the terms of P from the power `count` − 2 on. With a slope of P of no more than 1 an error
+        // of ẍ grows to cosh(1)/2 of itself at most.
+        let mut rest = [0.0; MOST_TERMS + 1];
+        for k in (0..count).rev() {
+            rest[k] = rest[k + 1] + terms[k].abs();
+        }
+        let square: f64 = (1..count).map(|i| terms[i].abs() * rest[(count - 2).saturating_sub(i)]).sum();
+        let missed = p1.abs() * rest[count - 2] + p2.abs() * square;
+        let is_gentle = p1.abs() + 2.0 * p2.abs() * rest[0] <= 1.0;
+        Self { from, width, x, terms, count, error: if is_gentle { missed } else { f64::INFINITY } }
+    }
+
+    /// The part of the length at a part of the time, and its derivative.
+    #[inline]
+    fn at(&self, s: f64) -> [f64; 2] {
+        let (mut way, mut slope) = (0.0, 0.0);
+        for term in self.terms[..self.count].iter().rev() {
+            slope = slope * s + way;
+            way = way * s + term;
+        }
+        [self.x + way, slope]
+    }
+
+    /// The part of the time at a part of the length, at the end or before.
+    fn time(&self, x: f64) -> f64 {
+        time_of_way(|s| self.at(s), x, [1.0, 2.0], 4.0 * f64::EPSILON)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use feedplan_planner::phase_law::PhaseLaw;
+
+    #[test]
+    fn the_part_of_a_cubic_at_a_time_is_where_its_time_is_over() {
+        let length = 3.0;
+        // Nearly even; from and to a crawl, in many parts; with a dip between.
+        for (speeds, a, most) in [
+            ([10.0, 10.1], [3.0, -2.0], 1),
+            ([1e-3, 10.0], [20.0, 10.0], 40),
+            ([10.0, 1e-3], [-10.0, -20.0], 40),
+            ([10.0, 9.0], [-30.0, 28.0], 8),
+        ] {
+            let square = SpeedSq::between(speeds, a, length);
+            // Over x = y³, for the start, and 1 − y³, for the end, from the middle: Simpson's rule.
+            let n = 20_000;
+            let half = |end: f64, to: f64| {
+                let f = |y: f64| {
+                    let x = if end == 0.0 { y.powi(3) } else { 1.0 - y.powi(3) };
+                    3.0 * y * y * length / square.derivatives(x)[0].sqrt()
+                };
+                let h = to / f64::from(2 * n);
+                let inner: f64 =
+                    (0..n).map(|i| 4.0 * f(h * f64::from(2 * i + 1)) + 2.0 * f(h * f64::from(2 * i))).sum();
+                (inner + f(to) - f(0.0)) * h / 3.0
+            };
+            let root = 0.5_f64.cbrt();
+            let [first, last] = [half(0.0, root), half(1.0, root)];
+            for times in [1.0, 0.3, 40.0] {
+                let (law, duration, [a0, a1]) = (PhaseLaw::SpeedCubic, times * (first + last), a);
+                let (piece, axis, value, [u0, u1], [p0, p1]) = (0, 255, 0.0, [0.0, 1.0], speeds);
+                let phase = Phase { piece, law, axis, value, u0, u1, p0, p1, duration, a0, a1 };
+                let cubic = Cubic::new(&phase, speeds, length);
+                assert!(cubic.parts.len() <= most + 8 && cubic.error < 1e-12, "{}", cubic.parts.len());
+                for x in [0.001_f64, 0.2, 0.5, 0.9, 0.9999] {
+                    let passed = if x <= 0.5 {
+                        half(0.0, x.cbrt())
+                    } else {
+                        first + last - half(1.0, (1.0 - x).cbrt())
+                    };
+                    let done = passed / (first + last);
+                    let (Part { from_start, share }, _) = cubic.part(done, 1.0 - done);
+                    let found = if from_start { share } else { 1.0 - share };
+                    assert!((found - x).abs() < 1e-10, "{speeds:?} {duration}: {found} for {x}");
+                    let pace = cubic.at_part(Part { from_start: true, share: x }, 1.0);
+                    assert!((pace.t - done).abs() < 1e-9, "{speeds:?} {duration}: {} for {done}", pace.t);
+                }
+            }
+        }
+    }
+}
