@@ -16,7 +16,6 @@ use feedplan_geometry::watch::Watch;
 
 use moves::{MoveError, PathOptions};
 use path_builder::{Axes, BuiltPath, Motion};
-use smooth_fit::{Smooth, SmoothOptions};
 
 instances! {
     /// The path of moves.
@@ -28,13 +27,5 @@ instances! {
         /// to its speed.
         fn smooth_path(&self, options: &PathOptions, axes: &Axes<M>, motion: Option<&Motion<M>>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_smooth_path;
-    }
-}
-
-instances! {
-    /// A smooth curve within the tolerance of a polyline.
-    pub trait SmoothFit for [2, 3, 6, 9] smooth_fit::polyline::Polyline<M> = {
-        /// `smooth_fit::smooth_fit`; pieces are cut beside the points that are marked in `cut`.
-        fn smooth(&self, cut: &[bool], options: &SmoothOptions<M>, watch: Watch) -> Smooth<M> = smooth_fit::smooth_fit;
     }
 }
