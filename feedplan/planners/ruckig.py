@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, path_segments, profile_of_sections
 from feedplan.arguments import number
-from feedplan.constraints.problem import Problem, speed_square
+from feedplan.constraints.problem import Problem
 from feedplan.errors import MissingPackageError
 from feedplan.geometry.corners import Corners
 from feedplan.lazy import cached_property
@@ -52,8 +52,6 @@ MARGINS = [2.0**-k for k in range(24, -1, -1)]
 ROUNDING = 1e-9
 # Number of halvings that find a reachable speed to the last digit.
 HALVINGS = 60
-# The least speed on a segment of a repaired profile as a share of the speed that the path allows.
-SLOWEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -197,14 +195,8 @@ def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
     time_limit = _checked(time_limit)
     if time_limit is not None and problem.even is not problem:
         time_limit *= 0.5
-    own = within_both(problem, lambda problem, _: _planned(problem, time_limit, None), None)
+    own = within_both(problem, lambda problem, _: _planned(problem, time_limit), None)
     return fastest_runs([own, s_curve.plan(problem)])
-
-
-def repaired(problem: Problem, profile: SpeedProfile, *, time_limit: float | None = None) -> SpeedProfile:
-    """A profile without limits of jerk made one that keeps them: where segments meet it is no faster, and
-    between no faster than the faster end, except to leave a stop and come to it."""
-    return _planned(problem, _checked(time_limit), profile)
 
 
 def _checked(time_limit: float | None) -> float | None:
@@ -213,12 +205,12 @@ def _checked(time_limit: float | None) -> float | None:
     return number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
 
 
-def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | None) -> SpeedProfile:
+def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:
     motions = Motions()
     limits = jerk_limits(problem)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
     try:
-        subruns = _subruns(problem, limits, guide)
+        subruns = _subruns(problem, limits)
         found = [_improved(subrun, motions, deadline) for subrun in subruns]
         offsets = np.cumsum([0] + [len(sections) for sections in found])
         rows = np.array([section for sections in found for section in sections]).reshape(-1, 5)
@@ -228,34 +220,15 @@ def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | N
     return SpeedProfile.of(native)
 
 
-def _subruns(problem: Problem, limits: Array, guide: SpeedProfile | None) -> list[Subrun]:
+def _subruns(problem: Problem, limits: Array) -> list[Subrun]:
     """The subruns of the path; those for the jerk-limited planner have no segments."""
-    segmented = path_segments(problem, limits, s_curve.CUTTINGS, s_curve.LOOK_AHEAD)
-    offsets, length, speed, acceleration, jerk, junction, piece, u = segmented
     subruns = []
-    for first, last in pairwise(offsets.tolist()):
-        own = slice(first, last)
-        v = speed[own]
-        ends = np.zeros(len(v) + 1)
-        ends[1:-1] = np.minimum(np.minimum(v[:-1], v[1:]), junction[own][:-1])
-        if guide is not None:
-            ends[:-1] = np.minimum(ends[:-1], _speeds(problem, guide, piece[own], u[own]))
-            v = np.minimum(v, np.maximum(np.maximum(ends[:-1], ends[1:]), SLOWEST * v))
-        columns = (column.tolist() for column in (length[own], v, acceleration[own], jerk[own]))
-        segments = [Segment(*row) for row in zip(*columns, strict=True)]
-        subruns.append(Subrun(segments, ends.tolist()))
+    for rows in path_segments(problem, limits, s_curve.CUTTINGS, s_curve.LOOK_AHEAD):
+        speed, junction = rows[:, 1], rows[:, 4]
+        ends = np.zeros(len(rows) + 1)
+        ends[1:-1] = np.minimum(np.minimum(speed[:-1], speed[1:]), junction[:-1])
+        subruns.append(Subrun([Segment(*row) for row in rows[:, :4].tolist()], ends.tolist()))
     return subruns
-
-
-def _speeds(problem: Problem, guide: SpeedProfile, piece: NDArray[np.uint32], u: Array) -> Array:
-    """The speed of a profile (n,) [mm/s] at places, between the ends of its arcs linear in u."""
-    at = guide.piece + guide.u0 / problem.path.width[guide.piece]
-    place = piece + u / problem.path.width[piece]
-    arc = np.clip(np.searchsorted(at, place, side="right") - 1, 0, len(guide) - 1)
-    part = (u - guide.u0[arc]) / (guide.u1 - guide.u0)[arc]
-    rate_sq = (1 - part) * guide.p0[arc] + part * guide.p1[arc]
-    speeds: Array = np.sqrt(np.maximum(rate_sq * speed_square(problem, piece, u), 0.0))
-    return speeds
 
 
 def _improved(subrun: Subrun, motions: Motions, deadline: float) -> list[Section]:

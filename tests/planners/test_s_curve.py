@@ -17,7 +17,6 @@ from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
-from feedplan.planners.ruckig import repaired
 from tests.campaign import seeds
 from tests.planners.random_paths import random_problem
 from tests.planners.test_jerk_limited import CURVES
@@ -111,16 +110,6 @@ def test_the_lemniscate_orders_the_methods() -> None:
     problem = build_problem(Path.from_curve(lemniscate(), feed=FREE), CURVES)
     best, states, passes = (planner(name)(problem).time for name in ("jerk-limited", "ruckig", "s-curve"))
     assert best < states < 0.99 * passes < 1.5 * best
-
-
-def test_a_bang_bang_profile_is_repaired() -> None:
-    problem = build_problem(Path.from_curve(lemniscate(), feed=FREE), CURVES)
-    guide = planner("bang-bang")(problem)
-    profile = repaired(problem, guide)
-    assert jerk_excess(problem, profile).worst <= HELD
-    assert guide.time < profile.time < planner("s-curve")(problem).time
-    # No faster than the guide where segments meet: nowhere much.
-    assert np.isfinite(profile.duration).all()
 
 
 def test_a_time_limit_gives_the_first_states() -> None:

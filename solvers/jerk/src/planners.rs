@@ -5,8 +5,8 @@ use feedplan_planner::problem::Fault;
 
 use crate::jerk_profile::JerkProfile;
 use crate::path_problem::Effort;
-use crate::s_curve::on_path::{Cutting, Segmented};
-use crate::s_curve::Section;
+use crate::s_curve::on_path::Cutting;
+use crate::s_curve::{Section, Segment};
 
 instances! {
     /// Plans of a problem within `jerk` [mm/s³] of every axis.
@@ -17,9 +17,9 @@ instances! {
         /// The two-pass profile; each subrun takes the cutting that gives the least time.
         fn s_curve(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize, effort: &Effort)
             -> Result<JerkProfile, Fault> = crate::s_curve::on_path::plan;
-        /// The segments that `s_curve` plans on.
+        /// The segments of each subrun that `s_curve` plans on.
         fn segments(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize)
-            -> Result<Segmented, Fault> = crate::s_curve::on_path::cut;
+            -> Result<Vec<Vec<Segment>>, Fault> = crate::s_curve::on_path::cut;
         /// The profile of sections of constant jerk; subrun i has those from `offsets[i]` to `offsets[i + 1]`.
         fn of_sections(&self, jerk: &[f64; M], offsets: &[usize], sections: &[Section]) -> Result<JerkProfile, Fault>
             = crate::s_curve::on_path::of_sections;

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::arrays::{indices, row, rows};
+use super::arrays::{indices, row, rows, to_array2};
 use super::memory;
 use super::native::Of;
 use super::plan::to_exception;
@@ -19,18 +19,6 @@ use feedplan_jerk::s_curve::on_path::Cutting;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
 use feedplan_jerk::JerkLimited as _;
 use feedplan_planner::problem;
-
-/// Offsets, then columns of segments.
-type Segments<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<f64>>,
-);
 
 /// How long a planner may take.
 fn deadline(time_limit: Option<f64>) -> Option<Instant> {
@@ -95,8 +83,8 @@ fn plan_s_curve<'py>(
     })
 }
 
-/// The segments that `plan_s_curve` plans on: offsets of the subruns, then (n,) length, speed, acceleration, jerk,
-/// junction, piece, u. A subrun without segments is not for it.
+/// The segments of each subrun that `plan_s_curve` plans on, (n, 5) rows of length, speed, acceleration, jerk and the speed
+/// limit at the junction with the next. A subrun without any is not for it.
 #[pyfunction]
 fn path_segments<'py>(
     py: Python<'py>,
@@ -104,24 +92,15 @@ fn path_segments<'py>(
     jerk: PyReadonlyArray1<'py, f64>,
     cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
-) -> PyResult<Segments<'py>> {
+) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
     let cuttings = to_cuttings(&cuttings);
     with_padded_axes!(problem.axes(), M, {
         let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
         let cut = |watch: Watch| problem::Problem { watch, ..problem }.segments(&jerk, &cuttings, look_ahead);
-        let segmented = run(py, None, cut)?.map_err(|fault| to_exception(&fault))?;
-        let column =
-            |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
-        Ok((
-            PyArray1::from_vec(py, segmented.subruns),
-            column(|segment| segment.length),
-            column(Segment::speed),
-            column(|segment| segment.limits.acceleration),
-            column(|segment| segment.limits.jerk),
-            column(|segment| segment.junction),
-            PyArray1::from_vec(py, segmented.piece),
-            PyArray1::from_vec(py, segmented.u),
-        ))
+        let subruns = run(py, None, cut)?.map_err(|fault| to_exception(&fault))?;
+        let row =
+            |own: &Segment| [own.length, own.speed(), own.limits.acceleration, own.limits.jerk, own.junction];
+        Ok(subruns.iter().map(|own| to_array2(py, own.iter().map(row).collect(), 5)).collect())
     })
 }
 

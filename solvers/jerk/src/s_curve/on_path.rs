@@ -69,41 +69,22 @@ pub fn plan<const M: usize>(
     })
 }
 
-#[derive(Clone, Debug, Default)]
-pub struct Segmented {
-    /// Offsets of the subruns in the segments; a subrun without segments is not for profilers of segments.
-    pub subruns: Vec<i64>,
-    pub segments: Vec<Segment>,
-    /// Piece and parameter at which each segment begins.
-    pub piece: Vec<u32>,
-    pub u: Vec<f64>,
-}
-
-/// Cuts all subruns into the segments that `plan` uses.
+/// The segments of each subrun that `plan` uses; none where the subrun is not for profilers of segments.
 pub fn cut<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
     cuttings: &[Cutting],
     look_ahead: usize,
-) -> Result<Segmented, Fault> {
+) -> Result<Vec<Vec<Segment>>, Fault> {
     let limits = checked(problem, jerk)?;
-    let mut all = Segmented { subruns: vec![0], ..Segmented::default() };
     let each = problem.watch.each(problem.width.len());
-    for subrun in subruns(problem) {
+    let segments = |subrun: &Subrun| {
         let path = ArcLengthPath::new(problem, &subrun.parts);
         let watch = each.part(subrun.parts.len() as f64);
-        let own = quickest(problem, &path, &subrun, &limits, (cuttings, look_ahead), watch)?;
-        let mut s = 0.0;
-        for segment in own.map(|own| own.segments).unwrap_or_default() {
-            let part = path.part(s);
-            all.piece.push(path.parts[part].piece as u32);
-            all.u.push(path.locate(part, s));
-            s += segment.length;
-            all.segments.push(segment);
-        }
-        all.subruns.push(all.segments.len() as i64);
-    }
-    Ok(all)
+        let own = quickest(problem, &path, subrun, &limits, (cuttings, look_ahead), watch)?;
+        Ok(own.map(|own| own.segments).unwrap_or_default())
+    };
+    subruns(problem).iter().map(segments).collect()
 }
 
 /// The profile of given sections, for subrun i those from `offsets[i]` to `offsets[i + 1]`; if none, the jerk-limited
