@@ -12,9 +12,9 @@ from scipy.integrate import quad
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
+from tests.along import profile_of
 
 Array = NDArray[np.float64]
-Row = tuple[int, PhaseLaw, float, float, float, float, float, float, float, float]
 
 
 def rest_to_rest(length: float, jerk: float, share: float = 1.0) -> list[tuple[float, float]]:
@@ -31,7 +31,7 @@ def constant_jerk(
     """The sections along a curve from a speed and an acceleration, cut where pieces meet."""
     table = CurveLength(curve)
     ends = table.length(np.arange(len(curve)), curve.width)
-    rows: list[Row] = []
+    rows = []
     piece, s, (v, a) = 0, 0.0, start
     u, some = 0.0, [row for row in sections if row[0] > 0.0]
     for number, (duration, jerk) in enumerate(some):
@@ -51,12 +51,12 @@ def constant_jerk(
             whole = crosses or finished
             u1 = float(curve.width[piece]) if whole else float(table.locate([s1], 1e-14).u[0])
             p0, p1 = v**2 / square(curve, piece, u), v1**2 / square(curve, piece, u1)
-            rows.append((piece, PhaseLaw.PATH_JERK, jerk, u, u1, p0, p1, time, a, a1))
+            rows.append((piece, PhaseLaw.PATH_JERK, NO_AXIS, jerk, u, u1, p0, p1, time, a, a1))
             s, v, a, u = s1, v1, a1, u1
             left -= time
             if crosses:
                 piece, u, s = piece + 1, 0.0, float(ends[piece])
-    return profile_of(rows)
+    return profile_of(*rows)
 
 
 def cubic_speed(
@@ -64,7 +64,7 @@ def cubic_speed(
 ) -> SpeedProfile:
     """Arcs, so many a piece, whose v² and its slope by the length are given at their ends."""
     table = CurveLength(curve)
-    rows: list[Row] = []
+    rows = []
     for piece in range(len(curve)):
         cuts = np.linspace(0.0, float(curve.width[piece]), arcs + 1)
         lengths = table.length(np.full(arcs + 1, piece), cuts)
@@ -74,8 +74,8 @@ def cubic_speed(
             time = quad(lambda s, *row: 1.0 / math.sqrt(hermite(s, *row)), 0.0, s1 - s0,
                         args=(s1 - s0, *w, *dw), epsabs=1e-15, epsrel=1e-13)[0]  # fmt: skip
             kind = PhaseLaw.SPEED_CUBIC
-            rows.append((piece, kind, 0.0, u0, u1, p[0], p[1], time, 0.5 * dw[0], 0.5 * dw[1]))
-    return profile_of(rows)
+            rows.append((piece, kind, NO_AXIS, 0.0, u0, u1, p[0], p[1], time, 0.5 * dw[0], 0.5 * dw[1]))
+    return profile_of(*rows)
 
 
 def hermite(s: float, way: float, w0: float, w1: float, dw0: float, dw1: float) -> float:
@@ -89,17 +89,3 @@ def square(curve: CompositeCurve, piece: int, u: float) -> float:
     """|C'|²."""
     tangent = curve.evaluate(np.array([piece]), np.array([u]), 1)[1]
     return float((tangent**2).sum())
-
-
-def profile_of(rows: list[Row]) -> SpeedProfile:
-    """One run of arcs."""
-    piece, kind, value, u0, u1, p0, p1, time, a0, a1 = zip(*rows, strict=True)
-    return SpeedProfile(
-        np.array(piece, np.uint32),
-        np.array(kind, np.uint8),
-        np.full(len(rows), NO_AXIS, np.uint8),
-        *(np.array(values, float) for values in (value, u0, u1, p0, p1, time)),
-        runs=np.array([0, len(rows)]),
-        a0=np.array(a0, float),
-        a1=np.array(a1, float),
-    )

@@ -19,10 +19,11 @@ from feedplan.geometry.path import Path
 from feedplan.lower_bound import lower_bound
 from feedplan.planners import planner
 from feedplan.profile import PhaseLaw, SpeedProfile
+from tests.along import FREE, path_along, problem_along
 from tests.campaign import seeds
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
-from tests.planners.test_curves import Planned, problem_of, random_curve
+from tests.planners.test_curves import Planned, random_curve
 
 plan = planner("bang-bang")
 
@@ -100,7 +101,7 @@ def test_random_curves_are_certified(weights: bool) -> None:
         rng = np.random.default_rng(seed + 10_000)
         curve = random_curve(seed, weights)
         limits = np.exp(rng.uniform(0.0, 3.0, curve.axes)), np.exp(rng.uniform(0.0, 5.0, curve.axes))
-        problem = problem_of(curve, *limits, float(np.exp(rng.uniform(0.0, 3.0))))
+        problem = problem_along(path_along(curve, feed=np.exp(rng.uniform(0.0, 3.0))), *limits)
         gaps.append(gap(problem, SpeedProfile.of(_solvers.plan_bang_bang(problem))))
         assert gaps[-1] > -1e-9, seed
     assert np.median(gaps) < 1e-4
@@ -151,7 +152,7 @@ def test_columns_that_differ_in_length_make_no_profile() -> None:
 def test_a_path_of_a_tool_on_plain_axes_has_the_same_bound_run_by_run() -> None:
     line = CompositeCurve.from_bezier([[0.0], [10.0]])
     curve = CompositeCurve.joined([line, replace(line, control_points=line.control_points + 10.0)])
-    problem = problem_of(curve, np.full(1, 1e9), np.full(1, 100.0), 1e9)
+    problem = problem_along(path_along(curve), FREE, 100.0)
     path: Path = replace(problem.path, runs=np.array([0, 1, 2]), dwell=np.zeros(2))
     stops = replace(problem, path=path)
     # 10 mm from rest to rest twice, and 20 mm once.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,69 +15,30 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, Setpoints, setpoints
+from tests.along import Phase, path_along, problem_along, profile_of
 
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)
-ARC = tuple[int, PhaseLaw, int, float, float, float, float, float, float]
-
-
-def problem_of(path: Path) -> Problem:
-    """The path with limits that setpoints do not look at."""
-    count, axes = len(path), len(path.axes)
-    return Problem(
-        path=path,
-        max_velocity=np.full(axes, np.inf),
-        max_acceleration=np.full(axes, np.inf),
-        max_jerk=np.full(axes, np.inf),
-        feed=np.full(count, 1e9),
-        junction_speed=np.full(count + 1, np.inf),
-        chord_tolerance=np.inf,
-        period=0.001,
-    )
 
 
 def sampled(path: Path, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Setpoints:
-    return setpoints(problem_of(path), profile, period, interpolator)
+    return setpoints(problem_along(path), profile, period, interpolator)
 
 
-def path_of(
-    control_points: list[list[list[float]]], width: list[float], runs: list[int], dwell: list[float]
-) -> Path:
-    count = len(width)
-    return Path(
-        axes=tuple("XYZ"[: len(control_points[0][0])]),
-        curve=CompositeCurve.from_pieces(np.array(control_points), np.array(width)),
-        feed=np.full(count, 100.0),
-        move=np.zeros((count, 2), np.int64),
-        line=np.arange(10, 10 * (count + 1), 10, dtype=np.int32),
-        runs=np.array(runs),
-        dwell=np.array(dwell),
-        tolerance=np.zeros(count),
-    )
+def path_of(control_points: list[list[list[float]]], width: list[float], **columns: Any) -> Path:
+    return path_along(CompositeCurve.from_pieces(control_points, width), **columns)
 
 
-def profile_of(arcs: list[ARC], runs: list[int]) -> SpeedProfile:
-    piece, kind, axis, value, u0, u1, p0, p1, duration = zip(*arcs, strict=True)
-    return SpeedProfile(
-        np.array(piece, np.uint32),
-        np.array(kind, np.uint8),
-        np.array(axis, np.uint8),
-        *(np.array(values, float) for values in (value, u0, u1, p0, p1, duration)),
-        runs=np.array(runs),
-    )
-
-
-def line_arcs(piece: int, length: float, acceleration: float, speed: float) -> list[ARC]:
+def line_arcs(piece: int, length: float, acceleration: float, speed: float) -> list[Phase]:
     """Rest to rest along a piece in +X: trapezoid, or triangle where `speed` is out of reach."""
     a, kind = acceleration, PhaseLaw.AXIS_ACCELERATION
     v = min(speed, math.sqrt(a * length))
     ramp = v * v / (2 * a)
-    arcs: list[ARC] = [(piece, kind, 0, a, 0.0, ramp, 0.0, v * v, v / a)]
+    arcs: list[Phase] = [(piece, kind, 0, a, 0.0, ramp, 0.0, v * v, v / a)]
     if length > 2 * ramp:
         cruise = length - 2 * ramp
         arcs.append((piece, PhaseLaw.FEED, 255, v * v, ramp, length - ramp, v * v, v * v, cruise / v))
@@ -85,17 +47,17 @@ def line_arcs(piece: int, length: float, acceleration: float, speed: float) -> l
 
 def line_case(speed: float = 50.0) -> tuple[Path, SpeedProfile]:
     """10 mm in +X from rest to rest at 1000 mm/s²."""
-    path = path_of([[[0.0, 2.0], [5.0, 2.0], [10.0, 2.0]]], [10.0], [0, 1], [0.0])
+    path = path_of([[[0.0, 2.0], [5.0, 2.0], [10.0, 2.0]]], [10.0])
     arcs = line_arcs(0, 10.0, 1000.0, speed)
-    return path, profile_of(arcs, [0, len(arcs)])
+    return path, profile_of(*arcs)
 
 
 def parabola_case(feed: float = 20.0) -> tuple[Path, SpeedProfile]:
     """x = u, y = u²/2 on [0, 4] at constant feed: it starts and ends in motion."""
-    path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0], [0, 1], [0.0])
+    path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0])
     duration = parabola_length(4.0) / feed
     ends = (feed**2, feed**2 / 17)
-    return path, profile_of([(0, PhaseLaw.FEED, 255, feed**2, 0.0, 4.0, *ends, duration)], [0, 1])
+    return path, profile_of((0, PhaseLaw.FEED, 255, feed**2, 0.0, 4.0, *ends, duration))
 
 
 def parabola_length(u: float) -> float:
@@ -105,9 +67,9 @@ def parabola_length(u: float) -> float:
 def two_runs(dwell: float) -> tuple[Path, SpeedProfile]:
     """10 mm in X in 0.25 s, a pause, then 4 mm on in about 0.126 s."""
     points = [[[0.0], [5.0], [10.0]], [[10.0], [12.0], [14.0]]]
-    path = path_of(points, [10.0, 4.0], [0, 1, 2], [dwell, 0.0])
+    path = path_of(points, [10.0, 4.0], runs=[0, 1, 2], dwell=np.array([dwell, 0.0]))
     arcs = [*line_arcs(0, 10.0, 1000.0, 50.0), *line_arcs(1, 4.0, 1000.0, 100.0)]
-    return path, profile_of(arcs, [0, 3, 5])
+    return path, profile_of(*arcs, runs=[0, 3, 5])
 
 
 def zigzag(seed: int, count: int = 20) -> tuple[Path, SpeedProfile]:
@@ -131,7 +93,7 @@ def zigzag(seed: int, count: int = 20) -> tuple[Path, SpeedProfile]:
             u0, u1 = from_x - x[i], min(to_x - x[i], h)
             kind = PhaseLaw.AXIS_ACCELERATION
             arcs.append((i, kind, 0, a if up else -a, u0, u1, max(p0, 0), max(p1, 0), duration))
-    return path_of(points, list(width), [0, count], [0.0]), profile_of(arcs, [0, len(arcs)])
+    return path_of(points, list(width)), profile_of(*arcs)
 
 
 def trapezoid(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -257,10 +219,10 @@ def test_a_thousand_runs_shorter_than_a_period_take_one_each(interpolator: str) 
     x = np.arange(1001) * 1e-6
     points = [[[a], [(a + b) / 2], [b]] for a, b in pairwise(x)]
     width = np.diff(x)
-    path = path_of(points, list(width), list(range(1001)), [0.0] * 1000)
+    path = path_of(points, list(width), runs=range(1001))
     arcs = [line_arcs(i, float(h), 1000.0, 100.0) for i, h in enumerate(width)]
     runs = np.concatenate(([0], np.cumsum([len(run) for run in arcs])))
-    profile = profile_of([arc for run in arcs for arc in run], list(runs))
+    profile = profile_of(*(arc for run in arcs for arc in run), runs=runs)
     chunk = sampled(path, profile, 0.001, interpolator).all()
     np.testing.assert_array_equal(chunk.position[:, 0], x)
     assert (chunk.velocity == 0).all()
@@ -321,15 +283,15 @@ def test_second_differences_stay_within_the_acceleration(interpolator: str, seed
 @pytest.mark.parametrize("degree", [2, 3])
 def test_the_parameter_moves_at_constant_acceleration(degree: int) -> None:
     # y = x²/2, C' = (1, u): u = ½·3·t² from rest to 6 in 2 s, then −6 mm/s² to rest at 9 in 1 s.
-    path = path_of([[[0.0, 0.0], [4.5, 0.0], [9.0, 40.5]]], [9.0], [0, 1], [0.0])
+    path = path_of([[[0.0, 0.0], [4.5, 0.0], [9.0, 40.5]]], [9.0])
     path = replace(path, curve=path.curve.elevated(degree))
     kind = PhaseLaw.PARAMETER_ACCELERATION
-    arcs: list[ARC] = [
+    arcs: list[Phase] = [
         (0, kind, 255, 3.0, 0.0, 6.0, 0.0, 36.0, 2.0),
         (0, kind, 255, -6.0, 6.0, 9.0, 36.0, 0.0, 1.0),
     ]
     for interpolator in INTERPOLATORS:
-        chunk = sampled(path, profile_of(arcs, [0, 2]), 0.01, interpolator).all()
+        chunk = sampled(path, profile_of(*arcs), 0.01, interpolator).all()
         up = chunk.t <= 2.0
         rest = 3.0 - chunk.t
         u = np.where(up, 1.5 * chunk.t**2, 9.0 - 3.0 * rest**2)
@@ -345,13 +307,13 @@ def test_the_parameter_moves_at_constant_acceleration(degree: int) -> None:
 
 def test_phases_of_constant_axis_velocity_and_of_constant_p_follow_their_law() -> None:
     # y = x²/2, C' = (1, u): y at a constant 6 mm/s on [1, 2]; p = 4 on [2, 4].
-    path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0], [0, 1], [0.0])
-    arcs: list[ARC] = [
+    path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0])
+    arcs: list[Phase] = [
         (0, PhaseLaw.PARAMETER_ACCELERATION, 255, 0.0, 0.0, 1.0, 36.0, 36.0, 1 / 6),
         (0, PhaseLaw.AXIS_VELOCITY, 1, 36.0, 1.0, 2.0, 36.0, 9.0, 1.5 / 6),
         (0, PhaseLaw.PARAMETER_ACCELERATION, 255, 0.0, 2.0, 4.0, 4.0, 4.0, 1.0),
     ]
-    profile = profile_of(arcs, [0, 3])
+    profile = profile_of(*arcs)
     for interpolator in INTERPOLATORS:
         chunk = sampled(path, profile, 0.01, interpolator).all()
         u, ends = chunk.u, np.cumsum(profile.duration)
@@ -391,7 +353,7 @@ def test_what_does_not_fit_is_refused_with_a_sentence() -> None:
         sampled(path, profile, 1e-9)
     with pytest.raises(InputError, match="does not belong to this path"):
         sampled(path, line_case()[1], 0.001)
-    first = profile_of(line_arcs(0, 10.0, 1000.0, 50.0), [0, 3, 3])
+    first = profile_of(*line_arcs(0, 10.0, 1000.0, 50.0), runs=[0, 3, 3])
     with pytest.raises(InputError, match="line 20: the profile has no phases in run 2"):
         sampled(path, first, 0.001)
     with pytest.raises(InputError, match="phase 3 of the profile is on no piece of its run"):

@@ -23,53 +23,14 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
-from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
+from tests.along import path_along, problem_along, profile_of
 
 Array = NDArray[np.float64]
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)
 BUTTERFLY = FilePath(__file__).parents[1] / "benchmarks" / "curves" / "butterfly.json"
 RATES = ("position", "velocity", "acceleration", "jerk")
-
-
-def problem_of(curve: CompositeCurve, velocity: Array | None = None, **changes: object) -> Problem:
-    """One run along the curve, with the velocity limits of its axes."""
-    count, axes = len(curve), curve.axes
-    limits = np.full(axes, 1e9) if velocity is None else velocity
-    path = Path(
-        axes=tuple("XYZABC"[:axes]),
-        curve=curve,
-        feed=np.full(count, 1e9),
-        move=np.zeros((count, 2), np.int64),
-        line=np.arange(1, count + 1, dtype=np.int32),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
-    problem = Problem(
-        path=path,
-        max_velocity=limits,
-        max_acceleration=np.full(axes, 1e9),
-        max_jerk=np.full(axes, np.inf),
-        feed=path.feed,
-        junction_speed=np.full(count + 1, np.inf),
-        chord_tolerance=np.inf,
-        period=0.001,
-    )
-    return replace(problem, **changes)  # type: ignore[arg-type]
-
-
-def profile_of(*arcs: tuple[int, PhaseLaw, int, float, float, float, float, float, float]) -> SpeedProfile:
-    """Rows of piece, kind, axis, value, u0, u1, p0, p1 and duration."""
-    piece, kind, axis, value, u0, u1, p0, p1, duration = zip(*arcs, strict=True)
-    return SpeedProfile(
-        np.array(piece, np.uint32),
-        np.array(kind, np.uint8),
-        np.array(axis, np.uint8),
-        *(np.array(values, float) for values in (value, u0, u1, p0, p1, duration)),
-        runs=np.array([0, len(arcs)]),
-    )
 
 
 def planned(problem: Problem) -> SpeedProfile:
@@ -90,7 +51,7 @@ def random_problem(seed: int, degree: int | None = None, rational: bool = True) 
     weights = np.exp(rng.uniform(np.log(0.2), np.log(5.0), len(points))) if rational else None
     curve = CompositeCurve.from_nurbs(points, knots, degree, weights)
     return replace(
-        problem_of(curve, np.exp(rng.uniform(0.0, 3.0, axes))),
+        problem_along(path_along(curve), np.exp(rng.uniform(0.0, 3.0, axes))),
         max_acceleration=np.exp(rng.uniform(0.0, 5.0, axes)),
         feed=np.full(len(curve), np.exp(rng.uniform(0.0, 3.0))),
         chord_tolerance=1e-3 if seed % 2 and degree > 2 else np.inf,
@@ -120,7 +81,7 @@ def _out_and_ahead(angle: Array) -> tuple[tuple[Array, Array], tuple[Array, Arra
 def test_a_circle_at_constant_feed_turns_evenly(interpolator: str, period: float) -> None:
     radius, feed = 10.0, 80.0
     curve = circle([0.0, 0.0], radius)
-    stream = setpoints(problem_of(curve), feed_profile(curve, feed), period, interpolator)
+    stream = setpoints(problem_along(path_along(curve)), feed_profile(curve, feed), period, interpolator)
     chunk = stream.all()
     angle, step = feed * chunk.t / radius, feed * period
     out, ahead = (np.stack([x, y], axis=1) for x, y in _out_and_ahead(angle))
@@ -144,7 +105,7 @@ def test_a_line_whose_parameter_speeds_up_is_the_school_formula(interpolator: st
     peak = float((1000 * half / curve.evaluate(0, 0.5, 1)[1, 0, 0]) ** 2)
     up = (0, PhaseLaw.AXIS_ACCELERATION, 0, 1000.0, 0.0, 0.5, 0.0, peak, half)
     down = (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 0.5, 1.0, peak, 0.0, half)
-    chunk = setpoints(problem_of(curve), profile_of(up, down), 0.001, interpolator).all()
+    chunk = setpoints(problem_along(path_along(curve)), profile_of(up, down), 0.001, interpolator).all()
     t = np.minimum(chunk.t, 2 * half)
     first, second = np.minimum(t, half), np.maximum(2 * half - t, 0.0)
     x = np.where(t <= half, 500 * first**2, 30 - 500 * second**2)
@@ -171,7 +132,7 @@ def test_an_axis_that_turns_round_keeps_its_acceleration(interpolator: str, rati
         pace, duration = math.sqrt(a), 2 / math.sqrt(a)
     end = float((a * duration / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
     arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, -a, 0.0, float(curve.width[0]), pace**2, end, duration)
-    chunk = setpoints(problem_of(curve), profile_of(arc), 1e-4, interpolator).all()
+    chunk = setpoints(problem_along(path_along(curve)), profile_of(arc), 1e-4, interpolator).all()
     t = chunk.t
     np.testing.assert_allclose(chunk.position[:, 0], r - 0.5 * a * t**2, atol=1e-11)
     np.testing.assert_allclose(chunk.velocity[:, 0], -a * t, atol=1e-8)
@@ -262,7 +223,7 @@ def test_an_axis_that_has_all_but_turned_round_is_not_taken_for_one_at_rest() ->
     pace = math.sqrt(a * r) / slope
     end = float((a * time / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
     arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, -a, pace * t0, float(curve.width[0]), pace**2, end, time - t0)
-    chunk = setpoints(problem_of(curve), profile_of(arc), 1e-3, "sarfraz").all()
+    chunk = setpoints(problem_along(path_along(curve)), profile_of(arc), 1e-3, "sarfraz").all()
     x = r - a * (chunk.t + t0) ** 2 / 2
     expected = np.sqrt((r - x) * (r + x))
     np.testing.assert_allclose(chunk.position[1:-1, 1], expected[1:-1], atol=1e-9)
@@ -279,7 +240,7 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
         (0, PhaseLaw.AXIS_ACCELERATION, 0, a, 0.0, 1.0, pace, pace, time),
         (0, PhaseLaw.AXIS_ACCELERATION, 0, a, 1.0, 2.0, pace, pace, time),
     )
-    problem = problem_of(curve.elevated(degree))
+    problem = problem_along(path_along(curve.elevated(degree)))
     # The cusp falls between setpoints, next to one, and on one.
     for period in (time / 100.5, time / (100 + 1e-7), time / 100):
         chunk = setpoints(problem, profile, period, interpolator).all()
@@ -349,7 +310,7 @@ def test_time_and_place_agree_with_integration(seed: int) -> None:
 def test_the_butterfly_is_followed_to_its_end(interpolator: str) -> None:
     data = json.loads(BUTTERFLY.read_text(encoding="utf-8"))
     curve = CompositeCurve.from_nurbs(data["control_points"], data["knots"], data["degree"], data["weights"])
-    problem = problem_of(curve, np.full(2, 250.0))
+    problem = problem_along(path_along(curve), 250.0)
     problem = replace(problem, max_acceleration=np.full(2, 3000.0), feed=np.full(len(curve), 200.0))
     profile = planned(problem)
     for period in (1e-4, 1e-3, 1e-2):
@@ -368,7 +329,7 @@ def joints_case(kind: PhaseLaw) -> tuple[Problem, SpeedProfile]:
     joints = CompositeCurve.from_bezier(np.cumsum(rng.normal(size=(10, 3)), axis=0), width=2.0)
     # D = 1 + 4 u² on [0, 2].
     problem = replace(
-        problem_of(tip),
+        problem_along(path_along(tip)),
         joint_axes=("X", "Y", "B"),
         joints=joints,
         tip_speed=SpeedPolynomial(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
@@ -415,15 +376,16 @@ def test_quadratic_and_higher_pieces_stand_in_one_path() -> None:
     arc = CompositeCurve.from_bezier([[6, 1], [8, -1], [9, 2]], [1, 0.7, 1])
     curve = CompositeCurve.joined([quadratic, cubic, arc])
     length = CurveLength(curve)
+    problem, profile = problem_along(path_along(curve)), feed_profile(curve, 30.0)
     for interpolator in INTERPOLATORS:
-        chunk = setpoints(problem_of(curve), feed_profile(curve, 30.0), 0.0011, interpolator).all()
+        chunk = setpoints(problem, profile, 0.0011, interpolator).all()
         np.testing.assert_allclose(length.length(chunk.piece, chunk.u), 30 * chunk.t, atol=1e-9)
         assert np.unique(chunk.piece).tolist() == [0, 1, 2]
 
 
 def test_what_general_pieces_cannot_do_is_refused_with_a_sentence() -> None:
     curve = CompositeCurve.from_bezier([[0.0, 0.0], [1.0, 2.0], [3.0, 2.0], [4.0, 0.0]])
-    problem, profile = problem_of(curve), feed_profile(curve, 10.0)
+    problem, profile = problem_along(path_along(curve)), feed_profile(curve, 10.0)
     for change, words in (
         (
             {"kind": np.array([1], np.uint8), "p0": np.array([np.inf])},

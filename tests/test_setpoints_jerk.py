@@ -17,8 +17,8 @@ from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
+from tests.along import path_along, problem_along
 from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
-from tests.test_setpoints_curves import problem_of
 
 Array = NDArray[np.float64]
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)
@@ -57,7 +57,7 @@ def test_a_hundred_millimetres_from_rest_to_rest_are_four_cubics(interpolator: s
     sections = rest_to_rest(100.0, 3200.0)
     assert [time for time, _ in sections] == pytest.approx([0.25, 0.25, 0.0, 0.25, 0.25], abs=1e-15)
     profile = constant_jerk(curve, sections)
-    stream = setpoints(problem_of(curve), profile, 0.001, interpolator)
+    stream = setpoints(problem_along(path_along(curve)), profile, 0.001, interpolator)
     chunk = stream.all()
     assert stream.count == 1001
     expected = motion_at(sections, chunk.t)
@@ -88,7 +88,7 @@ def test_a_circle_at_constant_tangential_jerk_is_exact(interpolator: str) -> Non
     profile = constant_jerk(curve, sections)
     assert set(profile.kind) == {PhaseLaw.PATH_JERK}
     assert len(profile) > len(curve)
-    chunk = setpoints(problem_of(curve), profile, 0.0007, interpolator).all()
+    chunk = setpoints(problem_along(path_along(curve)), profile, 0.0007, interpolator).all()
     keep = ~switching(profile, chunk.t, 1e-9)
     keep[[0, -1]] = False
     t = chunk.t[keep]
@@ -154,7 +154,7 @@ def test_rates_on_random_curves_are_the_differences_of_the_positions(interpolato
     length = CurveLength(curve)
     for profile in profiles(curve, seed):
         period = 0.0005
-        stream = setpoints(problem_of(curve), profile, period, interpolator)
+        stream = setpoints(problem_along(path_along(curve)), profile, period, interpolator)
         chunk = stream.all()
         differences_agree(chunk, profile, period)
         # Newton's error is in parts of each step: from rest the first is shorter than 1e-7 mm.
@@ -175,7 +175,7 @@ def test_joints_follow_the_motion_of_the_tip(interpolator: str, seed: int) -> No
         np.cumsum(rng.normal(size=(4 + seed, 2 + seed % 5)), axis=0), width=2.0
     )
     problem = replace(
-        problem_of(tip),
+        problem_along(path_along(tip)),
         joint_axes=tuple("XYZABC"[: joints.axes]),
         joints=joints,
         tip_speed=SpeedPolynomial(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
@@ -197,8 +197,9 @@ def test_joints_follow_the_motion_of_the_tip(interpolator: str, seed: int) -> No
 
 def test_both_interpolators_agree_in_chunks_of_any_size() -> None:
     curve = random_curve(1)
+    problem = problem_along(path_along(curve))
     for profile in profiles(curve, 1):
-        sarfraz, newton = (setpoints(problem_of(curve), profile, 0.0013, name) for name in INTERPOLATORS)
+        sarfraz, newton = (setpoints(problem, profile, 0.0013, name) for name in INTERPOLATORS)
         whole = sarfraz.all()
         for stream in (sarfraz, newton):
             parts = [chunk.position for chunk in stream.chunks(37)]
@@ -207,7 +208,7 @@ def test_both_interpolators_agree_in_chunks_of_any_size() -> None:
 
 def test_a_profile_that_cannot_be_followed_is_refused_with_a_sentence() -> None:
     curve = CompositeCurve.from_bezier([[0.0, 0.0], [20.0, 10.0], [40.0, 10.0], [60.0, 0.0]])
-    problem: Problem = problem_of(curve)
+    problem: Problem = problem_along(path_along(curve))
     jerk = constant_jerk(curve, rest_to_rest(CurveLength(curve).total, 3000.0))
     cubic = cubic_speed(curve, lambda s: 400.0, lambda s: 0.0, 1)
     for profile, change, words in (

@@ -21,6 +21,7 @@ from feedplan.planning import plan
 from feedplan.profile import OF_PHASES, SpeedProfile
 from feedplan.program.program import Program
 from feedplan.setpoints import SetpointChunk, setpoints
+from tests.along import path_along
 
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "line")
 
@@ -146,16 +147,13 @@ def spline() -> Callable[..., Case]:
             ([width[0]], width[:-1] + width[1:], [width[-1]])
         )
         knots = polygon[:-1] + share[:, None] * np.diff(polygon, axis=0)
-        number = np.arange(count)
-        path = Path(
-            axes=machine.axis_names,
-            curve=CompositeCurve.from_pieces(np.stack([knots[:-1], polygon[1:-1], knots[1:]], axis=1), width),
-            feed=np.full(count, feed),
-            move=np.stack([number, number], axis=1),
-            line=np.asarray(number + 1, dtype=np.int32),
-            runs=np.array([0, count // 3, count]),
+        path = path_along(
+            CompositeCurve.from_pieces(np.stack([knots[:-1], polygon[1:-1], knots[1:]], axis=1), width),
+            machine.axis_names,
+            feed=feed,
+            line=np.arange(1, count + 1),
+            runs=[0, count // 3, count],
             dwell=np.array([0.0123, 0.0]),
-            tolerance=np.zeros(count),
         )
         return planned(build_problem(path, machine), machine)
 

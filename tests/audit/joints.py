@@ -17,7 +17,7 @@ from feedplan.machine.joint_interpolants import joint_interpolants
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import positions
 from feedplan.profile import PhaseLaw, SpeedProfile
-from tests.audit.curves import path_along
+from tests.along import path_along
 
 Array = NDArray[np.float64]
 

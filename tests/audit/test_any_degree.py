@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from feedplan.audit import Audit, audit
+from feedplan.audit import audit
 from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
@@ -22,15 +22,13 @@ from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.program.program import MoveKind, Program
-from tests.audit.curves import machine_of, path_along, planned, problem_along, sampled
+from tests.along import FREE, path_along, problem_along
+from tests.audit.curves import machine_of, planned, sampled
+from tests.audit.faults import STRANGE, broken, faster, rubbish
 
 Array = NDArray[np.float64]
 Change = Callable[..., NDArray[Any]]
 SPEED_LINE = PhaseLaw.SPEED_LINE
-
-
-def broken(result: Audit) -> set[tuple[str, str | None]]:
-    return {(check.name, check.axis) for check in result.broken}
 
 
 def rational(curve: CompositeCurve) -> CompositeCurve:
@@ -157,12 +155,8 @@ def test_numbers_that_are_none_get_into_no_curve(other: Any) -> None:
 @pytest.mark.parametrize("seed", range(6))
 def test_a_profile_of_rubbish_ends_in_a_verdict(other: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    strange = np.array([0.0, -1.0, 5e-324, 1e-310, 1e160, 1e308, math.inf, math.nan])
-    changes: dict[str, NDArray[Any]] = {}
-    for name in ("value", "u0", "u1", "p0", "p1", "duration"):
-        column = getattr(other.profile, name)
-        hit = rng.random(len(column)) < (0.02, 0.2, 1.0)[seed % 3]
-        changes[name] = np.where(hit, rng.choice(strange[: 8 if seed % 2 else 6], len(column)), column)
+    values = STRANGE if seed % 2 else STRANGE[:5]
+    changes = rubbish(rng, other.profile, (0.02, 0.2, 1.0)[seed % 3], values)
     changes["kind"] = rng.integers(0, 7, len(other.profile)).astype(np.uint8)
     assert not other.with_profile(**changes).audit().ok
 
@@ -178,36 +172,29 @@ def random_curve(rng: np.random.Generator, weights: bool) -> CompositeCurve:
     return curve.with_width(rng.uniform(0.2, 4.0, len(curve)))
 
 
-def faster(profile: SpeedProfile, factor: float) -> SpeedProfile:
-    """The whole profile at p times `factor`."""
-    return replace(
-        profile,
-        value=profile.value * factor,
-        p0=profile.p0 * factor,
-        p1=profile.p1 * factor,
-        duration=profile.duration / math.sqrt(factor),
-    )
-
-
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.sampled_from([math.inf, 0.01]))
 def test_random_splines_pass_and_a_thousandth_faster_fail(seed: int, weights: bool, chord: float) -> None:
     rng = np.random.default_rng(seed)
     curve = random_curve(rng, weights)
     limits = np.exp(rng.uniform(0.0, 3.0, curve.axes)), np.exp(rng.uniform(0.0, 5.0, curve.axes))
-    problem = problem_along(path_along(curve), *limits, float(np.exp(rng.uniform(0.0, 3.0))), chord)
+    problem = problem_along(
+        path_along(curve, feed=np.exp(rng.uniform(0.0, 3.0))), *limits, chord_tolerance=chord
+    )
     if curve.degree.max() == 1:
         # Corners: every junction is a stop.
         problem.junction_speed[:] = 0.0
     profile, machine = planned(problem), machine_of(problem)
     assert audit(problem, profile, machine).failures == ()
-    assert not audit(problem, faster(profile, 1.001), machine).ok
+    assert not audit(problem, faster(profile), machine).ok
     scaled = replace(profile, p0=profile.p0 * 1.001, p1=profile.p1 * 1.001)
     assert not audit(problem, scaled, machine).ok
 
 
 def lap(chord_tolerance: float = math.inf) -> tuple[Problem, SpeedProfile]:
     """A circle of radius 10 mm from rest to rest."""
-    problem = problem_along(path_along(circle([0.0, 0.0], 10.0)), 1e9, 3000.0, 1e9, chord_tolerance)
+    problem = problem_along(
+        path_along(circle([0.0, 0.0], 10.0)), FREE, 3000.0, chord_tolerance=chord_tolerance
+    )
     return problem, planned(problem)
 
 
@@ -227,7 +214,7 @@ def test_a_circle_has_the_sagitta_of_its_radius() -> None:
 def test_arcs_along_a_line_of_speed_are_measured() -> None:
     points = np.array([[0.0, 0.0], [6.0, 9.0], [-3.0, 9.0], [8.0, -2.0], [12.0, 4.0]])
     curve = CompositeCurve.from_bezier(points, width=15.0)
-    problem = problem_along(path_along(curve), 1e4, 1e5, 400.0, 1e-4)
+    problem = problem_along(path_along(curve, feed=400.0), 1e4, 1e5, chord_tolerance=1e-4)
     profile = planned(problem)
     lines = np.flatnonzero(profile.kind == SPEED_LINE)
     assert len(lines) > 3
@@ -319,9 +306,7 @@ def test_a_spline_move_is_followed_by_its_own_pieces_or_parts_of_them() -> None:
     spline = long_spline()
     cut = spline.split(np.arange(0, 200, 3), np.full(67, 0.3))
     for curve in (spline, cut):
-        path = path_along(
-            curve, move=np.zeros((len(curve), 2), np.int64), tolerance=np.full(len(curve), 1e-3)
-        )
+        path = path_along(curve, move=np.zeros((len(curve), 2), np.int64), tolerance=1e-3)
         problem = problem_along(path, 100.0, 1000.0)
         machine = machine_of(problem)
         result = audit(problem, None, machine, spline_program(spline))
@@ -340,7 +325,7 @@ def test_a_spline_move_is_followed_by_its_own_pieces_or_parts_of_them() -> None:
     loop = np.array([[[0, 0], [10, 0]], [[10, 0], [10, 5]], [[10, 5], [10, 0]], [[10, 0], [20, 0]]], float)
     ways = CompositeCurve.from_pieces(loop, np.array([10.0, 5.0, 5.0, 10.0]))
     straight = CompositeCurve.from_pieces(loop[[0, 3]], np.array([10.0, 10.0]))
-    path = path_along(straight, move=np.zeros((2, 2), np.int64), tolerance=np.full(2, 0.01))
+    path = path_along(straight, move=np.zeros((2, 2), np.int64), tolerance=0.01)
     problem = problem_along(path, 100.0, 1000.0)
     result = audit(problem, None, machine_of(problem), spline_program(ways))
     assert broken(result) == {("deviation", None)}
@@ -361,7 +346,7 @@ def test_a_circle_is_followed_by_exact_pieces() -> None:
         splines=None,
     )
     curve = circle([0.0, 0.0], 10.0)
-    path = path_along(curve, move=np.zeros((4, 2), np.int64), tolerance=np.full(4, 1e-6))
+    path = path_along(curve, move=np.zeros((4, 2), np.int64), tolerance=1e-6)
     problem = problem_along(path, 100.0, 1000.0)
     result = audit(problem, None, machine_of(problem), program)
     assert result.failures == ()
@@ -383,7 +368,7 @@ def along_a_line(*pieces: tuple[float, ...]) -> CompositeCurve:
 
 
 def test_an_infinite_p_is_refused() -> None:
-    problem = problem_along(path_along(along_a_line((0, 10), (10, 20))), [500.0, 400.0], 1000.0, 50.0)
+    problem = problem_along(path_along(along_a_line((0, 10), (10, 20)), feed=50.0), [500.0, 400.0], 1000.0)
     profile, machine = planned(problem), machine_of(problem)
     assert audit(problem, profile, machine).ok
     for name in ("p0", "p1"):

@@ -12,20 +12,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan.audit import Audit, audit
+from feedplan.audit import audit
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, Program
+from tests.along import path_along, problem_along
+from tests.audit.faults import broken
 
 Change = Callable[..., NDArray[Any]]
 PLANE = Machine("plane", (Axis("X", 100.0, 1000.0), Axis("Y", 100.0, 1000.0)))
-
-
-def broken(result: Audit) -> set[tuple[str, str | None]]:
-    return {(check.name, check.axis) for check in result.broken}
 
 
 def program_of(targets: list[list[float]], **arcs: Any) -> Program:
@@ -53,22 +50,10 @@ def program_of(targets: list[list[float]], **arcs: Any) -> Program:
 
 def problem_of(points: list[list[list[float]]], move: list[list[int]], tolerance: float) -> Problem:
     control = np.array(points)
-    count = len(control)
-    path = Path(
-        axes=("X", "Y"),
-        curve=CompositeCurve.from_pieces(
-            control, np.linalg.norm(np.diff(control, axis=1), axis=2).sum(axis=1)
-        ),
-        feed=np.full(count, 50.0),
-        move=np.array(move),
-        line=np.asarray([10 * (first + 1) for first, _ in move], dtype=np.int32),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.full(count, tolerance),
-    )
-    ones = np.ones(2)
-    return Problem(
-        path, 100 * ones, 1000 * ones, ones * math.inf, path.feed, np.zeros(count + 1), math.inf, 0.001
+    curve = CompositeCurve.from_pieces(control, np.linalg.norm(np.diff(control, axis=1), axis=2).sum(axis=1))
+    lines = [10 * (first + 1) for first, _ in move]
+    return problem_along(
+        path_along(curve, feed=50.0, move=np.array(move), line=lines, tolerance=tolerance), 100.0, 1000.0
     )
 
 

@@ -19,7 +19,8 @@ from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import setpoints
-from tests.audit.curves import machine_of, path_along, problem_along
+from tests.along import path_along, problem_along
+from tests.audit.curves import machine_of
 from tests.audit.test_joints import past_the_column, wavy, wide
 from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
 from tests.test_setpoints_jerk import profiles, random_curve
@@ -41,8 +42,7 @@ def broken(result: Audit) -> set[str]:
 
 def problem_on(curve: CompositeCurve, jerk: Any = FREE**2) -> Problem:
     """A curve with jerk limits and hardly any others."""
-    problem = problem_along(path_along(curve), FREE, FREE)
-    return replace(problem, max_jerk=np.broadcast_to(np.asarray(jerk, float), curve.axes).copy())
+    return problem_along(path_along(curve), FREE, FREE, max_jerk=np.broadcast_to(jerk, curve.axes))
 
 
 def line() -> tuple[Problem, SpeedProfile]:

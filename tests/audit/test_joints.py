@@ -22,13 +22,10 @@ from feedplan.machine.path_derivatives import derivatives
 from feedplan.profile import OF_PHASES, PhaseLaw, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 from tests.audit.curves import places_at, sampled
+from tests.audit.faults import broken, faster, rubbish
 from tests.audit.joints import joint_problem, planned_joints, steady
 
 Array = NDArray[np.float64]
-
-
-def broken(result: Audit) -> set[tuple[str, str | None]]:
-    return {(check.name, check.axis) for check in result.broken}
 
 
 def past_the_column(distance: float = 40.0) -> CompositeCurve:
@@ -147,14 +144,7 @@ def test_the_fastest_plan_passes_and_uses_its_limits(case: Case) -> None:
 
 def test_a_thousandth_faster_fails(case: Case) -> None:
     profile = case.profile
-    whole = replace(
-        profile,
-        p0=profile.p0 * 1.001,
-        p1=profile.p1 * 1.001,
-        value=profile.value * 1.001,
-        duration=profile.duration / math.sqrt(1.001),
-    )
-    assert "acceleration" in {name for name, _ in broken(case.audit(profile=whole))}
+    assert "acceleration" in {name for name, _ in broken(case.audit(profile=faster(profile)))}
     only_p = replace(profile, p0=profile.p0 * 1.001, p1=profile.p1 * 1.001)
     assert {"jump", "duration"} <= {name for name, _ in broken(case.audit(profile=only_p))}
 
@@ -221,12 +211,7 @@ def test_every_lowered_limit_is_the_one_that_is_named(case: Case) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_a_profile_of_rubbish_ends_in_a_verdict(case: Case, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    strange = np.array([0.0, -1.0, 5e-324, 1e-310, 1e160, 1e308, math.inf, math.nan])
-    columns: dict[str, NDArray[Any]] = {}
-    for name in ("value", "u0", "u1", "p0", "p1", "duration"):
-        column = getattr(case.profile, name)
-        hit = rng.random(len(column)) < (0.1, 1.0)[seed % 2]
-        columns[name] = np.where(hit, rng.choice(strange, len(column)), column)
+    columns = rubbish(rng, case.profile, (0.1, 1.0)[seed % 2])
     columns["piece"] = rng.integers(0, 2**32, len(case.profile), dtype=np.uint32)
     kept = {**columns, "piece": case.profile.piece}
     for some in (columns, kept):
@@ -460,11 +445,4 @@ def test_random_paths_of_a_trunnion_pass_and_a_thousandth_faster_fail(seed: int)
     problem = joint_problem(machine, "XYZAC", wavy(seed), coordinate_mode=CoordinateMode.TIP)
     profile = planned_joints(problem)
     assert audit(problem, profile, machine).failures == ()
-    faster = replace(
-        profile,
-        p0=profile.p0 * 1.001,
-        p1=profile.p1 * 1.001,
-        value=profile.value * 1.001,
-        duration=profile.duration / math.sqrt(1.001),
-    )
-    assert not audit(problem, faster, machine).ok
+    assert not audit(problem, faster(profile), machine).ok

@@ -20,6 +20,8 @@ from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.profile import PhaseLaw, SpeedProfile
+from tests.along import path_along, problem_along, profile_of
+from tests.audit.faults import STRANGE, broken, rubbish
 
 Change = Callable[..., NDArray[Any]]
 
@@ -33,47 +35,11 @@ def plane(*max_velocity_jump: float) -> Machine:
 
 
 def path_of(points: list[list[list[float]]], width: list[float]) -> Path:
-    count = len(width)
-    number = np.arange(count)
-    return Path(
-        axes=("X", "Y"),
-        curve=CompositeCurve.from_pieces(np.array(points), np.array(width)),
-        feed=np.full(count, 100.0),
-        move=np.stack([number, number], axis=1),
-        line=np.asarray(10 * (number + 1), dtype=np.int32),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
+    return path_along(CompositeCurve.from_pieces(points, width), feed=100.0)
 
 
 def problem_of(path: Path, **changes: Any) -> Problem:
-    problem = Problem(
-        path=path,
-        max_velocity=np.full(2, 500.0),
-        max_acceleration=np.full(2, 1000.0),
-        max_jerk=np.full(2, np.inf),
-        feed=np.full(len(path), 100.0),
-        junction_speed=np.full(len(path) + 1, np.inf),
-        chord_tolerance=math.inf,
-        period=0.001,
-    )
-    return replace(problem, **changes)
-
-
-def profile_of(*arcs: tuple[int, PhaseLaw, int, float, float, float, float, float, float]) -> SpeedProfile:
-    piece, kind, axis, *numbers = zip(*arcs, strict=True)
-    return SpeedProfile(
-        np.array(piece, np.uint32),
-        np.array(kind, np.uint8),
-        np.array(axis, np.uint8),
-        *(np.array(column, float) for column in numbers),
-        runs=np.array([0, len(arcs)]),
-    )
-
-
-def broken(result: Audit) -> set[tuple[str, str | None]]:
-    return {(check.name, check.axis) for check in result.broken}
+    return problem_along(path, **{"velocity": 500.0, "acceleration": 1000.0, **changes})
 
 
 LINE = path_of([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]], [10.0])
@@ -100,7 +66,7 @@ def test_a_trapezoid_is_measured_as_a_person_would() -> None:
 
 def test_the_acceleration_across_a_parabola_is_its_curvature_times_speed_squared() -> None:
     limits = np.array([1000.0, 400.0])
-    result = audit(problem_of(PARABOLA, max_acceleration=limits, **THROUGH), STEADY_X, plane())
+    result = audit(problem_of(PARABOLA, acceleration=limits, **THROUGH), STEADY_X, plane())
     assert result.ok
     assert result.check("acceleration", "Y").ratio == pytest.approx(1.0, abs=1e-11)
     assert result.check("acceleration", "X").worst < 1e-6
@@ -121,7 +87,7 @@ def test_the_chord_error_of_a_plan_is_the_sagitta_at_the_tip() -> None:
 def test_a_limit_just_above_the_pass_mark_fails_and_just_below_passes() -> None:
     for share, ok in ((2e-6, False), (0.5e-6, True)):
         limits = np.array([1000.0 * (1 - share), 1000.0])
-        result = audit(problem_of(LINE, max_acceleration=limits), TRAPEZOID, plane())
+        result = audit(problem_of(LINE, acceleration=limits), TRAPEZOID, plane())
         assert result.ok == ok
         assert broken(result) == (set() if ok else {("acceleration", "X")})
 
@@ -399,14 +365,8 @@ def test_numbers_with_hardly_a_digit_left_end_in_a_verdict() -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_a_profile_of_rubbish_ends_in_a_verdict(part: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    strange = np.array([0.0, -0.0, -1.0, 5e-324, 1e-310, 1e-160, 1e160, 1e308, math.inf, math.nan])
-    changes: dict[str, NDArray[Any]] = {}
-    for name in ("value", "u0", "u1", "p0", "p1", "duration"):
-        column = getattr(part.profile, name)
-        hit = rng.random(len(column)) < (0.02, 0.2, 1.0)[seed % 3]
-        # In every other case only what counts as a number, to get past the first look.
-        values = strange if seed % 2 else strange[[0, 3, 4, 5, 6]]
-        changes[name] = np.where(hit, rng.choice(values, len(column)), column)
+    # In every other case only what counts as a number, to get past the first look.
+    changes = rubbish(rng, part.profile, (0.02, 0.2, 1.0)[seed % 3], STRANGE if seed % 2 else STRANGE[:5])
     piece = rng.integers(0, 2**32, len(part.profile), dtype=np.uint32)
     changes["piece"] = piece if seed % 4 == 3 else rng.permutation(part.profile.piece)
     for case in (part.with_profile(**{**changes, "piece": part.profile.piece}), part.with_profile(**changes)):
@@ -414,7 +374,7 @@ def test_a_profile_of_rubbish_ends_in_a_verdict(part: Any, seed: int) -> None:
 
 
 def test_limits_that_are_no_numbers_fail() -> None:
-    assert not audit(problem_of(LINE, max_acceleration=np.array([math.nan, 1000.0])), TRAPEZOID, plane()).ok
+    assert not audit(problem_of(LINE, acceleration=np.array([math.nan, 1000.0])), TRAPEZOID, plane()).ok
     assert not audit(problem_of(LINE, feed=np.array([math.nan])), TRAPEZOID, plane()).ok
 
 
@@ -441,7 +401,7 @@ def test_jerk_is_judged_only_where_it_is_claimed(part: Any) -> None:
 
 
 def test_a_sentence_names_place_value_and_limit() -> None:
-    result = audit(problem_of(LINE, max_acceleration=np.array([900.0, 900.0])), TRAPEZOID, plane())
+    result = audit(problem_of(LINE, acceleration=np.array([900.0, 900.0])), TRAPEZOID, plane())
     (sentence,) = result.failures
     assert sentence.startswith("line 10, 0.0")
     assert "X acceleration 1000 mm/s², the limit is 900 mm/s²" in sentence

@@ -11,21 +11,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan.audit import Audit, audit, audit_setpoints
+from feedplan.audit import audit, audit_setpoints
 from feedplan.constraints.problem import build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
 from feedplan.setpoints import setpoints
+from tests.along import path_along
+from tests.audit.faults import broken
 
 Change = Callable[..., NDArray[Any]]
-
-
-def broken(result: Audit) -> set[tuple[str, str | None]]:
-    return {(check.name, check.axis) for check in result.broken}
 
 
 def moving(part: Any, row: int) -> int:
@@ -239,19 +236,8 @@ def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
     )
     half = 0.305  # the corner comes 35.5 ms after the start
     corners = np.array([[0.0, 0.0], [half, 0.0], [half, half]])
-    path = Path(
-        axes=("X", "Y"),
-        curve=CompositeCurve.from_pieces(
-            np.stack([corners[:-1], 0.5 * (corners[:-1] + corners[1:]), corners[1:]], axis=1),
-            np.full(2, half),
-        ),
-        feed=np.full(2, 10.0),
-        move=np.array([[0, 0], [1, 1]]),
-        line=np.array([1, 2], np.int32),
-        runs=np.array([0, 2]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(2),
-    )
+    points = np.stack([corners[:-1], 0.5 * (corners[:-1] + corners[1:]), corners[1:]], axis=1)
+    path = path_along(CompositeCurve.from_pieces(points, np.full(2, half)), feed=10.0)
     problem = build_problem(path, machine)
     profile = planner("bang-bang")(problem)
     points = setpoints(problem, profile, 0.001).all()

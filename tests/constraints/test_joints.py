@@ -11,11 +11,11 @@ from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.planners import planner
+from tests.along import path_along
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess
 
@@ -29,23 +29,6 @@ CYLINDER = Machine(
 )
 
 
-def path_of(
-    curve: CompositeCurve, axes: tuple[str, ...] = ("X", "Y", "Z"), feed: float = 200.0, **columns: object
-) -> Path:
-    count = len(curve)
-    path = Path(
-        axes=axes,
-        curve=curve,
-        feed=np.full(count, feed),
-        move=np.zeros((count, 2)),
-        line=np.arange(1, count + 1),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
-    return replace(path, **columns)  # type: ignore[arg-type]
-
-
 def without_travel(machine: Machine) -> Machine:
     axes = tuple(replace(axis, travel=(-np.inf, np.inf)) for axis in machine.axes)
     return replace(machine, axes=axes, chord_tolerance=np.inf)
@@ -57,7 +40,7 @@ def without_travel(machine: Machine) -> Machine:
 def test_the_cylindrical_machine_passes_its_axis_in_the_known_time(distance: float, time: float) -> None:
     # The times are those of an independent implementation with closed forms of K, to 1e-12 s.
     line = CompositeCurve.from_bezier([[-100.0, distance, -30.0], [130.0, distance, 39.0]], width=230.0)
-    problem = build_problem(path_of(line.elevated(2)), CYLINDER)
+    problem = build_problem(path_along(line.elevated(2), feed=200.0), CYLINDER)
     profile = plan(problem)
     assert profile.time == pytest.approx(time, rel=1e-11)
     excess, use = worst_excess(problem, profile)
@@ -65,15 +48,15 @@ def test_the_cylindrical_machine_passes_its_axis_in_the_known_time(distance: flo
     assert use >= 1 - 1e-6
     # The same by a line of another parameter speed, cut unevenly.
     uneven = line.elevated(3).split([0, 0], [1.0, 97.0]).with_width([0.3, 20.0, 1.0])
-    assert plan(build_problem(path_of(uneven), CYLINDER)).time == pytest.approx(time, rel=1e-9)
+    assert plan(build_problem(path_along(uneven, feed=200.0), CYLINDER)).time == pytest.approx(time, rel=1e-9)
 
 
 def test_a_circle_about_the_column_is_one_joint_alone() -> None:
     # r = 50: the column turns 360 deg at A = 20 rad/s², and the tool goes 150 mm/s where V = 3 rad/s.
-    problem = build_problem(path_of(circle([0.0, 0.0, 5.0], 50.0), feed=1e6), CYLINDER)
+    problem = build_problem(path_along(circle([0.0, 0.0, 5.0], 50.0), feed=1e6), CYLINDER)
     v, a, way = 3.0, 20.0, 2 * np.pi
     assert plan(problem).time == pytest.approx(way / v + v / a, rel=1e-8)
-    assert plan(build_problem(path_of(circle([0.0, 0.0, 5.0], 50.0), feed=100.0), CYLINDER)).time == (
+    assert plan(build_problem(path_along(circle([0.0, 0.0, 5.0], 50.0), feed=100.0), CYLINDER)).time == (
         pytest.approx(way / 2.0 + 2.0 / a, rel=1e-8)
     )
 
@@ -103,10 +86,10 @@ def random_problem(name: str, seed: int) -> Problem:
     knots = np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
     weights = None if rng.random() < 0.5 else 10 ** rng.uniform(-1, 1, count)
     curve = CompositeCurve.from_nurbs(points, knots, degree, weights)
-    path = path_of(
+    path = path_along(
         curve.with_width(curve.width * size * count),
-        tuple(axes),
-        10 ** rng.uniform(0.5, 3),
+        axes,
+        feed=10 ** rng.uniform(0.5, 3),
         coordinate_mode=None if coordinate_mode is None else np.array([coordinate_mode]),
     )
     return build_problem(path, machine)
@@ -139,15 +122,15 @@ def test_a_singular_place_and_a_travel_end_are_told_with_their_lines() -> None:
             CompositeCurve.from_bezier([[-50.0, 0.0, 0.0], [50.0, 0.0, 0.0]]),
         ]
     ).elevated(2)
-    with pytest.raises(InputError, match="line 2: the tool is at the axis of the column, where C cannot"):
-        build_problem(path_of(through), CYLINDER)
+    with pytest.raises(InputError, match="line 20: the tool is at the axis of the column, where C cannot"):
+        build_problem(path_along(through, feed=200.0), CYLINDER)
     far = CompositeCurve.from_bezier([[100.0, 0.0, 0.0], [2000.0, 0.0, 0.0]]).elevated(2)
-    with pytest.raises(InputError, match="line 1: X would go to 2000 mm, its travel ends at 900 mm"):
-        build_problem(path_of(far), Machine.load("cylindrical"))
+    with pytest.raises(InputError, match="line 10: X would go to 2000 mm, its travel ends at 900 mm"):
+        build_problem(path_along(far, feed=200.0), Machine.load("cylindrical"))
     belts = Machine.load("corexy")
     short = replace(belts, axes=(replace(belts.axes[0], travel=(-10.0, 300.0)), *belts.axes[1:]))
-    with pytest.raises(InputError, match=r"line 1: \w would go to 2000 mm, its travel ends at 300 mm"):
-        build_problem(path_of(far), short)
+    with pytest.raises(InputError, match=r"line 10: \w would go to 2000 mm, its travel ends at 300 mm"):
+        build_problem(path_along(far, feed=200.0), short)
 
 
 def test_crossed_belts_plan_as_the_same_limits_in_their_own_directions() -> None:
@@ -156,7 +139,7 @@ def test_crossed_belts_plan_as_the_same_limits_in_their_own_directions() -> None
     line = CompositeCurve.from_bezier([[0.0, 0.0, 0.0], [100.0, 100.0, 0.0]], width=100.0).elevated(2)
     motor = belts.axes[0]
     v, a, way = motor.max_velocity, motor.max_acceleration, 200.0
-    time = plan(build_problem(path_of(line, feed=np.inf), belts)).time
+    time = plan(build_problem(path_along(line, feed=np.inf), belts)).time
     assert time == pytest.approx(way / v + v / a if way > v * v / a else 2 * np.sqrt(way / a), rel=1e-9)
 
 
@@ -164,7 +147,7 @@ def test_turning_on_the_spot_counts_in_degrees() -> None:
     machine = without_travel(Machine.load("trunnion-ac"))
     points = [[10.0, 0.0, 0.0, 0.0, 0.0], [10.0, 0.0, 0.0, 0.0, 90.0]]
     turn = CompositeCurve.from_bezier(points, width=90.0).elevated(2)
-    path = path_of(turn, ("X", "Y", "Z", "A", "C"), 30.0, coordinate_mode=np.array([CoordinateMode.TIP]))
+    path = path_along(turn, "XYZAC", feed=30.0, coordinate_mode=np.array([CoordinateMode.TIP]))
     problem = build_problem(path, machine)
     profile = plan(problem)
     assert profile.time == pytest.approx(90 / 30 + 30 / machine.axis("C").max_acceleration, rel=1e-6)

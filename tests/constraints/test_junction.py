@@ -10,21 +10,7 @@ from feedplan.constraints.junction import junction_limit
 from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.joints import end_edges, tangent_jumps
-from feedplan.geometry.path import Path
-
-
-def one_run(curve: CompositeCurve, feed: float = 50.0) -> Path:
-    count = len(curve)
-    return Path(
-        axes=tuple("XYZ"[: curve.axes]),
-        curve=curve,
-        feed=np.full(count, feed),
-        move=np.zeros((count, 2)),
-        line=np.zeros(count),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
+from tests.along import path_along
 
 
 def bezier(*points: list[float]) -> CompositeCurve:
@@ -57,5 +43,5 @@ def test_a_jump_of_velocity_limits_the_speed_at_corners_of_any_degree() -> None:
             arc([0, 2], (0, 0), math.pi / 2),
         ]
     )
-    limit = junction_limit(one_run(curve), np.array([6.0, 10.0]))
+    limit = junction_limit(path_along(curve), np.array([6.0, 10.0]))
     np.testing.assert_array_equal(limit, [0.0, np.inf, 6.0, np.inf, 0.0])

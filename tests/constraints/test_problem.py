@@ -7,22 +7,14 @@ from feedplan import InputError, Machine, Path
 from feedplan.constraints.problem import build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.axis import Axis
+from tests.along import path_along
 
 
 def polyline(points: list[list[float]], feed: float = 10.0, runs: list[int] | None = None) -> Path:
     corners = np.array(points)
     control = np.stack([corners[:-1], (corners[:-1] + corners[1:]) / 2, corners[1:]], axis=1)
-    n = len(control)
-    return Path(
-        axes=("X", "Y"),
-        curve=CompositeCurve.from_pieces(control, np.linalg.norm(control[:, 2] - control[:, 0], axis=1)),
-        feed=np.full(n, feed),
-        move=np.repeat(np.arange(n)[:, None], 2, axis=1),
-        line=np.arange(1, n + 1, dtype=np.int32),
-        runs=np.array(runs or [0, n]),
-        dwell=np.zeros(len(runs or [0, n]) - 1),
-        tolerance=np.zeros(n),
-    )
+    curve = CompositeCurve.from_pieces(control, np.linalg.norm(control[:, 2] - control[:, 0], axis=1))
+    return path_along(curve, feed=feed, runs=runs or [0, len(curve)])
 
 
 def machine(jump: float = 0.0) -> Machine:

@@ -13,6 +13,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
+from tests.along import path_along
 
 CURVES = FilePath(__file__).parents[2] / "benchmarks" / "curves"
 
@@ -75,16 +76,7 @@ def random_path_problem(seed: int) -> Problem:
         start = points[-1]
     curve = CompositeCurve.joined(curves)
     n = len(curve)
-    path = Path(
-        axes=tuple(axes),
-        curve=curve,
-        feed=np.full(n, 10 ** rng.uniform(1.3, 2.5)) * rng.uniform(0.7, 1.0, n),
-        move=np.zeros((n, 2)),
-        line=np.arange(1, n + 1),
-        runs=np.array([0, n]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(n),
-    )
+    path = path_along(curve, axes, feed=np.full(n, 10 ** rng.uniform(1.3, 2.5)) * rng.uniform(0.7, 1.0, n))
     jump = 10 ** rng.uniform(0.0, 1.5) if rng.random() < 0.7 else 0.0
     machine = Machine(
         "any",

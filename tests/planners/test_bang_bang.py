@@ -19,11 +19,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from feedplan import InfeasibleError, InputError, Path
+from feedplan import InfeasibleError, InputError
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.planners.bang_bang import plan
 from feedplan.profile import PhaseLaw, SpeedProfile
+from tests.along import path_along, problem_along
 
 Array = NDArray[np.float64]
 
@@ -38,29 +39,10 @@ def problem(
     junction: Array,
 ) -> Problem:
     """A problem from the tangents at both ends of each piece; each piece begins at the origin."""
-    count, axes = left.shape
     second = left * width[:, None] / 2
     control = np.stack([np.zeros_like(left), second, second + right * width[:, None] / 2], axis=1)
-    path = Path(
-        axes=tuple("XYZABC"[:axes]),
-        curve=CompositeCurve.from_pieces(control, width),
-        feed=feed,
-        move=np.zeros((count, 2), dtype=np.int64),
-        line=np.arange(1, count + 1, dtype=np.int32),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
-    return Problem(
-        path=path,
-        max_velocity=velocity,
-        max_acceleration=acceleration,
-        max_jerk=np.full(axes, np.inf),
-        feed=feed,
-        junction_speed=junction,
-        chord_tolerance=np.inf,
-        period=0.001,
-    )
+    path = path_along(CompositeCurve.from_pieces(control, width), feed=feed)
+    return problem_along(path, velocity, acceleration, junction_speed=junction)
 
 
 def straight(length: float, feed: float, velocity: float, acceleration: float, pieces: int = 1) -> Problem:
@@ -228,15 +210,15 @@ def test_every_limit_holds_and_some_limit_is_active_everywhere() -> None:
 
 def test_an_end_that_cannot_be_reached_names_line_and_speed() -> None:
     task = replace(straight(10.0, 1e3, 1e3, 500.0, 4), end_speed=120.0)
-    with pytest.raises(InfeasibleError, match="line 4: no profile ends at 120 mm/s") as caught:
+    with pytest.raises(InfeasibleError, match="line 40: no profile ends at 120 mm/s") as caught:
         plan(task)
     assert caught.value.reachable == pytest.approx(100.0)
-    assert caught.value.line == 4
+    assert caught.value.line == 40
     assert plan(replace(task, end_speed=100.0 * (1 - 1e-12))).time == pytest.approx(0.2)
 
 
 def test_a_start_that_cannot_be_held_names_the_speed() -> None:
-    with pytest.raises(InfeasibleError, match="line 1: no profile starts at 101 mm/s") as caught:
+    with pytest.raises(InfeasibleError, match="line 10: no profile starts at 101 mm/s") as caught:
         plan(replace(straight(10.0, 1e3, 1e3, 500.0), start_speed=101.0))
     assert caught.value.reachable == pytest.approx(100.0)
 

@@ -14,44 +14,14 @@ from numpy.typing import NDArray
 
 from benchmarks.named import butterfly, lemniscate, trefoil
 from feedplan._solvers import PlanError, plan_bang_bang
-from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.profile import SpeedProfile
+from tests.along import FREE, path_along, problem_along
 from tests.planners.excess import worst_excess
 
 Array = NDArray[np.float64]
-
-
-def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed: float) -> Problem:
-    """One run from rest to rest, nothing but the axes' limits and the feed."""
-    count = len(curve)
-    path = Path(
-        axes=tuple("XYZABC"[: curve.axes]),
-        curve=curve,
-        feed=np.full(count, feed),
-        move=np.zeros((count, 2)),
-        line=np.zeros(count),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
-    return problem_along(path, velocity, acceleration)
-
-
-def problem_along(path: Path, velocity: Array, acceleration: Array) -> Problem:
-    """From rest to rest under the axes' limits and the path's feeds."""
-    return Problem(
-        path=path,
-        max_velocity=velocity,
-        max_acceleration=acceleration,
-        max_jerk=np.full(len(path.axes), np.inf),
-        feed=path.feed,
-        junction_speed=np.full(len(path) + 1, np.inf),
-        chord_tolerance=np.inf,
-        period=0.001,
-    )
 
 
 class Planned:
@@ -64,7 +34,7 @@ class Planned:
         self.curve, self.feed = curve, feed
         self.velocity = np.broadcast_to(np.asarray(velocity, float), axes).copy()
         self.acceleration = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
-        self.problem = problem_of(curve, self.velocity, self.acceleration, feed)
+        self.problem = problem_along(path_along(curve, feed=feed), self.velocity, self.acceleration)
         self.profile = SpeedProfile.of(plan_bang_bang(self.problem))
         self.time = self.profile.time
 
@@ -141,7 +111,7 @@ def test_limits_that_are_no_limits_are_refused(
 
 
 def test_runs_that_do_not_divide_the_path_are_refused() -> None:
-    problem = problem_of(CompositeCurve.from_bezier([[0.0], [1.0], [2.0]]), np.ones(1), np.ones(1), 1.0)
+    problem = problem_along(path_along(CompositeCurve.from_bezier([[0.0], [1.0], [2.0]]), feed=1.0), 1.0, 1.0)
     with pytest.raises(PlanError) as caught:
         plan_bang_bang(replace(problem, path=replace(problem.path, runs=np.array([0]))))
     assert "the runs do not divide the 1 pieces" in caught.value.args[3]
@@ -159,7 +129,7 @@ def test_quadratics_among_pieces_of_elevated_degree_take_the_same_time(seed: int
     mixed = CompositeCurve.joined([p.elevated(2 + int(rng.integers(0, 3))) for p in pieces])
     limits = np.exp(rng.uniform(0.0, 3.0, 3)), np.exp(rng.uniform(0.0, 5.0, 3))
     feed = float(np.exp(rng.uniform(0.0, 3.0)))
-    problem = problem_of(mixed, *limits, feed)
+    problem = problem_along(path_along(mixed, feed=feed), *limits)
     profile = SpeedProfile.of(plan_bang_bang(problem))
     assert profile.time == pytest.approx(Planned(curve, *limits, feed).time, rel=1e-11)
     excess, use = worst_excess(problem, profile)
@@ -178,7 +148,7 @@ def test_a_flying_lap_of_a_circle_by_hand() -> None:
     # Each eighth of the circle is at one axis's limit: 8 √((2 − √2) r/A).
     r, a = 10.0, 3000.0
     curve = circle([0.0, 0.0], r)
-    problem = problem_of(curve, np.full(2, 1e9), np.full(2, a), 1e9)
+    problem = problem_along(path_along(curve), FREE, a)
     speed = float(np.sqrt(a * r))
     flying = replace(problem, start_speed=speed, end_speed=speed)
     time = SpeedProfile.of(plan_bang_bang(flying)).time
@@ -196,7 +166,7 @@ def test_a_cusp_and_a_jump_of_parameter_speed_change_nothing_that_they_should_no
     )
     time = Planned(line, 40.0, 500.0).time
     assert time == pytest.approx(10 / 40 + 40 / 500, rel=1e-12)
-    along = problem_along(Path.from_curve(slow, feed=1e9), np.array([40.0]), np.array([500.0]))
+    along = problem_along(Path.from_curve(slow, feed=FREE), 40.0, 500.0)
     assert SpeedProfile.of(plan_bang_bang(along)).time == pytest.approx(time, rel=1e-10)
     # A semicubical parabola turns back in its cusp: both halves from rest to rest.
     whole = CompositeCurve.from_bezier([[-8.0, 4.0], [8.0, -4.0], [-8.0, -4.0], [8.0, 4.0]])

@@ -16,9 +16,9 @@ from feedplan.geometry.path import Path
 from feedplan.planning import rounding_stops
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import setpoints
+from tests.along import problem_along
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess, worst_excess_exactly
-from tests.planners.test_curves import problem_along
 
 Array = NDArray[np.float64]
 

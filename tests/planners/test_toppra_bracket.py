@@ -15,11 +15,11 @@ import pytest
 
 pytest.importorskip("toppra", reason="toppra has wheels for Linux on x86-64 only")
 
-from feedplan import Path
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.planners import toppra
 from feedplan.planners.bang_bang import plan
+from tests.along import path_along, problem_along
 from tests.constraints.test_joints import random_problem
 
 
@@ -38,21 +38,10 @@ def cam_problem(count: int, seed: int) -> Problem:
     tangent = 2 * edges / (np.append(0, width) + np.append(width, 0))[:, None]
     start = np.vstack([np.zeros(3), np.cumsum(0.5 * (tangent[:-1] + tangent[1:]) * width[:, None], axis=0)])
     middle = start[:-1] + 0.5 * tangent[:-1] * width[:, None]
-    feed = np.full(count, rng.uniform(20.0, 60.0))
-    path = Path(
-        axes=("X", "Y", "Z"),
-        curve=CompositeCurve.from_pieces(np.stack([start[:-1], middle, start[1:]], axis=1), width),
-        feed=feed,
-        move=np.zeros((count, 2), dtype=np.int64),
-        line=np.arange(1, count + 1, dtype=np.int32),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
+    feed = rng.uniform(20.0, 60.0)
+    curve = CompositeCurve.from_pieces(np.stack([start[:-1], middle, start[1:]], axis=1), width)
     acceleration, velocity = np.exp(rng.uniform(5.0, 7.0, 3)), rng.uniform(20.0, 60.0, 3)
-    return Problem(
-        path, velocity, acceleration, np.full(3, np.inf), feed, np.full(count + 1, np.inf), np.inf, 0.001
-    )
+    return problem_along(path_along(curve, feed=feed), velocity, acceleration)
 
 
 def time_of(problem: Problem, cells: int, scheme: str) -> float:

@@ -1,0 +1,44 @@
+"""Faults of whole profiles for the tests of the audit, and the checks that find them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.audit import Audit
+from feedplan.profile import SpeedProfile
+
+# The first five get past the audit's look at signs and sizes.
+STRANGE = np.array([0.0, 5e-324, 1e-310, 1e-160, 1e160, -0.0, -1.0, 1e308, math.inf, math.nan])
+
+
+def broken(result: Audit) -> set[tuple[str, str | None]]:
+    """Name and axis of the checks that fail."""
+    return {(check.name, check.axis) for check in result.broken}
+
+
+def faster(profile: SpeedProfile, factor: float = 1.001) -> SpeedProfile:
+    """The whole profile at p times `factor`, with the durations to it."""
+    return replace(
+        profile,
+        p0=profile.p0 * factor,
+        p1=profile.p1 * factor,
+        value=profile.value * factor,
+        duration=profile.duration / math.sqrt(factor),
+    )
+
+
+def rubbish(
+    rng: np.random.Generator, profile: SpeedProfile, share: float, values: NDArray[np.float64] = STRANGE
+) -> dict[str, NDArray[Any]]:
+    """The columns of numbers with a share of their entries replaced by any of the values."""
+    columns = {}
+    for name in ("value", "u0", "u1", "p0", "p1", "duration"):
+        column = getattr(profile, name)
+        hit = rng.random(len(column)) < share
+        columns[name] = np.where(hit, rng.choice(values, len(column)), column)
+    return columns
