@@ -149,10 +149,7 @@ def _audit_axes(
     results = [audit_plan(problem, plan_limits, feed, profile, program, whole)]
     if setpoints is not None:
         report(PLAN_SHARE)
-        stream = SetpointAudit(limits, 0.0, problem, feed, profile, program)
-        for chunk, share in setpoints:
-            _push(stream, chunk, share)
-        results.append(stream.finish())
+        results.append(_seen(SetpointAudit(limits, 0.0, problem, feed, profile, program), setpoints))
     return results
 
 
@@ -189,22 +186,22 @@ def _audit_joints(
     if setpoints is not None:
         report(PLAN_SHARE)
         compared = () if profile is None else (problem, feed, profile)
-        stream = SetpointAudit(limits, 0.0, *compared)
-        for chunk, share in setpoints:
-            _push(stream, chunk, share)
-        results.append(stream.finish())
+        results.append(_seen(SetpointAudit(limits, 0.0, *compared), setpoints))
     return results
 
 
-def _push(stream: SetpointAudit, chunk: SetpointChunk, share: Listener | None) -> None:
-    stream.push(
-        _array(chunk.t, np.float64),
-        _array(chunk.position, np.float64),
-        _array(chunk.velocity, np.float64),
-        _array(chunk.acceleration, np.float64),
-        _array(chunk.line, np.int32),
-        share,
-    )
+def _seen(stream: SetpointAudit, setpoints: Chunks) -> Findings:
+    """What the audit of a stream finds in all its setpoints."""
+    for chunk, share in setpoints:
+        stream.push(
+            _array(chunk.t, np.float64),
+            _array(chunk.position, np.float64),
+            _array(chunk.velocity, np.float64),
+            _array(chunk.acceleration, np.float64),
+            _array(chunk.line, np.int32),
+            share,
+        )
+    return stream.finish()
 
 
 def audit_setpoints(
