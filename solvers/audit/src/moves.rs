@@ -55,6 +55,30 @@ pub(super) enum Shape<'a> {
     },
 }
 
+#[cfg(test)]
+impl<'a> Programmed<'a> {
+    /// Lines in X, Y and perhaps Z from a place to others, on these source lines.
+    pub const fn of_lines(start: &'a [f64], target: &'a [f64], line: &'a [i32]) -> Self {
+        let axes = start.len();
+        Self {
+            axes,
+            start,
+            target,
+            line,
+            arc_move: &[],
+            arc_centre: &[],
+            arc_normal: &[],
+            arc_angle: &[],
+            spline_move: &[],
+            spline_pieces: &[0],
+            splines: Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] },
+            change_move: &[],
+            change_start: &[],
+            xyz: [Some(0), Some(1), if axes > 2 { Some(2) } else { None }],
+        }
+    }
+}
+
 impl<'a> Programmed<'a> {
     /// Number of moves.
     pub fn len(&self) -> usize {
@@ -258,8 +282,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const NONE: Pieces = Pieces { axes: 3, stride: 3, control: &[], weights: &[], offsets: &[0], width: &[] };
-
     /// The distance from the nearest place.
     fn off<const M: usize>(programmed: &Move<M>, q: &[f64; M]) -> f64 {
         programmed.distance(q, 0.0)
@@ -277,20 +299,10 @@ mod tests {
             width: &[4.0, 4.0],
         };
         let program = Programmed {
-            axes: 2,
-            start: &[0.0, 0.0],
-            target: &[8.0, 4.0],
-            line: &[1],
-            arc_move: &[],
-            arc_centre: &[],
-            arc_normal: &[],
-            arc_angle: &[],
             spline_move: &[0],
             spline_pieces: &[0, 2],
             splines,
-            change_move: &[],
-            change_start: &[],
-            xyz: [Some(0), Some(1), None],
+            ..Programmed::of_lines(&[0.0, 0.0], &[8.0, 4.0], &[1])
         };
         let spline = program.get::<2>(0);
         assert!(spline.is_motion());
@@ -326,20 +338,11 @@ mod tests {
 
     fn helix<'a>((target, angle): &'a ([f64; 3], [f64; 1])) -> Move<'a, 3> {
         Programmed {
-            axes: 3,
-            start: &[10.0, 0.0, 0.0],
-            target,
-            line: &[1],
             arc_move: &[0],
             arc_centre: &[0.0, 0.0, 0.0],
             arc_normal: &[2],
             arc_angle: angle,
-            spline_move: &[],
-            spline_pieces: &[0],
-            splines: NONE,
-            change_move: &[],
-            change_start: &[],
-            xyz: [Some(0), Some(1), Some(2)],
+            ..Programmed::of_lines(&[10.0, 0.0, 0.0], target, &[1])
         }
         .get(0)
     }
@@ -347,20 +350,11 @@ mod tests {
     #[test]
     fn a_quarter_circle_is_as_far_as_the_radii_differ() {
         let quarter = Programmed {
-            axes: 2,
-            start: &[10.0, 0.0],
-            target: &[0.0, 10.0],
-            line: &[1],
             arc_move: &[0],
             arc_centre: &[0.0, 0.0, 0.0],
             arc_normal: &[2],
             arc_angle: &[TAU / 4.0],
-            spline_move: &[],
-            spline_pieces: &[0],
-            splines: NONE,
-            change_move: &[],
-            change_start: &[],
-            xyz: [Some(0), Some(1), None],
+            ..Programmed::of_lines(&[10.0, 0.0], &[0.0, 10.0], &[1])
         }
         .get::<2>(0);
         assert!((off(&quarter, &[6.0, 9.0]) - (117.0_f64.sqrt() - 10.0)).abs() < 1e-14);
@@ -376,20 +370,11 @@ mod tests {
         for (normal, target) in [(1_u8, [0.0, 0.0, -1.0]), (2, [0.0, 1.0, 0.0])] {
             let normals = [normal];
             let quarter = Programmed {
-                axes: 3,
-                start: &[1.0, 0.0, 0.0],
-                target: &target,
-                line: &[1],
                 arc_move: &[0],
                 arc_centre: &[0.0, 0.0, 0.0],
                 arc_normal: &normals,
                 arc_angle: &[TAU / 4.0],
-                spline_move: &[],
-                spline_pieces: &[0],
-                splines: NONE,
-                change_move: &[],
-                change_start: &[],
-                xyz: [Some(0), Some(1), Some(2)],
+                ..Programmed::of_lines(&[1.0, 0.0, 0.0], &target, &[1])
             }
             .get::<3>(0);
             assert!(distance(&quarter.at(1.0), &target) < 1e-15, "normal {normal}");

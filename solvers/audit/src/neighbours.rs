@@ -91,24 +91,14 @@ impl<'a, const M: usize> Neighbours<'a, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::curve::Pieces;
 
     /// Along X from 0 to 4, along Y to (4, 4), and back to the start of that by a half circle.
     const PROGRAM: Programmed = Programmed {
-        axes: 2,
-        start: &[0.0, 0.0],
-        target: &[4.0, 0.0, 4.0, 4.0, 4.0, 0.0],
-        line: &[1, 2, 3],
         arc_move: &[2],
         arc_centre: &[4.0, 2.0, 0.0],
         arc_normal: &[2],
         arc_angle: &[std::f64::consts::PI],
-        spline_move: &[],
-        spline_pieces: &[],
-        splines: Pieces { axes: 2, stride: 2, control: &[], weights: &[], offsets: &[0], width: &[] },
-        change_move: &[],
-        change_start: &[],
-        xyz: [Some(0), Some(1), None],
+        ..Programmed::of_lines(&[0.0, 0.0], &[4.0, 0.0, 4.0, 4.0, 4.0, 0.0], &[1, 2, 3])
     };
 
     #[test]

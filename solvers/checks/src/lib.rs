@@ -16,6 +16,6 @@ pub mod wave;
 
 pub use audit::{audit, Audit};
 pub use axes::{padded, AXES, FEW_AXES, PADDED};
-pub use campaign::seeds;
+pub use campaign::{assert_none, seeds};
 pub use cases::{milder_case, random_case, Case, Random};
 pub use elevated::Elevated;

@@ -1,6 +1,6 @@
 //! The two-pass jerk-limited profiler: profiles by hand, random sequences of segments, numbers of any size.
 
-use feedplan_checks::{seeds, Random};
+use feedplan_checks::{assert_none, seeds, Random};
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::s_curve::{plan, Limits, Profiler, Section, SectionKind, Segment};
 use proptest::prelude::*;
@@ -234,12 +234,7 @@ fn random_segments_are_crossed_within_all_limits() {
             failures.push(format!("seed {seed}: {what}"));
         }
     }
-    assert!(
-        failures.is_empty(),
-        "{} failures\n{}",
-        failures.len(),
-        failures[..failures.len().min(20)].join("\n")
-    );
+    assert_none(&failures);
 }
 
 #[test]

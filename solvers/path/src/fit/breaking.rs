@@ -267,7 +267,6 @@ fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
 mod tests {
     use super::*;
     use crate::fit::chain::lengths_along;
-    use feedplan_geometry::watch::Watch;
 
     /// Breaks as (point, corner, line) and extremes.
     fn grouped<const M: usize>(
@@ -276,15 +275,7 @@ mod tests {
         max_curvature: f64,
     ) -> (Vec<(usize, bool, bool)>, Vec<usize>) {
         let along = lengths_along(points);
-        let corner_cosine = 0.5_f64.cos();
-        let chain = Chain {
-            points,
-            along: &along,
-            tolerance: 0.01,
-            corner_cosine,
-            parallel: false,
-            watch: Watch::default(),
-        };
+        let chain = Chain { corner_cosine: 0.5_f64.cos(), ..Chain::of(points, &along, 0.01) };
         let (breaks, extremes) = group(&chain, max_chord, max_curvature);
         (breaks.iter().map(|b| (b.at, b.corner, b.line)).collect(), extremes)
     }
@@ -303,14 +294,7 @@ mod tests {
     fn the_curvature_is_that_of_the_circle_through_three_points() {
         let points = [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [3.0, 5.0]];
         let along = lengths_along(&points);
-        let chain = Chain {
-            points: &points,
-            along: &along,
-            tolerance: 0.01,
-            corner_cosine: 0.0,
-            parallel: false,
-            watch: Watch::default(),
-        };
+        let chain = Chain::of(&points, &along, 0.01);
         let (kappa, look) = curvature(&chain, 0, 3, 1);
         assert!((kappa - 1.0).abs() < 1e-15 && look == 1);
     }
@@ -384,14 +368,7 @@ mod tests {
     fn a_tangent_is_that_of_the_circle() {
         let points = [[1.0, 0.0], [0.6, 0.8], [-1.0, 0.0]];
         let along = lengths_along(&points);
-        let chain = Chain {
-            points: &points,
-            along: &along,
-            tolerance: 0.01,
-            corner_cosine: 0.0,
-            parallel: false,
-            watch: Watch::default(),
-        };
+        let chain = Chain::of(&points, &along, 0.01);
         let [x, y] = Break { at: 1, sides: [0, 2], corner: false, line: false }.tangent(&chain);
         assert!((x + 0.8).abs() < 1e-15 && (y - 0.6).abs() < 1e-15);
     }

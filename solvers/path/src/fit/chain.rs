@@ -17,6 +17,14 @@ pub struct Chain<'a, const M: usize> {
     pub watch: Watch<'a>,
 }
 
+#[cfg(test)]
+impl<'a, const M: usize> Chain<'a, M> {
+    /// A chain that has corners where it turns by more than 90 degrees.
+    pub fn of(points: &'a [[f64; M]], along: &'a [f64], tolerance: f64) -> Self {
+        Self { points, along, tolerance, corner_cosine: 0.0, parallel: false, watch: Watch::default() }
+    }
+}
+
 impl<const M: usize> Chain<'_, M> {
     /// The results in order, computed in parallel if the chain is long.
     pub fn map<T: Sync, R: Send>(

@@ -120,18 +120,10 @@ mod tests {
     use super::*;
     use crate::fit::chain::lengths_along;
     use feedplan_geometry::quadratic::Quadratic;
-    use feedplan_geometry::watch::Watch;
 
     fn features(points: &[[f64; 2]], extremes: &[usize], tolerance: f64) -> Vec<usize> {
         let along = lengths_along(points);
-        let chain = Chain {
-            points,
-            along: &along,
-            tolerance,
-            corner_cosine: 0.0,
-            parallel: false,
-            watch: Watch::default(),
-        };
+        let chain = Chain::of(points, &along, tolerance);
         let features = select(&chain, 0, points.len() - 1, extremes);
         assert!(features.windows(2).all(|pair| pair[0] < pair[1]));
         assert_eq!((features[0], features[features.len() - 1]), (0, points.len() - 1));

@@ -1,7 +1,7 @@
 //! Random and adversarial paths: every limit holds, some limit is active everywhere, and changes that leave the path
 //! the same leave its time the same.
 
-use feedplan_checks::{audit, random_case, seeds, Audit, Case, Random, AXES};
+use feedplan_checks::{assert_none, audit, random_case, seeds, Audit, Case, Random, AXES};
 use feedplan_geometry::quadratic::Quadratic;
 
 /// The worst figures over cases with these seeds, and every failure as a sentence.
@@ -74,24 +74,14 @@ fn changes(seeds: std::ops::Range<u64>) -> ([f64; 6], Vec<String>) {
 fn every_limit_holds_and_one_is_active_everywhere() {
     let (worst, failures) = campaign(seeds(1_500));
     println!("{worst:?}");
-    assert!(
-        failures.is_empty(),
-        "{} failures\n{}",
-        failures.len(),
-        failures[..failures.len().min(40)].join("\n")
-    );
+    assert_none(&failures);
 }
 
 #[test]
 fn the_time_depends_on_the_path_alone() {
     let (worst, failures) = changes(seeds(1_500));
     println!("{worst:?}");
-    assert!(
-        failures.is_empty(),
-        "{} failures\n{}",
-        failures.len(),
-        failures[..failures.len().min(40)].join("\n")
-    );
+    assert_none(&failures);
 }
 
 /// Two right angles rounded by parabolas, with equal limits for both axes: on the parabolas the limit curve is
