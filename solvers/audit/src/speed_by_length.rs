@@ -1,15 +1,16 @@
-//! The speed of a phase by the length of the path from its anchor, and the time to there.
+//! Speed, acceleration and jerk along the path at a length from the anchor of a phase, which is the end of it that lengths and
+//! times are counted from; and the time from there.
 //!
-//! At constant jerk the time of a length is found by Newton's method in a bracket; where v² is a cubic polynomial of the length
-//! it is integrated.
+//! At constant jerk the time is found by Newton's method within a bracket; where v² is a cubic polynomial of the length, it is
+//! the integral of 1/v.
 
 use super::quadrature::{integral, MOST_HALVINGS};
 use super::EPS;
 
-/// Halvings of a bracket of the time until it is as narrow as its numbers.
+/// A bracket of floating-point numbers cannot be halved more often than this.
 const MOST_STEPS: u32 = 1100;
 
-/// v, its change a and that one's change j, in s.
+/// Speed, acceleration and jerk along the path, in mm and s.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     pub v: f64,

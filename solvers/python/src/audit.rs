@@ -174,7 +174,7 @@ pub fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
     })
 }
 
-/// `feedplan.audit.Limits`: what holds everywhere, one number an axis.
+/// `feedplan.audit._Limits`: what holds everywhere, one number an axis.
 #[derive(FromPyObject)]
 pub struct LimitArrays {
     max_velocity: Vec<f64>,

@@ -1,4 +1,5 @@
-//! The planners with limits of jerk: the package's own problem in, a profile out.
+//! Profiles within limits of jerk for Python: by the jerk-limited planner, by the two-pass profiler of segments, and from
+//! sections that Python makes of such segments.
 
 use std::time::{Duration, Instant};
 

@@ -16,7 +16,7 @@ use feedplan_audit::joints::formula::Formula;
 use feedplan_audit::joints::path::{JointPath, Words};
 use feedplan_audit::kernels::PlanKernels;
 
-/// `feedplan.machine.words.AxisWords`.
+/// `feedplan.machine.axis_words.AxisWords`.
 #[derive(FromPyObject)]
 struct WordArrays<'py> {
     kinematics: KinematicsArrays<'py>,

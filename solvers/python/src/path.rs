@@ -1,4 +1,4 @@
-//! `build_path`: the moves of a program to the columns of its path.
+//! The path of a program for Python: `build_path` makes its columns from the native moves and the rules for them.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;

@@ -1,4 +1,5 @@
-//! The columns of the moves of a whole program.
+//! The moves of a whole program as columns, as `feedplan.program.program.Program` has them, from the `Moves` that the
+//! interpreter has collected.
 
 use super::{Moves, Stop};
 use crate::block::AXES;
@@ -8,7 +9,7 @@ use crate::events::Events;
 /// The letters of the columns of a tool direction, after those of the axes.
 const DIRECTION: [u8; 3] = *b"IJK";
 
-/// The moves of a program, one row each; see `Program` in the Python package.
+/// One row a move, except for arcs, splines, changes of coordinates and events, which name their moves.
 #[derive(Debug)]
 pub struct Columns {
     pub axes: Vec<u8>,

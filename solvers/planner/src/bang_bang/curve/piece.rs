@@ -1,5 +1,5 @@
-//! One piece of the path over t in [0, 1], as the kernel of curves needs it: tangents, weight, D, and what rounding
-//! left of them.
+//! One piece of the path over t in [0, 1] as polynomials, from its control points and weights: the numerator g of the
+//! tangents, the weight ω, the square D of the tool's speed, and how far rounding may have moved g.
 
 use crate::bang_bang::tolerance::{MAX_NOISE, NO_TANGENT, OFF_ITSELF, OFF_LINE, POINT_NOISE, TANGENT_NOISE};
 use feedplan_geometry::polynomial::Polynomial;
