@@ -1,6 +1,7 @@
 //! Geometry of curves: polynomials, Bézier pieces, splines, circles, lengths and their inverse. Lengths are in mm.
 
 pub mod arc_length;
+pub mod bisection;
 pub mod conic;
 pub mod elementary;
 mod instances;

@@ -11,6 +11,7 @@ use crate::arc_length_path::{
 };
 use crate::jerk_profile::JerkProfile;
 use crate::path_problem::Limits;
+use feedplan_geometry::bisection::boundary;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;
@@ -315,18 +316,9 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
     let looked: Vec<(f64, bool)> = points(SAMPLES[1]).map(|u| (u, inverse_radius(u) > 1.0)).collect();
     let crossed = looked.windows(2).filter(|pair| pair[0].1 != pair[1].1);
     let kinks = crossed.map(|pair| {
-        let (mut low, tight, mut high) = (pair[0].0, pair[0].1, pair[1].0);
-        loop {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                return middle;
-            }
-            if (inverse_radius(middle) > 1.0) == tight {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        let [(from, tight), (to, _)] = [pair[0], pair[1]];
+        let [low, high] = boundary(from, to, |u| (inverse_radius(u) > 1.0) == tight);
+        0.5 * (low + high)
     });
     kinks.filter(|&u| u > AT_END * width && u < (1.0 - AT_END) * width).collect()
 }

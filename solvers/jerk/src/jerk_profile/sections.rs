@@ -4,12 +4,10 @@ use super::{JerkProfile, Movement, State};
 use crate::arc_length_path::ArcLengthPath;
 use crate::path_problem::Geometry;
 use crate::s_curve::{Section, SegmentEnd};
+use feedplan_geometry::bisection::boundary;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phases;
 use feedplan_planner::problem::Problem;
-
-/// Bisection steps for the time at which a section of constant jerk passes a knot.
-const HALVINGS: usize = 200;
 
 /// A section of constant jerk; after `cut` it lies on one part.
 struct Span {
@@ -31,21 +29,10 @@ impl Span {
         let (mut start, mut left) = (from, duration);
         while part + 1 < path.parts.len() && path.knots()[part + 1] < to.s {
             let knot = path.knots()[part + 1];
-            let (mut low, mut high) = (0.0, left);
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if middle <= low || middle >= high {
-                    break;
-                }
-                if start.after(middle, jerk).s < knot {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            let end = State { s: knot, ..start.after(high, jerk) };
-            out.push(Self { part, ends: [start, end], jerk, duration: high });
-            (start, left) = (end, left - high);
+            let [_, time] = boundary(0.0, left, |time| start.after(time, jerk).s < knot);
+            let end = State { s: knot, ..start.after(time, jerk) };
+            out.push(Self { part, ends: [start, end], jerk, duration: time });
+            (start, left) = (end, left - time);
             part += 1;
         }
         out.push(Self { part, ends: [start, to], jerk, duration: left });
