@@ -18,7 +18,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
-from feedplan.setpoints import INTERPOLATORS, setpoints
+from feedplan.setpoints import INTERPOLATORS, Setpoints
 
 NAME = "interpolators"
 FEED = 50.0  # [mm/s]
@@ -145,7 +145,7 @@ def stream_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[st
     rows: list[dict[str, Cell]] = []
     for step in steps:
         for interpolator in INTERPOLATORS:
-            stream = setpoints(problem, profile, step / FEED, interpolator)
+            stream = Setpoints(problem, profile, step / FEED, interpolator)
             begin = time.perf_counter()
             count = sum(len(chunk) for chunk in stream.chunks())
             seconds = time.perf_counter() - begin

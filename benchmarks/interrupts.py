@@ -26,7 +26,7 @@ from feedplan.plan_folder import write_plan
 from feedplan.planners import corners, limits_jerk, planner
 from feedplan.program.read import read_program
 from feedplan.progress import Listener, part
-from feedplan.setpoints import setpoints
+from feedplan.setpoints import Setpoints
 
 NAME = "interrupts"
 METHODS = ("bang-bang", "s-curve", "jerk-limited")
@@ -78,7 +78,7 @@ def _stages(program: Path, machine: Machine, method: str, output: Path) -> Itera
     plan = Plan(made["read"], machine, problem, profile, method, made["bound"], {"plan": 0.0})
 
     def audited(progress: Listener) -> Any:
-        points = setpoints(problem, profile, machine.period, progress=part(progress, 0.0, 0.02))
+        points = Setpoints(problem, profile, machine.period, progress=part(progress, 0.0, 0.02))
         jerk = limits_jerk(method)
         rest = part(progress, 0.02, 1.0)
         return audit(problem, profile, machine, made["read"], points, jerk=jerk, progress=rest)

@@ -56,7 +56,7 @@ from feedplan.progress import Listener, Progress, of_stage, part, tell
 from feedplan.refit import FitLimits
 from feedplan.report.account import Account, account
 from feedplan.report.operations import OperationTime, operation_times
-from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, Sink, setpoints
+from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, Sink
 from feedplan.time_limit import TimeLimit
 from feedplan.today import Today, beside_plan
 from feedplan.trajectory import State, Trajectory
@@ -151,7 +151,7 @@ class Plan:
         used.
         """
         callback(progress, "the part done")
-        return setpoints(
+        return Setpoints(
             self.problem,
             self.profile,
             self.machine.period if period is None else period,
@@ -467,7 +467,7 @@ def plan(
                 own["time_limit"] = limit.left
                 # How long what follows will take is known from setpoints of a first plan.
                 own["reserve"] = lambda first: limit.keep_for(
-                    setpoints(problem, first, machine.period, interpolator, max_setpoints)
+                    Setpoints(problem, first, machine.period, interpolator, max_setpoints)
                 )
             if tells_progress(method):
                 turn = next(turns)

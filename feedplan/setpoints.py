@@ -66,7 +66,8 @@ Sink = Callable[[SetpointChunk], None]
 
 
 class Setpoints:
-    """The stream of setpoints, computed as it is read; iterating gives chunks.
+    """Setpoints every `period` [s] of the joints along a problem's path by its profile, computed as they are
+    read; iterating gives chunks.
 
     Setpoint 0 is the start of the path. A pause D before the first run takes ceil(D/period) periods there. A
     run with time T and pause D takes ceil((T + D)/period) periods: each stop is hit exactly and the stream
@@ -75,6 +76,15 @@ class Setpoints:
     step. At a stop velocity, acceleration and jerk are 0; at a switching point, where the acceleration jumps,
     a setpoint has the values of the phase that begins there. `computing` is the time that this took
     so far, `passing` what those took to whom they were passed on [s].
+
+    By the `interpolator` sarfraz, where an axis moves at constant acceleration or speed its way tells the
+    place, in closed form on quadratic pieces; elsewhere a table of length or time does, with Sarfraz's
+    predictor and corrector, and the length at a time in closed form where the jerk on the path is constant.
+    By newton: steps of speed times period, to third order, and Newton–Raphson. Pieces may have any degree,
+    polynomial or rational. `progress` is told how far the laying out is; `events` are those of the plan
+    (`feedplan.event_places`).
+    Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
+    setpoints than `max_setpoints`.
     """
 
     def __init__(
@@ -82,7 +92,7 @@ class Setpoints:
         problem: Problem,
         profile: SpeedProfile,
         period: float,
-        interpolator: Interpolator,
+        interpolator: Interpolator = "sarfraz",
         max_setpoints: int = MAX_SETPOINTS,
         progress: Listener | None = None,
         events: Events | None = None,
@@ -201,26 +211,3 @@ def chunks(chunk: Callable[[int, int], SetpointChunk], count: int, size: int) ->
     if not is_whole(size, most=MAX_CHUNK):
         raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
     return (chunk(start, min(start + size, count)) for start in range(0, count, size))
-
-
-def setpoints(
-    problem: Problem,
-    profile: SpeedProfile,
-    period: float,
-    interpolator: Interpolator = "sarfraz",
-    max_setpoints: int = MAX_SETPOINTS,
-    progress: Listener | None = None,
-    events: Events | None = None,
-) -> Setpoints:
-    """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
-
-    `sarfraz`: where an axis moves at constant acceleration or speed its way tells the place, in closed form
-    on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere, the length at a
-    time in closed form where the jerk along the path is constant. `newton`: steps
-    of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
-    rational. `progress` is told how far the laying out is; `events` are those of the plan
-    (`feedplan.event_places`).
-    Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
-    setpoints than `max_setpoints`.
-    """
-    return Setpoints(problem, profile, period, interpolator, max_setpoints, progress, events)

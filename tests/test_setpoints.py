@@ -19,14 +19,14 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
-from feedplan.setpoints import INTERPOLATORS, Setpoints, setpoints
+from feedplan.setpoints import INTERPOLATORS, Setpoints
 from tests.along import Phase, path_along, problem_along, profile_of
 
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)
 
 
 def sampled(path: Path, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Setpoints:
-    return setpoints(problem_along(path), profile, period, interpolator)
+    return Setpoints(problem_along(path), profile, period, interpolator)
 
 
 def path_of(control_points: list[list[list[float]]], width: list[float], **columns: Any) -> Path:

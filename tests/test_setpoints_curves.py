@@ -24,7 +24,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
 from feedplan.profile import PhaseLaw, SpeedProfile
-from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
+from feedplan.setpoints import INTERPOLATORS, SetpointChunk, Setpoints
 from tests.along import path_along, problem_along, profile_of
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def _out_and_ahead(angle: Array) -> tuple[tuple[Array, Array], tuple[Array, Arra
 def test_a_circle_at_constant_feed_turns_evenly(interpolator: str, period: float) -> None:
     radius, feed = 10.0, 80.0
     curve = circle([0.0, 0.0], radius)
-    stream = setpoints(problem_along(path_along(curve)), feed_profile(curve, feed), period, interpolator)
+    stream = Setpoints(problem_along(path_along(curve)), feed_profile(curve, feed), period, interpolator)
     chunk = stream.all()
     angle, step = feed * chunk.t / radius, feed * period
     out, ahead = (np.stack([x, y], axis=1) for x, y in _out_and_ahead(angle))
@@ -105,7 +105,7 @@ def test_a_line_whose_parameter_speeds_up_is_the_school_formula(interpolator: st
     peak = float((1000 * half / curve.evaluate(0, 0.5, 1)[1, 0, 0]) ** 2)
     up = (0, PhaseLaw.AXIS_ACCELERATION, 0, 1000.0, 0.0, 0.5, 0.0, peak, half)
     down = (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 0.5, 1.0, peak, 0.0, half)
-    chunk = setpoints(problem_along(path_along(curve)), profile_of(up, down), 0.001, interpolator).all()
+    chunk = Setpoints(problem_along(path_along(curve)), profile_of(up, down), 0.001, interpolator).all()
     t = np.minimum(chunk.t, 2 * half)
     first, second = np.minimum(t, half), np.maximum(2 * half - t, 0.0)
     x = np.where(t <= half, 500 * first**2, 30 - 500 * second**2)
@@ -132,7 +132,7 @@ def test_an_axis_that_turns_round_keeps_its_acceleration(interpolator: str, rati
         pace, duration = math.sqrt(a), 2 / math.sqrt(a)
     end = float((a * duration / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
     arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, -a, 0.0, float(curve.width[0]), pace**2, end, duration)
-    chunk = setpoints(problem_along(path_along(curve)), profile_of(arc), 1e-4, interpolator).all()
+    chunk = Setpoints(problem_along(path_along(curve)), profile_of(arc), 1e-4, interpolator).all()
     t = chunk.t
     np.testing.assert_allclose(chunk.position[:, 0], r - 0.5 * a * t**2, atol=1e-11)
     np.testing.assert_allclose(chunk.velocity[:, 0], -a * t, atol=1e-8)
@@ -160,10 +160,10 @@ def test_a_higher_degree_changes_no_setpoint(interpolator: str, seed: int) -> No
     problem = random_problem(seed, degree=2, rational=False)
     profile = planned(problem)
     period = profile.time / 397.3
-    plain = setpoints(problem, profile, period, interpolator).all()
+    plain = Setpoints(problem, profile, period, interpolator).all()
     for degree in range(3, 10):
         raised = replace(problem, path=replace(problem.path, curve=problem.curve.elevated(degree)))
-        chunk = setpoints(raised, profile, period, interpolator).all()
+        chunk = Setpoints(raised, profile, period, interpolator).all()
         np.testing.assert_array_equal(chunk.piece, plain.piece)
         for name in ("u", "position"):
             np.testing.assert_allclose(getattr(chunk, name), getattr(plain, name), atol=1e-9, err_msg=name)
@@ -187,7 +187,7 @@ def test_planned_curves_are_sampled_within_their_limits(interpolator: str, seed:
     problem = random_problem(seed, rational=rational)
     profile = planned(problem)
     period = profile.time / 397.3
-    stream = setpoints(problem, profile, period, interpolator)
+    stream = Setpoints(problem, profile, period, interpolator)
     chunk = stream.all()
     assert all(np.isfinite(getattr(chunk, name)).all() for name in RATES)
     assert (np.abs(chunk.velocity) <= problem.max_velocity * (1 + 1e-8)).all()
@@ -223,7 +223,7 @@ def test_an_axis_that_has_all_but_turned_round_is_not_taken_for_one_at_rest() ->
     pace = math.sqrt(a * r) / slope
     end = float((a * time / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
     arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, -a, pace * t0, float(curve.width[0]), pace**2, end, time - t0)
-    chunk = setpoints(problem_along(path_along(curve)), profile_of(arc), 1e-3, "sarfraz").all()
+    chunk = Setpoints(problem_along(path_along(curve)), profile_of(arc), 1e-3, "sarfraz").all()
     x = r - a * (chunk.t + t0) ** 2 / 2
     expected = np.sqrt((r - x) * (r + x))
     np.testing.assert_allclose(chunk.position[1:-1, 1], expected[1:-1], atol=1e-9)
@@ -243,7 +243,7 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
     problem = problem_along(path_along(curve.elevated(degree)))
     # The cusp falls between setpoints, next to one, and on one.
     for period in (time / 100.5, time / (100 + 1e-7), time / 100):
-        chunk = setpoints(problem, profile, period, interpolator).all()
+        chunk = Setpoints(problem, profile, period, interpolator).all()
         moving = slice(0, int(np.searchsorted(chunk.t, 2 * time)))
         tau, b = chunk.t[moving] - time, (a / 2) ** 1.5
         expected = (
@@ -263,7 +263,7 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
 def test_time_and_place_agree_with_integration(seed: int) -> None:
     problem = random_problem(seed)
     profile, curve = planned(problem), problem.curve
-    chunk = setpoints(problem, profile, profile.time / 97.3).all()
+    chunk = Setpoints(problem, profile, profile.time / 97.3).all()
     arc = arcs_of(chunk, profile)
     starts = np.cumsum(profile.duration) - profile.duration
 
@@ -314,7 +314,7 @@ def test_the_butterfly_is_followed_to_its_end(interpolator: str) -> None:
     problem = replace(problem, max_acceleration=np.full(2, 3000.0), feed=np.full(len(curve), 200.0))
     profile = planned(problem)
     for period in (1e-4, 1e-3, 1e-2):
-        chunk = setpoints(problem, profile, period, interpolator).all()
+        chunk = Setpoints(problem, profile, period, interpolator).all()
         assert np.abs(np.diff(chunk.position, 2, axis=0)).max() <= 3000 * period**2 * (1 + 1e-5)
         assert np.abs(np.diff(chunk.position, axis=0)).max() <= 200 * period * (1 + 1e-9)
         assert chunk.position[-1].tolist() == curve.control_points[-1].tolist()
@@ -350,7 +350,7 @@ def tip_time(speed_sq: tuple[float, float], u: float) -> float:
 @pytest.mark.parametrize("kind", [PhaseLaw.FEED, PhaseLaw.SPEED_LINE])
 def test_joints_follow_the_speed_of_the_tip(interpolator: str, kind: PhaseLaw) -> None:
     problem, profile = joints_case(kind)
-    stream = setpoints(problem, profile, 0.0005, interpolator)
+    stream = Setpoints(problem, profile, 0.0005, interpolator)
     chunk = stream.all()
     assert stream.axes == chunk.axes == ("X", "Y", "B")
     assert problem.joints is not None
@@ -378,7 +378,7 @@ def test_quadratic_and_higher_pieces_stand_in_one_path() -> None:
     length = CurveLength(curve)
     problem, profile = problem_along(path_along(curve)), feed_profile(curve, 30.0)
     for interpolator in INTERPOLATORS:
-        chunk = setpoints(problem, profile, 0.0011, interpolator).all()
+        chunk = Setpoints(problem, profile, 0.0011, interpolator).all()
         np.testing.assert_allclose(length.length(chunk.piece, chunk.u), 30 * chunk.t, atol=1e-9)
         assert np.unique(chunk.piece).tolist() == [0, 1, 2]
 
@@ -394,8 +394,8 @@ def test_what_general_pieces_cannot_do_is_refused_with_a_sentence() -> None:
         ({"kind": np.array([7], np.uint8)}, "unknown kind 7"),
     ):
         with pytest.raises((InputError, ValueError), match=words):
-            setpoints(problem, replace(profile, **change), 0.001)  # type: ignore[arg-type]
+            Setpoints(problem, replace(profile, **change), 0.001)  # type: ignore[arg-type]
     for coefficients, offsets in (([1.0], [0, 2]), ([1.0, np.nan], [0, 2]), ([1.0], [0, 1, 1])):
         tip = SpeedPolynomial(np.array(coefficients), np.array(offsets))
         with pytest.raises(InputError, match="the tip speed does not fit the 1 pieces"):
-            setpoints(replace(problem, tip_speed=tip), profile, 0.001)
+            Setpoints(replace(problem, tip_speed=tip), profile, 0.001)

@@ -16,7 +16,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
 from feedplan.profile import PhaseLaw, SpeedProfile
-from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
+from feedplan.setpoints import INTERPOLATORS, SetpointChunk, Setpoints
 from tests.along import path_along, problem_along
 from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
 
@@ -57,7 +57,7 @@ def test_a_hundred_millimetres_from_rest_to_rest_are_four_cubics(interpolator: s
     sections = rest_to_rest(100.0, 3200.0)
     assert [time for time, _ in sections] == pytest.approx([0.25, 0.25, 0.0, 0.25, 0.25], abs=1e-15)
     profile = constant_jerk(curve, sections)
-    stream = setpoints(problem_along(path_along(curve)), profile, 0.001, interpolator)
+    stream = Setpoints(problem_along(path_along(curve)), profile, 0.001, interpolator)
     chunk = stream.all()
     assert stream.count == 1001
     expected = motion_at(sections, chunk.t)
@@ -88,7 +88,7 @@ def test_a_circle_at_constant_tangential_jerk_is_exact(interpolator: str) -> Non
     profile = constant_jerk(curve, sections)
     assert set(profile.kind) == {PhaseLaw.PATH_JERK}
     assert len(profile) > len(curve)
-    chunk = setpoints(problem_along(path_along(curve)), profile, 0.0007, interpolator).all()
+    chunk = Setpoints(problem_along(path_along(curve)), profile, 0.0007, interpolator).all()
     keep = ~switching(profile, chunk.t, 1e-9)
     keep[[0, -1]] = False
     t = chunk.t[keep]
@@ -154,7 +154,7 @@ def test_rates_on_random_curves_are_the_differences_of_the_positions(interpolato
     length = CurveLength(curve)
     for profile in profiles(curve, seed):
         period = 0.0005
-        stream = setpoints(problem_along(path_along(curve)), profile, period, interpolator)
+        stream = Setpoints(problem_along(path_along(curve)), profile, period, interpolator)
         chunk = stream.all()
         differences_agree(chunk, profile, period)
         # Newton's error is in parts of each step: from rest the first is shorter than 1e-7 mm.
@@ -184,7 +184,7 @@ def test_joints_follow_the_motion_of_the_tip(interpolator: str, seed: int) -> No
     jerk = constant_jerk(tip, sections := rest_to_rest(length.total, 3000.0))
     cubic = cubic_speed(tip, lambda s: 25.0 + 60.0 * s, lambda s: 60.0, 3)
     for profile in (jerk, cubic):
-        chunk = setpoints(problem, profile, 0.0005, interpolator).all()
+        chunk = Setpoints(problem, profile, 0.0005, interpolator).all()
         np.testing.assert_allclose(chunk.position, joints.evaluate(0, chunk.u, 0)[0], atol=1e-12)
         differences_agree(chunk, profile, 0.0005)
         s = length.length(chunk.piece, chunk.u)
@@ -199,7 +199,7 @@ def test_both_interpolators_agree_in_chunks_of_any_size() -> None:
     curve = random_curve(1)
     problem = problem_along(path_along(curve))
     for profile in profiles(curve, 1):
-        sarfraz, newton = (setpoints(problem, profile, 0.0013, name) for name in INTERPOLATORS)
+        sarfraz, newton = (Setpoints(problem, profile, 0.0013, name) for name in INTERPOLATORS)
         whole = sarfraz.all()
         for stream in (sarfraz, newton):
             parts = [chunk.position for chunk in stream.chunks(37)]
@@ -226,6 +226,6 @@ def test_a_profile_that_cannot_be_followed_is_refused_with_a_sentence() -> None:
         for name, value in change.items():
             columns[name][0] = value
         with pytest.raises(InputError, match=rf"^phase 0 of the profile .*{words}.*: plan this path again$"):
-            setpoints(problem, replace(profile, **columns), 0.001)
+            Setpoints(problem, replace(profile, **columns), 0.001)
     with pytest.raises(InputError, match=f"{len(jerk)} phases, and `a0` has {len(jerk) - 1} entries"):
         replace(jerk, a0=jerk.a0[:-1])

@@ -20,7 +20,7 @@ from feedplan.planners import planner
 from feedplan.planning import plan
 from feedplan.profile import OF_PHASES, SpeedProfile
 from feedplan.program.program import Program
-from feedplan.setpoints import SetpointChunk, setpoints
+from feedplan.setpoints import SetpointChunk, Setpoints
 from tests.along import path_along
 
 COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "line")
@@ -81,7 +81,7 @@ class Case:
 
 def planned(problem: Problem, machine: Machine, program: Program | None = None) -> Case:
     profile = planner("bang-bang")(problem)
-    return Case(problem, profile, machine, program, setpoints(problem, profile, problem.period).all())
+    return Case(problem, profile, machine, program, Setpoints(problem, profile, problem.period).all())
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.profile import PhaseLaw, SpeedProfile
-from feedplan.setpoints import setpoints
+from feedplan.setpoints import Setpoints
 from tests.along import path_along, problem_along
 from tests.audit.curves import machine_of
 from tests.audit.test_joints import past_the_column, wavy, wide
@@ -32,7 +32,7 @@ FREE = 1e6
 def judged(problem: Problem, profile: SpeedProfile, with_setpoints: bool = True, **changes: Any) -> Audit:
     """The verdict of a method that claims to limit jerk."""
     problem = replace(problem, **changes)
-    stream = setpoints(problem, profile, problem.period) if with_setpoints else None
+    stream = Setpoints(problem, profile, problem.period) if with_setpoints else None
     return audit(problem, profile, machine_of(problem), None, stream, jerk=True)
 
 
@@ -73,7 +73,7 @@ def test_a_jerk_two_millionths_above_its_limit_is_found(with_setpoints: bool) ->
 
 def test_setpoints_alone_show_the_excess_too() -> None:
     problem, profile = line()
-    stream = setpoints(problem, profile, 0.001).all()
+    stream = Setpoints(problem, profile, 0.001).all()
     # Rounding hides some 2e-6 of the limit in third differences over 1 ms.
     for excess, ok in ((0.5e-6, True), (1e-5, False)):
         tight = replace(problem, max_jerk=problem.max_jerk / (1.0 + excess))
@@ -117,7 +117,7 @@ def test_random_curves_pass_at_their_own_jerk_and_fail_below_it(seed: int) -> No
         ends = np.linalg.norm(curve.evaluate(*places, 1)[1], axis=1)
         ends *= np.sqrt([profile.p0[0], profile.p1[-1]])
         problem = replace(problem, start_speed=float(ends[0]), end_speed=float(ends[1]))
-        dense = setpoints(problem, profile, 2e-5).all()
+        dense = Setpoints(problem, profile, 2e-5).all()
         most = np.abs(dense.jerk[1:-1]).max(axis=0)
         free = judged(problem, profile)
         assert free.failures == ()
@@ -229,7 +229,7 @@ def test_a_step_of_the_acceleration_where_the_curvature_jumps_shows_as_a_jerk() 
             assert ("jerk" in broken(result)) == (not ok)
             # Where no path is known the setpoints alone show it.
             known = replace(problem, max_jerk=limit)
-            alone = [setpoints(problem, profile, 0.001).all()]
+            alone = [Setpoints(problem, profile, 0.001).all()]
             result = audit(known, None, machine_of(problem), None, alone, jerk=True)
             assert result.ok == ok
 
@@ -246,7 +246,7 @@ def test_a_step_of_the_acceleration_that_no_difference_may_show_is_named() -> No
 
 def test_what_is_not_claimed_is_not_measured() -> None:
     problem, profile = line()
-    stream = setpoints(problem, profile, 0.001)
+    stream = Setpoints(problem, profile, 0.001)
     tight = replace(problem, max_jerk=problem.max_jerk / 2)
     result = audit(tight, profile, machine_of(tight), None, stream)
     assert result.ok
@@ -291,8 +291,8 @@ def joints(request: pytest.FixtureRequest) -> tuple[Problem, SpeedProfile, Machi
 
 def test_the_jerk_of_joints_is_that_of_their_setpoints(joints: Any) -> None:
     problem, profile, machine = joints
-    stream = setpoints(problem, profile, machine.period)
-    dense = setpoints(problem, profile, 1e-4).all()
+    stream = Setpoints(problem, profile, machine.period)
+    dense = Setpoints(problem, profile, 1e-4).all()
     most = np.abs(dense.jerk[1:-1]).max(axis=0)
     result = audit(problem, profile, machine, None, stream, jerk=True)
     assert result.failures == ()

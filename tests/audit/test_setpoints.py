@@ -18,7 +18,7 @@ from feedplan.errors import InputError
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
-from feedplan.setpoints import setpoints
+from feedplan.setpoints import Setpoints
 from tests.along import path_along
 from tests.audit.faults import broken
 
@@ -55,12 +55,12 @@ def test_without_a_profile_the_places_are_found_along_the_path(part: Any) -> Non
 
 
 def test_both_interpolators_pass(part: Any) -> None:
-    stream = setpoints(part.problem, part.profile, part.problem.period, "newton")
+    stream = Setpoints(part.problem, part.profile, part.problem.period, "newton")
     assert audit(part.problem, part.profile, part.machine, part.program, stream).failures == ()
 
 
 def test_another_period_than_the_machines_passes(part: Any) -> None:
-    stream = setpoints(part.problem, part.profile, 0.0037)
+    stream = Setpoints(part.problem, part.profile, 0.0037)
     result = audit(replace(part.problem, chord_tolerance=math.inf), part.profile, part.machine, None, stream)
     assert result.failures == ()
 
@@ -199,7 +199,7 @@ def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any, ch
 
 def test_the_progress_grows_from_nothing_to_all(part: Any) -> None:
     shares: list[float] = []
-    stream = setpoints(part.problem, part.profile, part.problem.period)
+    stream = Setpoints(part.problem, part.profile, part.problem.period)
     audit(part.problem, part.profile, part.machine, part.program, stream, progress=shares.append)
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
@@ -240,7 +240,7 @@ def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
     path = path_along(CompositeCurve.from_pieces(points, np.full(2, half)), feed=10.0)
     problem = build_problem(path, machine)
     profile = planner("bang-bang")(problem)
-    points = setpoints(problem, profile, 0.001).all()
+    points = Setpoints(problem, profile, 0.001).all()
     row = int(np.flatnonzero(points.position[:, 1] > 0)[0])
     before, after = half - points.position[row - 1, 0], points.position[row, 1]
     cut = before * after / math.hypot(before, after)

@@ -7,7 +7,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.machine.machine import Machine
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
-from feedplan.setpoints import setpoints
+from feedplan.setpoints import Setpoints
 
 # A plan stopped at once may take minutes: setpoints are made of those that take no longer [s].
 LONGEST = 60.0
@@ -22,5 +22,5 @@ def audited(
 ) -> tuple[str, ...]:
     """A sentence for each limit that is broken."""
     short = profile.time <= LONGEST
-    points = setpoints(problem, profile, machine.period, "sarfraz") if short else None
+    points = Setpoints(problem, profile, machine.period, "sarfraz") if short else None
     return audit(problem, profile, machine, program, points, jerk=jerk).failures

@@ -27,7 +27,7 @@ from feedplan.planners._segments import is_line
 from feedplan.planners.junction_deviation import corner_speed
 from feedplan.profile import PhaseLaw
 from feedplan.program.read import read_program
-from feedplan.setpoints import setpoints
+from feedplan.setpoints import Setpoints
 
 Array = NDArray[np.float64]
 
@@ -183,7 +183,7 @@ def test_on_a_circle_each_method_has_the_speed_of_its_rule() -> None:
     optimum = planner("bang-bang")(problem).time
     for method in METHODS:
         profile = planner(method)(problem)
-        stream = setpoints(problem, profile, T)
+        stream = Setpoints(problem, profile, T)
         verdict = audit(problem, profile, PLANE, setpoints=stream)
         assert verdict.ok == (method in (ARCS, CVT)), (method, verdict.failures)
         assert not verdict.ok or profile.time > optimum
@@ -200,7 +200,7 @@ def test_setpoints_from_and_to_rest_follow_a_speed_whose_square_is_linear() -> N
     problem = build_problem(Path.from_curve(curve, feed=1e3), PLANE)
     profile = planner(TANGENTIAL)(problem)
     assert (profile.kind == PhaseLaw.SPEED_LINE).sum() > 2
-    chunk = setpoints(problem, profile, T).all()
+    chunk = Setpoints(problem, profile, T).all()
     # Times by midpoints over the root of the way, where the integrand is smooth.
     for i in np.flatnonzero(profile.kind == PhaseLaw.SPEED_LINE):
         u0, u1 = profile.u0[i], profile.u1[i]

@@ -15,7 +15,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.planning import rounding_stops
 from feedplan.profile import PhaseLaw, SpeedProfile
-from feedplan.setpoints import setpoints
+from feedplan.setpoints import Setpoints
 from tests.along import problem_along
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess, worst_excess_exactly
@@ -153,7 +153,7 @@ def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
 def test_setpoints_through_turns_keep_every_limit(seed: int) -> None:
     problem = problem_of(*random_curve(seed))
     profile = SpeedProfile.of(plan_bang_bang(problem))
-    chunk = setpoints(problem, profile, profile.time / 200, "sarfraz").all()
+    chunk = Setpoints(problem, profile, profile.time / 200, "sarfraz").all()
     assert (np.abs(chunk.velocity) <= problem.max_velocity * (1 + 1e-9)).all()
     assert (np.abs(chunk.acceleration) <= problem.max_acceleration * (1 + 1e-6)).all()
 
