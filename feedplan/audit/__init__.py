@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -89,13 +88,13 @@ def audit(
     machine_axes = _machine_axes(machine, axes)
     jump = [axis.max_velocity_jump for axis in machine_axes]
     limits = _Limits(
-        max_velocity=_numbers(problem.max_velocity),
-        max_acceleration=_numbers(problem.max_acceleration),
-        min_velocity=_numbers(problem.min_velocity),
-        min_acceleration=_numbers(problem.min_acceleration),
-        max_jerk=_numbers(problem.max_jerk),
+        max_velocity=problem.max_velocity.tolist(),
+        max_acceleration=problem.max_acceleration.tolist(),
+        min_velocity=problem.min_velocity.tolist(),
+        min_acceleration=problem.min_acceleration.tolist(),
+        max_jerk=problem.max_jerk.tolist(),
         judges_jerk=jerk,
-        max_velocity_jump=jump if problem.velocity_jump is None else _numbers(problem.velocity_jump),
+        max_velocity_jump=jump if problem.velocity_jump is None else problem.velocity_jump.tolist(),
         jump_beyond=jump,
         travel=[axis.travel for axis in machine_axes],
         feed_axes=feed_axes(axes),
@@ -194,11 +193,11 @@ def _seen(stream: SetpointAudit, setpoints: Chunks) -> Findings:
     """What the audit of a stream finds in all its setpoints."""
     for chunk, share in setpoints:
         stream.push(
-            _array(chunk.t, np.float64),
-            _array(chunk.position, np.float64),
-            _array(chunk.velocity, np.float64),
-            _array(chunk.acceleration, np.float64),
-            _array(chunk.line, np.int32),
+            np.ascontiguousarray(chunk.t, np.float64),
+            np.ascontiguousarray(chunk.position, np.float64),
+            np.ascontiguousarray(chunk.velocity, np.float64),
+            np.ascontiguousarray(chunk.acceleration, np.float64),
+            np.ascontiguousarray(chunk.line, np.int32),
             share,
         )
     return stream.finish()
@@ -345,21 +344,10 @@ def _lines(given: ArrayLike) -> NDArray[np.int32]:
     narrow = len(lines) == 0 or np.can_cast(lines.dtype, np.int32)
     if not narrow and not (lines.min() >= -(2**31) and lines.max() < 2**31):
         raise InputError("source lines are beyond 2147483647: give the lines of a program")
-    return _array(lines, np.int32)
+    return np.ascontiguousarray(lines, np.int32)
 
 
 def _period(times: NDArray[np.float64], default: float) -> float:
     """The usual time step; the machine's where the times show none."""
     step = float(np.median(np.diff(times[:CHUNK])))
     return step if math.isfinite(step) and step > 0 else default
-
-
-Scalar = TypeVar("Scalar", bound=np.generic)
-
-
-def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:
-    return np.ascontiguousarray(values, dtype=dtype)
-
-
-def _numbers(values: NDArray[np.float64]) -> list[float]:
-    return [float(value) for value in values]
