@@ -1,7 +1,8 @@
-"""Numbers with units as text. All quantities in feedplan are in mm, degrees and seconds."""
+"""Numbers with units as text, and for JSON. All quantities in feedplan are in mm, degrees and seconds."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 MM_PER_INCH = 25.4
@@ -23,6 +24,11 @@ def shared_unit(units: Iterable[str], otherwise: str) -> str:
 def counted(number: int, noun: str) -> str:
     """`1 run`, `2 runs`."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def finite(value: float) -> float | None:
+    """The number, or None for those that JSON lacks: infinite ones and NaN."""
+    return value if math.isfinite(value) else None
 
 
 def duration_text(seconds: float) -> str:

@@ -19,6 +19,7 @@ from feedplan.errors import InputError
 from feedplan.machine.kinematics import Kinematics, _registered, register
 from feedplan.plan_folder import write_plan
 from tests.outputs.parquet import FORMATS
+from tests.sentences import assert_one_sentence
 
 PROGRAM = "G21 G90 G64 P0.05\nF3000\nG1 X20 Y5\nG3 X10 Y15 I-5 J5\nG1 X0 Y10\nG1 Y0\nM2\n"
 
@@ -374,9 +375,3 @@ def change_setpoints(folder: Path, change: Any) -> None:
         arrays = dict(file)
     change(arrays)
     np.savez(folder / "setpoints.npz", **arrays)
-
-
-def assert_one_sentence(err: str, words: str) -> None:
-    assert err.startswith("error: ")
-    assert err.count("\n") == 1
-    assert words in err

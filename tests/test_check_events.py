@@ -15,13 +15,7 @@ from feedplan.checking import check
 from feedplan.cli import main
 from feedplan.errors import InputError
 from feedplan.plan_folder import write_plan
-
-
-def assert_one_sentence(err: str, words: str) -> None:
-    assert err.startswith("error: ")
-    assert err.count("\n") == 1
-    assert words in err
-
+from tests.sentences import assert_one_sentence
 
 WITH_EVENTS = "G21 G90 G61\nF3000\nS900 M3\nG1 X20\nG4 P0.05\nM8\nG1 Y10\nM62 P1\nG1 Y20\nM5\nM2\n"
 

@@ -17,6 +17,7 @@ from feedplan.cli import main
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
 from feedplan.outputs import KNOTS, format_named
 from tests.outputs.parquet import FORMATS
+from tests.sentences import assert_one_sentence
 
 
 @pytest.fixture
@@ -159,9 +160,7 @@ def test_bad_usage_is_one_sentence_and_exits_2(arguments: list[str], words: str,
     assert main(arguments) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.startswith("error: ")
-    assert words in err
-    assert err.count("\n") == 1
+    assert_one_sentence(err, words)
 
 
 SQUARE = "G21 G90\nG61\nF3000\nG1 X20\nG1 Y20\nG1 X0\nG1 Y0\nM2\n"
@@ -259,9 +258,7 @@ def test_a_file_that_is_no_program_is_one_sentence_and_writes_nothing(
     assert main([command, str(file), *(["-o", str(out)] if command == "plan" else [])]) == 2
     printed, err = capsys.readouterr()
     assert printed == ""
-    assert err.startswith("error: ")
-    assert "a.ngc" in err
-    assert err.count("\n") == 1
+    assert_one_sentence(err, "a.ngc")
     assert not out.exists()
 
 

@@ -102,7 +102,7 @@ def test_random_curves_are_certified(weights: bool) -> None:
         curve = random_curve(seed, weights)
         limits = np.exp(rng.uniform(0.0, 3.0, curve.axes)), np.exp(rng.uniform(0.0, 5.0, curve.axes))
         problem = problem_along(path_along(curve, feed=np.exp(rng.uniform(0.0, 3.0))), *limits)
-        gaps.append(gap(problem, SpeedProfile.of(_solvers.plan_bang_bang(problem))))
+        gaps.append(gap(problem, plan(problem)))
         assert gaps[-1] > -1e-9, seed
     assert np.median(gaps) < 1e-4
     assert max(gaps) < 1e-3

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
+from feedplan.planners.bang_bang import plan
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, Setpoints
 from tests.along import path_along, problem_along, profile_of
@@ -31,11 +31,6 @@ Array = NDArray[np.float64]
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)
 BUTTERFLY = FilePath(__file__).parents[1] / "benchmarks" / "curves" / "butterfly.json"
 RATES = ("position", "velocity", "acceleration", "jerk")
-
-
-def planned(problem: Problem) -> SpeedProfile:
-    """The fastest profile from rest to rest."""
-    return SpeedProfile.of(plan_bang_bang(problem))
 
 
 def random_problem(seed: int, degree: int | None = None, rational: bool = True) -> Problem:
@@ -158,7 +153,7 @@ def test_an_axis_that_turns_round_keeps_its_acceleration(interpolator: str, rati
 @pytest.mark.parametrize("seed", range(8))
 def test_a_higher_degree_changes_no_setpoint(interpolator: str, seed: int) -> None:
     problem = random_problem(seed, degree=2, rational=False)
-    profile = planned(problem)
+    profile = plan(problem)
     period = profile.time / 397.3
     plain = Setpoints(problem, profile, period, interpolator).all()
     for degree in range(3, 10):
@@ -185,7 +180,7 @@ def arcs_of(chunk: SetpointChunk, profile: SpeedProfile) -> NDArray[np.int64]:
 @given(seed=st.integers(0, 2**32 - 1), rational=st.booleans())
 def test_planned_curves_are_sampled_within_their_limits(interpolator: str, seed: int, rational: bool) -> None:
     problem = random_problem(seed, rational=rational)
-    profile = planned(problem)
+    profile = plan(problem)
     period = profile.time / 397.3
     stream = Setpoints(problem, profile, period, interpolator)
     chunk = stream.all()
@@ -262,7 +257,7 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
 @given(seed=st.integers(0, 2**32 - 1))
 def test_time_and_place_agree_with_integration(seed: int) -> None:
     problem = random_problem(seed)
-    profile, curve = planned(problem), problem.curve
+    profile, curve = plan(problem), problem.curve
     chunk = Setpoints(problem, profile, profile.time / 97.3).all()
     arc = arcs_of(chunk, profile)
     starts = np.cumsum(profile.duration) - profile.duration
@@ -312,7 +307,7 @@ def test_the_butterfly_is_followed_to_its_end(interpolator: str) -> None:
     curve = CompositeCurve.from_nurbs(data["control_points"], data["knots"], data["degree"], data["weights"])
     problem = problem_along(path_along(curve), 250.0)
     problem = replace(problem, max_acceleration=np.full(2, 3000.0), feed=np.full(len(curve), 200.0))
-    profile = planned(problem)
+    profile = plan(problem)
     for period in (1e-4, 1e-3, 1e-2):
         chunk = Setpoints(problem, profile, period, interpolator).all()
         assert np.abs(np.diff(chunk.position, 2, axis=0)).max() <= 3000 * period**2 * (1 + 1e-5)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feedplan.audit.worst import Findings
+from feedplan.units import finite
 
 # A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
 # long paths (some 1e-10) and means nothing to a machine.
@@ -105,10 +106,10 @@ class LimitCheck:
         """The numbers by name; what is not finite is None."""
         return {
             "ok": self.ok,
-            "worst": _finite(self.worst),
-            "limit": _finite(self.limit),
-            "ratio": _finite(self.ratio),
-            "time": _finite(self.time),
+            "worst": finite(self.worst),
+            "limit": finite(self.limit),
+            "ratio": finite(self.ratio),
+            "time": finite(self.time),
             "line": self.line,
             "judged": self.judged,
         }
@@ -237,7 +238,3 @@ def _worst(checks: Iterable[LimitCheck], axes: tuple[str, ...]) -> tuple[LimitCh
     order, of_axis = list(_KINDS), (None, *axes)
     keys = sorted(worst, key=lambda key: (order.index(key[0]), of_axis.index(key[1])))
     return tuple(worst[key] for key in keys)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -19,6 +19,7 @@ from feedplan.report.limits import drawn_phases, limit_samples, samples_per_phas
 from feedplan.report.reduce import Envelope
 from feedplan.report.tool_path import POINTS, ToolPath
 from feedplan.setpoints import SetpointChunk
+from feedplan.units import finite
 
 # Points kept. The page draws a few thousand of them at once, and the finer ones when it is zoomed.
 _TIME_POINTS = 240_000  # all curves over time together
@@ -129,7 +130,7 @@ def chart_data(
 ) -> dict[str, Any]:
     """All data that a page draws, with its arrays; `length` is the result of `over_length`."""
     limits = {
-        name: [float(value) if np.isfinite(value) else None for value in getattr(problem, f"max_{name}")]
+        name: [finite(float(value)) for value in getattr(problem, f"max_{name}")]
         for name in ("velocity", "acceleration", "jerk")
     }
     least = {name: getattr(problem, f"min_{name}").tolist() for name in ("velocity", "acceleration")}

@@ -11,7 +11,7 @@ from feedplan.audit import Audit, LimitCheck
 from feedplan.report.account import Account, Total
 from feedplan.report.losses import Share, SlowLine
 from feedplan.report.stops import Stops
-from feedplan.units import duration_text, mm_per_min, ratio_text, tolerance_text
+from feedplan.units import counted, duration_text, mm_per_min, ratio_text, tolerance_text
 
 # Limits of the machine and the program; all other checks are checks of consistency.
 _OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
@@ -75,7 +75,7 @@ def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
         ("Length", *length, turned or f"{summary['pieces']} pieces"),
         ("Mean speed", *mean, by_minute),
-        ("Stops on the length", str(summary["stops"]), "", _counted(summary["runs"], "run")),
+        ("Stops on the length", str(summary["stops"]), "", counted(summary["runs"], "run")),
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
     ]
     if bound is not None:
@@ -176,7 +176,7 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
     if gain:
         rows.append(("Time along the path as fitted", duration_text(float(gain["times"][0]))))
         rows.append(("… gained by fits to the speed", f"{_short(gain['gained'])} s"))
-    rows.append(("Pieces planned", f"{summary['pieces']} in {_counted(summary['runs'], 'run')}"))
+    rows.append(("Pieces planned", f"{summary['pieces']} in {counted(summary['runs'], 'run')}"))
     compute = summary.get("compute") or {}
     rows += [(f"Time to {name}", duration_text(float(seconds))) for name, seconds in compute.items()]
     body = "".join(f'<tr><td>{escape(name)}</td><td class="n">{value}</td></tr>' for name, value in rows)
@@ -285,10 +285,6 @@ def _percent(ratio: float) -> str:
 
 def _short(value: float) -> str:
     return "0" if abs(value) < 1e-9 else f"{value:.3g}"
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _length(length: float, unit: str) -> tuple[str, str]:

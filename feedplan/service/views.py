@@ -16,6 +16,7 @@ from feedplan.machine.machine import Machine
 from feedplan.plan_folder import SUMMARY_FILE
 from feedplan.service.refusals import STATE, Refusal
 from feedplan.service.store import Record, Store
+from feedplan.units import finite
 
 _PARTS = ("events", "result", "audit", "setpoints", "program", "report", "drawing", "cancel")
 
@@ -90,7 +91,7 @@ def machine(known: Machine) -> dict[str, Any]:
     """A machine with its limits and its whole file."""
     return {
         **{name: getattr(known, name) for name in ("name", "period", "kinematics")},
-        "chord_tolerance": _finite(known.chord_tolerance),
+        "chord_tolerance": finite(known.chord_tolerance),
         "axes": [_axis(axis) for axis in known.axes],
         "controller": known.controller
         and {"name": known.controller.name, "parameters": dict(known.controller.parameters)},
@@ -110,8 +111,4 @@ def _axis(axis: Axis) -> dict[str, Any]:
     }
     travel = list(axis.travel) if all(map(math.isfinite, axis.travel)) else None
     limits = {name: list(limit) if isinstance(limit, tuple) else limit for name, limit in row.items()}
-    return {**limits, "max_jerk": _finite(axis.max_jerk), "travel": travel}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return {**limits, "max_jerk": finite(axis.max_jerk), "travel": travel}

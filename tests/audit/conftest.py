@@ -84,18 +84,6 @@ def planned(problem: Problem, machine: Machine, program: Program | None = None) 
     return Case(problem, profile, machine, program, Setpoints(problem, profile, problem.period).all())
 
 
-@pytest.fixture
-def changed() -> Callable[..., NDArray[Any]]:
-    """A copy of an array with one element replaced by a value or by a function of it."""
-
-    def change(array: NDArray[Any], place: Any, value: Any) -> NDArray[Any]:
-        copy = array.copy()
-        copy[place] = value(copy[place]) if callable(value) else value
-        return copy
-
-    return change
-
-
 @pytest.fixture(scope="session")
 def part(tmp_path_factory: pytest.TempPathFactory) -> Case:
     """Curve, corner, arc, helix, pause and exact stop on a mill that is slow in Z."""

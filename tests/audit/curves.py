@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
@@ -22,11 +21,6 @@ def machine_of(problem: Problem, jump: float = 0.0) -> Machine:
     """Axes with the limits of the problem."""
     limits = zip(problem.axes, problem.max_velocity, problem.max_acceleration, strict=True)
     return Machine("own", tuple(Axis(name, v, a, max_velocity_jump=jump) for name, v, a in limits))
-
-
-def planned(problem: Problem) -> SpeedProfile:
-    """The exact profile on pieces of any degree."""
-    return SpeedProfile.of(plan_bang_bang(problem))
 
 
 def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:

@@ -21,6 +21,13 @@ def broken(result: Audit) -> set[tuple[str, str | None]]:
     return {(check.name, check.axis) for check in result.broken}
 
 
+def changed(array: NDArray[Any], place: Any, value: Any) -> NDArray[Any]:
+    """A copy of an array with one element replaced by a value, or by a function of it."""
+    copy = array.copy()
+    copy[place] = value(copy[place]) if callable(value) else value
+    return copy
+
+
 def faster(profile: SpeedProfile, factor: float = 1.001) -> SpeedProfile:
     """The whole profile at p times `factor`, with the durations to it."""
     return replace(

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Cut
@@ -50,11 +49,6 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
         cut=Cut(curve, found.piece, found.part),
     )
     return problem if not changes else type(problem)(**{**vars(problem), **changes})
-
-
-def planned_joints(problem: Problem) -> SpeedProfile:
-    """The exact profile of the joints' limits alone."""
-    return SpeedProfile.of(plan_bang_bang(problem))
 
 
 def steady(problem: Problem, p: float) -> SpeedProfile:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -20,14 +19,14 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
+from feedplan.planners.bang_bang import plan
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.program.program import MoveKind, Program
 from tests.along import FREE, path_along, problem_along
-from tests.audit.curves import machine_of, planned, sampled
-from tests.audit.faults import STRANGE, broken, faster, rubbish
+from tests.audit.curves import machine_of, sampled
+from tests.audit.faults import STRANGE, broken, changed, faster, rubbish
 
 Array = NDArray[np.float64]
-Change = Callable[..., NDArray[Any]]
 SPEED_LINE = PhaseLaw.SPEED_LINE
 
 
@@ -75,7 +74,7 @@ def test_the_same_plan_in_another_form_measures_the_same(part: Any, other: Any) 
 
 
 @pytest.mark.parametrize("arc", [0, 7, 40, -1])
-def test_p_scaled_on_one_arc_is_a_jump_there(other: Any, changed: Change, arc: int) -> None:
+def test_p_scaled_on_one_arc_is_a_jump_there(other: Any, arc: int) -> None:
     profile = other.profile
     arc = arc % len(profile)
     scaled = {name: changed(getattr(profile, name), arc, lambda p: 1.001 * p) for name in ("p0", "p1")}
@@ -84,7 +83,7 @@ def test_p_scaled_on_one_arc_is_a_jump_there(other: Any, changed: Change, arc: i
     assert other.start(arc) - 1e-9 <= worst.time <= other.start(arc + 1) + 1e-9
 
 
-def test_every_way_of_breaking_a_profile_is_named(other: Any, changed: Change) -> None:
+def test_every_way_of_breaking_a_profile_is_named(other: Any) -> None:
     profile, problem = other.profile, other.problem
     arc = int(np.flatnonzero((profile.kind == PhaseLaw.AXIS_ACCELERATION) & (profile.p0 != profile.p1))[8])
     assert ("duration", None) in broken(
@@ -109,7 +108,7 @@ def test_every_way_of_breaking_a_profile_is_named(other: Any, changed: Change) -
     assert broken(other.with_problem(junction_speed=junction).audit()) == {("junction", None)}
 
 
-def test_a_setpoint_off_its_place_is_found(other: Any, changed: Change) -> None:
+def test_a_setpoint_off_its_place_is_found(other: Any) -> None:
     points = other.points
     row = 40 + int(np.argmax(np.linalg.norm(points.velocity[40:], axis=1) > 20.0))
     along = points.velocity[row] / np.linalg.norm(points.velocity[row])
@@ -120,7 +119,7 @@ def test_a_setpoint_off_its_place_is_found(other: Any, changed: Change) -> None:
         assert (check.time, check.line) == (pytest.approx(points.t[row]), points.line[row])
 
 
-def test_a_piece_off_the_program_or_its_neighbour_is_found(other: Any, changed: Change) -> None:
+def test_a_piece_off_the_program_or_its_neighbour_is_found(other: Any) -> None:
     curve, piece = other.path.curve, 12
     line = other.path.line[piece]
     inner = changed(
@@ -183,7 +182,7 @@ def test_random_splines_pass_and_a_thousandth_faster_fail(seed: int, weights: bo
     if curve.degree.max() == 1:
         # Corners: every junction is a stop.
         problem.junction_speed[:] = 0.0
-    profile, machine = planned(problem), machine_of(problem)
+    profile, machine = plan(problem), machine_of(problem)
     assert audit(problem, profile, machine).failures == ()
     assert not audit(problem, faster(profile), machine).ok
     scaled = replace(profile, p0=profile.p0 * 1.001, p1=profile.p1 * 1.001)
@@ -195,7 +194,7 @@ def lap(chord_tolerance: float = math.inf) -> tuple[Problem, SpeedProfile]:
     problem = problem_along(
         path_along(circle([0.0, 0.0], 10.0)), FREE, 3000.0, chord_tolerance=chord_tolerance
     )
-    return problem, planned(problem)
+    return problem, plan(problem)
 
 
 def test_a_circle_has_the_sagitta_of_its_radius() -> None:
@@ -215,7 +214,7 @@ def test_arcs_along_a_line_of_speed_are_measured() -> None:
     points = np.array([[0.0, 0.0], [6.0, 9.0], [-3.0, 9.0], [8.0, -2.0], [12.0, 4.0]])
     curve = CompositeCurve.from_bezier(points, width=15.0)
     problem = problem_along(path_along(curve, feed=400.0), 1e4, 1e5, chord_tolerance=1e-4)
-    profile = planned(problem)
+    profile = plan(problem)
     lines = np.flatnonzero(profile.kind == SPEED_LINE)
     assert len(lines) > 3
     machine = machine_of(problem)
@@ -235,7 +234,7 @@ def test_setpoints_on_curves_are_followed(form: str) -> None:
     else:
         points = np.array([[0.0, 0.0], [6.0, 9.0], [-3.0, 9.0], [8.0, -2.0]])
         problem = problem_along(path_along(CompositeCurve.from_bezier(points, width=15.0)), 1e4, 3000.0)
-        profile = planned(problem)
+        profile = plan(problem)
     machine, points_ = machine_of(problem), sampled(problem, profile)
     assert audit(problem, profile, machine, None, [points_]).failures == ()
     assert audit(problem, None, machine, None, [points_]).failures == ()
@@ -264,7 +263,7 @@ def test_the_travel_is_kept_inside_a_piece_too() -> None:
     half = CompositeCurve.from_bezier([[1, 0], [1, 2], [-1, 2], [-1, 0]], [1, 1 / 3, 1 / 3, 1], 3.0)
     bent = problem_along(path_along(half), 1e4, 1e4)
     axes = (Axis("X", 1e4, 1e4), Axis("Y", 1e4, 1e4, travel=(-0.999, 0.999)))
-    result = audit(bent, planned(bent), Machine("own", axes))
+    result = audit(bent, plan(bent), Machine("own", axes))
     assert broken(result) == {("travel", "Y")}
     assert result.check("travel", "Y").worst == pytest.approx(1.0, abs=1e-12)
 
@@ -369,7 +368,7 @@ def along_a_line(*pieces: tuple[float, ...]) -> CompositeCurve:
 
 def test_an_infinite_p_is_refused() -> None:
     problem = problem_along(path_along(along_a_line((0, 10), (10, 20)), feed=50.0), [500.0, 400.0], 1000.0)
-    profile, machine = planned(problem), machine_of(problem)
+    profile, machine = plan(problem), machine_of(problem)
     assert audit(problem, profile, machine).ok
     for name in ("p0", "p1"):
         column = getattr(profile, name).copy()

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from feedplan.audit import audit
 from feedplan.constraints.problem import Problem
@@ -19,9 +17,8 @@ from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, Program
 from tests.along import path_along, problem_along
-from tests.audit.faults import broken
+from tests.audit.faults import broken, changed
 
-Change = Callable[..., NDArray[Any]]
 PLANE = Machine("plane", (Axis("X", 100.0, 1000.0), Axis("Y", 100.0, 1000.0)))
 
 
@@ -166,9 +163,7 @@ def test_a_path_with_a_gap_or_other_ends_is_found() -> None:
 
 
 @pytest.mark.parametrize("piece", [5, 30, -2])
-def test_a_control_point_moved_by_twice_the_tolerance_is_found(
-    part: Any, changed: Change, piece: int
-) -> None:
+def test_a_control_point_moved_by_twice_the_tolerance_is_found(part: Any, piece: int) -> None:
     piece = piece % len(part.path)
     tolerance = part.path.tolerance[piece]
     for corner in (0, 2):
@@ -184,7 +179,7 @@ def test_a_control_point_moved_by_twice_the_tolerance_is_found(
     assert "jump" in {name for name, _ in broken(result)}
 
 
-def test_another_program_is_not_the_one_that_is_followed(part: Any, changed: Change) -> None:
+def test_another_program_is_not_the_one_that_is_followed(part: Any) -> None:
     assert part.program is not None
     for move in (7, 40, 61):
         target = changed(part.program.target, (move, 1), lambda y: y + 0.05)
@@ -195,7 +190,7 @@ def test_another_program_is_not_the_one_that_is_followed(part: Any, changed: Cha
     assert not part.with_program(arc_angle=-part.program.arc_angle).audit().ok
 
 
-def test_pieces_that_follow_other_moves_than_they_say_are_found(part: Any, changed: Change) -> None:
+def test_pieces_that_follow_other_moves_than_they_say_are_found(part: Any) -> None:
     moves = changed(part.path.move, 10, part.path.move[40])
     assert ("deviation", None) in broken(part.with_path(move=moves).audit())
     beyond = changed(part.path.move, 10, np.array([10**6, 10**6]))

@@ -19,11 +19,12 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import derivatives
+from feedplan.planners import bang_bang
 from feedplan.profile import OF_PHASES, PhaseLaw, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 from tests.audit.curves import places_at, sampled
-from tests.audit.faults import broken, faster, rubbish
-from tests.audit.joints import joint_problem, planned_joints, steady
+from tests.audit.faults import broken, changed, faster, rubbish
+from tests.audit.joints import joint_problem, steady
 
 Array = NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class Case:
 
     def __init__(self, machine: Machine, problem: Problem) -> None:
         self.machine, self.problem = machine, problem
-        self.profile = planned_joints(problem)
+        self.profile = bang_bang.plan(problem)
         self.points = sampled(problem, self.profile)
 
     def audit(self, chunks: Any = None, profile: SpeedProfile | None = None, **changes: Any) -> Audit:
@@ -154,12 +155,6 @@ def test_the_planners_stand_ins_are_never_asked(case: Case) -> None:
     assert joints is not None
     wrong = replace(joints, control_points=joints.control_points * 1.5)
     assert case.audit(joints=wrong).failures == ()
-
-
-def changed(array: NDArray[Any], place: int, value: Any) -> NDArray[Any]:
-    copy = array.copy()
-    copy[place] = value(copy[place]) if callable(value) else value
-    return copy
 
 
 def test_every_way_of_breaking_a_profile_is_named(case: Case) -> None:
@@ -297,7 +292,7 @@ def test_a_stop_with_a_pause_may_wait_for_the_next_period() -> None:
         way.path, runs=np.array([0, half, count]), dwell=np.array([0.0203, 0.0]), start_dwell=0.005
     )
     problem = replace(way, path=path, words=way.words * 2, junction_speed=stop)
-    profile = planned_joints(problem)
+    profile = bang_bang.plan(problem)
     time = profile.run_times
     first = int(np.ceil((time[0] + 0.0203) / 1e-3 - 1e-9))
     second = int(np.ceil(time[1] / 1e-3 - 1e-9))
@@ -401,7 +396,7 @@ def test_the_chord_error_is_that_of_the_tip() -> None:
 def test_the_travel_is_that_of_the_joints() -> None:
     machine = wide("cylindrical")
     problem = joint_problem(machine, "XYZ", past_the_column())
-    profile = planned_joints(problem)
+    profile = bang_bang.plan(problem)
 
     def limited(name: str, least: float, most: float) -> Machine:
         axes = tuple(replace(a, travel=(least, most)) if a.name == name else a for a in machine.axes)
@@ -443,6 +438,6 @@ def test_a_corner_of_the_joints_needs_the_jump_that_the_machine_allows() -> None
 def test_random_paths_of_a_trunnion_pass_and_a_thousandth_faster_fail(seed: int) -> None:
     machine = wide("trunnion-ac")
     problem = joint_problem(machine, "XYZAC", wavy(seed), coordinate_mode=CoordinateMode.TIP)
-    profile = planned_joints(problem)
+    profile = bang_bang.plan(problem)
     assert audit(problem, profile, machine).failures == ()
     assert not audit(problem, faster(profile), machine).ok

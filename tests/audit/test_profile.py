@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -21,9 +20,7 @@ from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.profile import PhaseLaw, SpeedProfile
 from tests.along import path_along, problem_along, profile_of
-from tests.audit.faults import STRANGE, broken, rubbish
-
-Change = Callable[..., NDArray[Any]]
+from tests.audit.faults import STRANGE, broken, changed, rubbish
 
 
 def plane(*max_velocity_jump: float) -> Machine:
@@ -131,9 +128,7 @@ def test_right_plans_pass_large_and_small_near_and_far(
 
 
 @pytest.mark.parametrize("names", ["X", "XY", "XYZA", "XYZAB", "XYZABC"])
-def test_every_number_of_axes_is_audited_and_each_by_its_own_limit(
-    spline: Any, changed: Change, names: str
-) -> None:
+def test_every_number_of_axes_is_audited_and_each_by_its_own_limit(spline: Any, names: str) -> None:
     axes = tuple(Axis(name, 300.0, 800.0 + 100.0 * k) for k, name in enumerate(names))
     case = spline(Machine("many", axes, 0.001, 0.01), 1)
     result = case.audit()
@@ -154,7 +149,7 @@ def test_a_part_with_arcs_corners_pauses_and_stops_passes(part: Any) -> None:
 
 
 @pytest.mark.parametrize("arc", [0, 7, 40, -1])
-def test_p_scaled_on_one_arc_is_a_jump_there(part: Any, changed: Change, arc: int) -> None:
+def test_p_scaled_on_one_arc_is_a_jump_there(part: Any, arc: int) -> None:
     profile = part.profile
     arc = arc % len(profile)
     case = part.with_profile(
@@ -171,9 +166,7 @@ def test_p_scaled_on_one_arc_is_a_jump_there(part: Any, changed: Change, arc: in
 
 @pytest.mark.parametrize("field", ["value", "u0", "u1", "p0", "p1", "duration"])
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
-def test_bad_numbers_in_the_profile_are_never_fine(
-    part: Any, changed: Change, field: str, bad: float
-) -> None:
+def test_bad_numbers_in_the_profile_are_never_fine(part: Any, field: str, bad: float) -> None:
     arc = len(part.profile) // 2
     result = part.with_profile(**{field: changed(getattr(part.profile, field), arc, bad)}).audit()
     assert not result.ok
@@ -206,14 +199,14 @@ def test_a_profile_that_ends_early_is_not_the_whole_path(part: Any) -> None:
     assert result.check("order").line == part.path.line[-1]
 
 
-def test_runs_that_are_not_those_of_the_path_are_found(part: Any, changed: Change) -> None:
+def test_runs_that_are_not_those_of_the_path_are_found(part: Any) -> None:
     runs = changed(part.profile.runs, 1, lambda offset: offset + 1)
     assert ("order", None) in broken(part.with_profile(runs=runs).audit())
     assert ("order", None) in broken(part.with_profile(runs=part.profile.runs[:-1]).audit())
 
 
 @pytest.mark.parametrize("arc", [3, 30])
-def test_a_wrong_duration_is_found(part: Any, changed: Change, arc: int) -> None:
+def test_a_wrong_duration_is_found(part: Any, arc: int) -> None:
     for error in (1e-5, -1e-5, 0.5):
         duration = changed(part.profile.duration, arc, lambda time, error=error: time * (1 + error))
         result = part.with_profile(duration=duration).audit()
@@ -222,14 +215,14 @@ def test_a_wrong_duration_is_found(part: Any, changed: Change, arc: int) -> None
         assert result.check("duration").worst == pytest.approx(abs(error), rel=1e-3)
 
 
-def test_another_constant_on_an_arc_is_found(part: Any, changed: Change) -> None:
+def test_another_constant_on_an_arc_is_found(part: Any) -> None:
     for arc in np.flatnonzero(part.profile.kind == PhaseLaw.AXIS_ACCELERATION)[[1, 8, 15]]:
         value = changed(part.profile.value, arc, lambda a: 1.01 * a)
         names = {name for name, _ in broken(part.with_profile(value=value).audit())}
         assert {"acceleration", "jump"} <= names
 
 
-def test_another_kind_or_axis_of_an_arc_is_found(part: Any, changed: Change) -> None:
+def test_another_kind_or_axis_of_an_arc_is_found(part: Any) -> None:
     profile = part.profile
     curved = np.flatnonzero((profile.kind == PhaseLaw.AXIS_ACCELERATION) & (profile.p0 != profile.p1))
     for arc in curved[[1, 8, 15]]:
@@ -304,7 +297,7 @@ def test_a_jump_of_speed_between_pieces_is_found_even_where_the_machine_may_jump
     assert ("jump", "X") in broken(audit(problem, profile_of(*arcs), plane()))
 
 
-def test_every_lowered_limit_is_the_one_that_is_named(part: Any, changed: Change) -> None:
+def test_every_lowered_limit_is_the_one_that_is_named(part: Any) -> None:
     base = part.audit()
     for name, field in (("acceleration", "max_acceleration"), ("velocity", "max_velocity")):
         for k, axis in enumerate("XYZ"):
@@ -322,7 +315,7 @@ def test_every_lowered_limit_is_the_one_that_is_named(part: Any, changed: Change
             assert result.check(name, axis).time == pytest.approx(worst.time)
 
 
-def test_a_feed_exceeded_on_one_line_is_found_on_that_line(part: Any, changed: Change) -> None:
+def test_a_feed_exceeded_on_one_line_is_found_on_that_line(part: Any) -> None:
     for piece in (10, 30, len(part.path) - 1):
         feed = part.problem.feed
         slower = changed(feed, piece, 1.0)
@@ -378,7 +371,7 @@ def test_limits_that_are_no_numbers_fail() -> None:
     assert not audit(problem_of(LINE, feed=np.array([math.nan])), TRAPEZOID, plane()).ok
 
 
-def test_the_verdict_is_plain_json(part: Any, changed: Change) -> None:
+def test_the_verdict_is_plain_json(part: Any) -> None:
     good = json.loads(json.dumps(part.audit().to_json(), allow_nan=False))
     assert good["ok"] is True
     assert good["failures"] == []

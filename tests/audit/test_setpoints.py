@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -20,9 +19,7 @@ from feedplan.machine.machine import Machine
 from feedplan.planners import planner
 from feedplan.setpoints import Setpoints
 from tests.along import path_along
-from tests.audit.faults import broken
-
-Change = Callable[..., NDArray[Any]]
+from tests.audit.faults import broken, changed
 
 
 def moving(part: Any, row: int) -> int:
@@ -66,7 +63,7 @@ def test_another_period_than_the_machines_passes(part: Any) -> None:
 
 
 @pytest.mark.parametrize("start", [40, 400, 700])
-def test_a_setpoint_shifted_by_a_micrometre_is_found(part: Any, changed: Change, start: int) -> None:
+def test_a_setpoint_shifted_by_a_micrometre_is_found(part: Any, start: int) -> None:
     row = moving(part, start)
     along = part.points.velocity[row] / np.linalg.norm(part.points.velocity[row])
     across = np.cross(along, [0.0, 0.0, 1.0])
@@ -91,7 +88,7 @@ def test_two_setpoints_swapped_are_found(part: Any) -> None:
     assert {("place", None), ("grid", None)} <= broken(part.rows(lambda column: column[order]).audit())
 
 
-def test_a_step_backwards_is_found_even_on_the_path_and_without_a_profile(part: Any, changed: Change) -> None:
+def test_a_step_backwards_is_found_even_on_the_path_and_without_a_profile(part: Any) -> None:
     row = moving(part, 100)
     position = changed(part.points.position, row, part.points.position[row - 2])
     case = part.with_points(position=position)
@@ -130,7 +127,7 @@ def test_faster_setpoints_break_the_limits_of_the_slower_machine(spline: Any) ->
     assert result.check("velocity", "X").ratio == pytest.approx(ratio, rel=1e-9)
 
 
-def test_a_feed_exceeded_by_the_setpoints_of_one_line_is_found_there(spline: Any, changed: Change) -> None:
+def test_a_feed_exceeded_by_the_setpoints_of_one_line_is_found_there(spline: Any) -> None:
     case = spline(Machine.load("mill"), 2, feed=30.0)
     feed = changed(case.problem.feed, 30, 29.9)
     result = audit(replace(case.problem, feed=feed), None, case.machine, None, case.chunks(1000))
@@ -141,9 +138,7 @@ def test_a_feed_exceeded_by_the_setpoints_of_one_line_is_found_there(spline: Any
 
 @pytest.mark.parametrize("column", ["t", "position", "velocity", "acceleration"])
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_bad_numbers_in_the_setpoints_are_never_fine(
-    part: Any, changed: Change, column: str, bad: float
-) -> None:
+def test_bad_numbers_in_the_setpoints_are_never_fine(part: Any, column: str, bad: float) -> None:
     for row in (0, 500, len(part.points.t) - 1):
         values = getattr(part.points, column)
         place = row if values.ndim == 1 else (row, 1)
@@ -162,7 +157,7 @@ def test_setpoints_left_out_are_found(part: Any) -> None:
         assert ("place", None) in broken(part.rows(lambda column, keep=keep: column[keep]).audit())
 
 
-def test_uneven_times_are_found(part: Any, changed: Change) -> None:
+def test_uneven_times_are_found(part: Any) -> None:
     for error in (1e-8, -1e-8):
         t = changed(part.points.t, 300, lambda time, error=error: time + error)
         result = part.with_points(t=t).audit()
@@ -172,9 +167,7 @@ def test_uneven_times_are_found(part: Any, changed: Change) -> None:
     assert ("grid", None) in broken(part.with_points(t=part.points.t[::-1].copy()).audit())
 
 
-def test_recorded_velocities_and_accelerations_must_be_those_of_the_motion(
-    part: Any, changed: Change
-) -> None:
+def test_recorded_velocities_and_accelerations_must_be_those_of_the_motion(part: Any) -> None:
     row = moving(part, 100)
     k = int(np.abs(part.points.acceleration[row]).argmax())
     assert abs(part.points.acceleration[row, k]) > 100
@@ -185,7 +178,7 @@ def test_recorded_velocities_and_accelerations_must_be_those_of_the_motion(
         assert result.check(f"recorded_{name}", "XYZ"[k]).time == pytest.approx(part.points.t[row])
 
 
-def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any, changed: Change) -> None:
+def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any) -> None:
     # The path's own places are an eighth of a piece apart and a setpoint falls between two of them.
     row = moving(part, 100)
     assert part.program is not None
@@ -355,7 +348,7 @@ def test_recorded_columns_are_compared_where_there_are_any() -> None:
 
 
 @pytest.mark.parametrize("place", [(0, 0), (100, 1), (250, 0)])
-def test_a_nan_in_a_file_is_never_fine(changed: Change, place: tuple[int, int]) -> None:
+def test_a_nan_in_a_file_is_never_fine(place: tuple[int, int]) -> None:
     result = audit_setpoints(T, changed(STRAIGHT, place, math.nan), PLANE)
     assert ("numbers", None) in broken(result)
     assert not audit_setpoints(changed(T, 7, math.nan), STRAIGHT, PLANE).ok

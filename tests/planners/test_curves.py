@@ -13,11 +13,11 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.named import butterfly, lemniscate, trefoil
-from feedplan._solvers import PlanError, plan_bang_bang
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.profile import SpeedProfile
+from feedplan.planners.bang_bang import plan
 from tests.along import FREE, path_along, problem_along
 from tests.planners.excess import worst_excess
 
@@ -35,7 +35,7 @@ class Planned:
         self.velocity = np.broadcast_to(np.asarray(velocity, float), axes).copy()
         self.acceleration = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
         self.problem = problem_along(path_along(curve, feed=feed), self.velocity, self.acceleration)
-        self.profile = SpeedProfile.of(plan_bang_bang(self.problem))
+        self.profile = plan(self.problem)
         self.time = self.profile.time
 
 
@@ -105,16 +105,14 @@ def test_random_curves_keep_every_limit_and_use_one_everywhere(weights: bool) ->
 def test_limits_that_are_no_limits_are_refused(
     velocity: float, acceleration: float, feed: float, words: str
 ) -> None:
-    with pytest.raises(PlanError) as caught:
+    with pytest.raises(InputError, match=f"{words}$"):
         Planned(random_curve(0), velocity, acceleration, feed)
-    assert caught.value.args[3] == words
 
 
 def test_runs_that_do_not_divide_the_path_are_refused() -> None:
     problem = problem_along(path_along(CompositeCurve.from_bezier([[0.0], [1.0], [2.0]]), feed=1.0), 1.0, 1.0)
-    with pytest.raises(PlanError) as caught:
-        plan_bang_bang(replace(problem, path=replace(problem.path, runs=np.array([0]))))
-    assert "the runs do not divide the 1 pieces" in caught.value.args[3]
+    with pytest.raises(InputError, match="the runs do not divide the 1 pieces"):
+        plan(replace(problem, path=replace(problem.path, runs=np.array([0]))))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -130,7 +128,7 @@ def test_quadratics_among_pieces_of_elevated_degree_take_the_same_time(seed: int
     limits = np.exp(rng.uniform(0.0, 3.0, 3)), np.exp(rng.uniform(0.0, 5.0, 3))
     feed = float(np.exp(rng.uniform(0.0, 3.0)))
     problem = problem_along(path_along(mixed, feed=feed), *limits)
-    profile = SpeedProfile.of(plan_bang_bang(problem))
+    profile = plan(problem)
     assert profile.time == pytest.approx(Planned(curve, *limits, feed).time, rel=1e-11)
     excess, use = worst_excess(problem, profile)
     assert excess <= 1e-8
@@ -151,7 +149,7 @@ def test_a_flying_lap_of_a_circle_by_hand() -> None:
     problem = problem_along(path_along(curve), FREE, a)
     speed = float(np.sqrt(a * r))
     flying = replace(problem, start_speed=speed, end_speed=speed)
-    time = SpeedProfile.of(plan_bang_bang(flying)).time
+    time = plan(flying).time
     assert time == pytest.approx(8 * np.sqrt((2 - np.sqrt(2)) * r / a), rel=1e-12)
 
 
@@ -167,7 +165,7 @@ def test_a_cusp_and_a_jump_of_parameter_speed_change_nothing_that_they_should_no
     time = Planned(line, 40.0, 500.0).time
     assert time == pytest.approx(10 / 40 + 40 / 500, rel=1e-12)
     along = problem_along(Path.from_curve(slow, feed=FREE), 40.0, 500.0)
-    assert SpeedProfile.of(plan_bang_bang(along)).time == pytest.approx(time, rel=1e-10)
+    assert plan(along).time == pytest.approx(time, rel=1e-10)
     # A semicubical parabola turns back in its cusp: both halves from rest to rest.
     whole = CompositeCurve.from_bezier([[-8.0, 4.0], [8.0, -4.0], [-8.0, -4.0], [8.0, 4.0]])
     assert whole.cusps().u.tolist() == [0.5]

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
+from feedplan.planners.bang_bang import plan
 from feedplan.planning import rounding_stops
-from feedplan.profile import PhaseLaw, SpeedProfile
+from feedplan.profile import PhaseLaw
 from feedplan.setpoints import Setpoints
 from tests.along import problem_along
 from tests.campaign import seeds
@@ -54,7 +54,7 @@ def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed
 def time_of(curve: CompositeCurve, acceleration: float | Array = 100.0, feed: float = 1e9) -> float:
     axes = curve.axes
     limit = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
-    return SpeedProfile.of(plan_bang_bang(problem_of(curve, np.full(axes, 1e9), limit, feed))).time
+    return plan(problem_of(curve, np.full(axes, 1e9), limit, feed)).time
 
 
 @pytest.mark.parametrize("place", [0.0, 0.3, 0.5, 0.7123456789, 1.0])
@@ -112,7 +112,7 @@ def random_curve(seed: int) -> tuple[CompositeCurve, Array, Array, float]:
 
 def test_a_stop_for_rounding_is_told_with_its_line() -> None:
     problem = problem_of(with_cusp(2, 0.5, np.array([3.0, -1.0])), np.ones(2), np.ones(2), 1.0)
-    profile = SpeedProfile.of(plan_bang_bang(problem))
+    profile = plan(problem)
     assert rounding_stops(problem, profile) == ()
     (sentence,) = rounding_stops(problem, replace(profile, slowed=np.zeros(2, dtype=np.uint32)))
     assert sentence.startswith(
@@ -123,26 +123,26 @@ def test_a_stop_for_rounding_is_told_with_its_line() -> None:
 def test_a_curve_that_all_but_rests_inside_keeps_its_limits_there() -> None:
     # Both tangents fall to 1e-12 of their greatest without turning round.
     problem = problem_of(*random_curve(3705))
-    assert worst_excess(problem, SpeedProfile.of(plan_bang_bang(problem)))[0] <= 1e-8
+    assert worst_excess(problem, plan(problem))[0] <= 1e-8
 
 
 @pytest.mark.parametrize("seed", [3422, 5957, 10814, 11046])
 def test_limits_that_floats_cannot_judge_next_to_a_cusp_are_kept(seed: int) -> None:
     # All tangents fall to 1e-10 of their greatest or less: in floats most digits of C' and C'' are rounding.
     problem = problem_of(*random_curve(seed))
-    assert worst_excess_exactly(problem, SpeedProfile.of(plan_bang_bang(problem))) <= 1e-8
+    assert worst_excess_exactly(problem, plan(problem)) <= 1e-8
 
 
 @pytest.mark.parametrize("seed", [3452, 4253, 7517, 8833, 11396])
 def test_axes_that_turn_within_rounding_of_each_other_have_a_plan(seed: int) -> None:
     problem = problem_of(*random_curve(seed))
-    assert worst_excess(problem, SpeedProfile.of(plan_bang_bang(problem)))[0] <= 1e-8
+    assert worst_excess(problem, plan(problem))[0] <= 1e-8
 
 
 def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
     # A line through a cusp: its speed squared is rounding there, and halving it gains nothing.
     problem = problem_of(*random_curve(12790))
-    profile = SpeedProfile.of(plan_bang_bang(problem))
+    profile = plan(problem)
     feed = profile.kind == PhaseLaw.FEED
     start, end = (problem.path.curve.evaluate(profile.piece, u, 0)[0] for u in (profile.u0, profile.u1))
     ways = np.linalg.norm(end - start, axis=1)
@@ -152,7 +152,7 @@ def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
 @pytest.mark.parametrize("seed", [29, 61, 70, 138, 187, 341])
 def test_setpoints_through_turns_keep_every_limit(seed: int) -> None:
     problem = problem_of(*random_curve(seed))
-    profile = SpeedProfile.of(plan_bang_bang(problem))
+    profile = plan(problem)
     chunk = Setpoints(problem, profile, profile.time / 200, "sarfraz").all()
     assert (np.abs(chunk.velocity) <= problem.max_velocity * (1 + 1e-9)).all()
     assert (np.abs(chunk.acceleration) <= problem.max_acceleration * (1 + 1e-6)).all()
@@ -161,7 +161,7 @@ def test_setpoints_through_turns_keep_every_limit(seed: int) -> None:
 @pytest.mark.parametrize("seed", [29, 61, 70, 138, 187, 341])
 def test_no_arc_goes_on_where_its_axis_turns_round(seed: int) -> None:
     problem = problem_of(*random_curve(seed))
-    profile = SpeedProfile.of(plan_bang_bang(problem))
+    profile = plan(problem)
     rows = zip(profile.piece, profile.kind, profile.axis, profile.u0, profile.u1, strict=True)
     for piece, kind, axis, u0, u1 in rows:
         if kind == PhaseLaw.AXIS_ACCELERATION:
@@ -175,7 +175,7 @@ def test_random_curves_next_to_cusps_keep_every_limit() -> None:
     count = seeds(400)
     for seed in range(count):
         problem = problem_of(*random_curve(seed))
-        profile = SpeedProfile.of(plan_bang_bang(problem))
+        profile = plan(problem)
         assert np.isfinite(profile.time), seed
         excess = worst_excess(problem, profile)[0]
         if excess > 1e-8 and problem.curve.weights is None:
