@@ -3,29 +3,11 @@
 use std::time::Duration;
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
+use feedplan_checks::Random;
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::Problem;
 use feedplan_planner::Exact as _;
-
-/// A random number generator that is the same everywhere (splitmix64).
-struct Random(u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-}
 
 /// A C1 quadratic B-spline as a CAM system's points give it: edges of 0.3 to 3 mm, small turns, 8 % sharp ones.
 fn cam_path(count: usize, seed: u64) -> Vec<Quadratic<3>> {

@@ -7,7 +7,7 @@ use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 
 use super::axes::{padded, PADDED};
-use super::cases::Random;
+use super::random::Random;
 use super::regular_path::RegularPath;
 
 /// One piece: its control points and weights, and its parameter width.

@@ -11,11 +11,13 @@ pub mod curves;
 mod elevated;
 pub mod jerk;
 pub mod polylines;
+mod random;
 mod regular_path;
 pub mod wave;
 
 pub use audit::{audit, Audit};
 pub use axes::{padded, AXES, FEW_AXES, PADDED};
 pub use campaign::{assert_none, seeds};
-pub use cases::{milder_case, random_case, Case, Random};
+pub use cases::{milder_case, random_case, Case};
 pub use elevated::Elevated;
+pub use random::Random;

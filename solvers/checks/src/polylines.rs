@@ -1,5 +1,6 @@
 //! Random polylines, and measures of a fitted curve that are independent of the fit.
 
+use super::random::Random;
 use feedplan_geometry::spline::Piece;
 use feedplan_path::smooth_fit::polyline::Polyline;
 use feedplan_path::smooth_fit::Smooth;
@@ -75,34 +76,15 @@ pub fn dense<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>) -> f64 {
     worst
 }
 
-/// A linear congruential generator with mixed bits.
-pub struct Random(pub u64);
-
-impl Random {
-    /// In [0, 1).
-    pub fn draw(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let mut x = self.0;
-        x ^= x >> 33;
-        x = x.wrapping_mul(0xff51_afd7_ed55_8ccd);
-        x ^= x >> 33;
-        (x >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn either_way(&mut self) -> f64 {
-        2.0 * self.draw() - 1.0
-    }
-}
-
 /// A walk of random steps and turns below 135°.
 pub fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Vec<[f64; D]> {
     let mut points = vec![[0.0; D]];
     let mut way = [0.0; D];
     while points.len() <= chords {
-        let free: [f64; D] = std::array::from_fn(|_| random.either_way());
+        let free: [f64; D] = std::array::from_fn(|_| random.between(-1.0, 1.0));
         let next = free.map(|x| x / length(&free));
         if (0..D).map(|k| way[k] * next[k]).sum::<f64>() > -0.7 {
-            let (last, size) = (points[points.len() - 1], step * (0.05 + random.draw()));
+            let (last, size) = (points[points.len() - 1], step * (0.05 + random.uniform()));
             points.push(std::array::from_fn(|k| last[k] + size * next[k]));
             way = next;
         }
@@ -112,26 +94,26 @@ pub fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Ve
 
 /// A random polyline without reversals: a walk, a zigzag, noise on a curve, dense points, or all of them.
 pub fn random_polyline<const D: usize>(random: &mut Random) -> Vec<[f64; D]> {
-    let chords = 2 + (150.0 * random.draw().powi(2)) as usize;
-    let step = 10f64.powf(3.5 * random.draw() - 2.5);
-    let kind = (5.0 * random.draw()) as usize;
-    let noise = [0.0, 0.003, 0.3][(3.0 * random.draw()) as usize] * step;
-    let phase: [f64; D] = std::array::from_fn(|_| random.draw());
+    let chords = 2 + (150.0 * random.uniform().powi(2)) as usize;
+    let step = 10f64.powf(3.5 * random.uniform() - 2.5);
+    let kind = (5.0 * random.uniform()) as usize;
+    let noise = [0.0, 0.003, 0.3][(3.0 * random.uniform()) as usize] * step;
+    let phase: [f64; D] = std::array::from_fn(|_| random.uniform());
     let points: Vec<[f64; D]> = match kind {
         0 | 1 => walk(random, chords, step),
         2 => {
-            let slope = 2.0 * random.draw();
+            let slope = 2.0 * random.uniform();
             let zig = |i: usize, k: usize| if k == 0 { i as f64 } else { slope * phase[k] * (i % 2) as f64 };
             (0..=chords).map(|i| std::array::from_fn(|k| step * zig(i, k))).collect()
         }
         _ => {
-            let turn = 0.3 * random.draw().powi(2);
+            let turn = 0.3 * random.uniform().powi(2);
             let at = |i: usize, k: usize| {
                 (1.0 + phase[k]) * (turn * i as f64 + 6.0 * phase[k]).sin() / turn
                     + if k == 0 { i as f64 } else { 0.0 }
             };
             (0..=chords)
-                .map(|i| std::array::from_fn(|k| step * at(i, k) + noise * random.either_way()))
+                .map(|i| std::array::from_fn(|k| step * at(i, k) + noise * random.between(-1.0, 1.0)))
                 .collect()
         }
     };

@@ -4,10 +4,8 @@
 use feedplan_checks::by_length::{ByLength, Curve};
 use feedplan_checks::campaign::seeds;
 use feedplan_checks::jerk::plan;
-use feedplan_checks::padded;
-use feedplan_checks::polylines::{
-    dense, derivatives, distance, length, random_polyline, to_segment, walk, Random,
-};
+use feedplan_checks::polylines::{dense, derivatives, distance, length, random_polyline, to_segment, walk};
+use feedplan_checks::{padded, Random};
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::jerk_limited::{Effort, End, Limits, Problem};
 use feedplan_path::smooth_fit::polyline::Polyline;
@@ -183,7 +181,7 @@ fn noise_on_a_circle_is_smoothed_and_leaves_the_radius() {
     let points: Vec<[f64; 2]> = (0..=800)
         .map(|i| {
             let (sin, cos) = (0.45 * i as f64).to_radians().sin_cos();
-            let radius = 8.0 + 0.01 * (random.draw() - 0.5);
+            let radius = 8.0 + 0.01 * (random.uniform() - 0.5);
             [radius * cos, radius * sin]
         })
         .collect();
@@ -234,7 +232,7 @@ fn random_polylines<const D: usize, const P: usize>(seed: u64, count: usize) -> 
         if points.len() < 2 {
             continue;
         }
-        let tolerance = 10f64.powf(3.0 * random.draw() - 3.5);
+        let tolerance = 10f64.powf(3.0 * random.uniform() - 3.5);
         let line = polyline(points.iter().map(|point| padded::<D, P>(point, 0.0)).collect(), tolerance);
         let smooth = fit(&line);
         check(&line, &smooth, &format!("{D} axes, case {case}"));
