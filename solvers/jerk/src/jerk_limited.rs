@@ -14,7 +14,7 @@
 //! | `rest_ramp` | the start from rest and the stop: constant jerk, w ∝ s^(4/3), or constant acceleration, w ∝ s |
 //! | `initial_plan`, `prepare` | a first plan within all limits |
 //! | `constraints`, `exact`, `relaxed` | the limits as slacks; the true problem and its convex relaxation |
-//! | `interior_point`, `newton`, `working_space`, `band` | the primal-dual interior-point method on one window |
+//! | `interior_point`, `newton`, `working_space`, `columns`, `band` | the primal-dual interior-point method on one window |
 //! | `intersample_check`, `window` | the limits between the collocation points |
 //! | `windows` | paths of any length |
 //! | `moving_axes` | the axes that move on a path |
@@ -29,6 +29,7 @@
 
 mod band;
 mod coarse;
+mod columns;
 mod constraints;
 mod exact;
 mod forms;

@@ -11,7 +11,6 @@ use super::interior_point::{Effort, Outcome};
 use super::model::Model;
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
-use feedplan_geometry::lanes::Lanes;
 
 /// Short intervals in a long one, and the fewest in a window that is solved on the coarse grid.
 const GROUP: usize = 3;
@@ -38,7 +37,7 @@ pub fn starts<'e, X: Model<M>, const M: usize>(
 ) -> (Vec<(Vec<f64>, Effort<'e>)>, usize) {
     let mut starts = vec![];
     let mut iterations = 0;
-    if rows.intervals.len() >= FEWEST {
+    if rows.count() >= FEWEST {
         let mut x = restrict(&far);
         let coarse = on_coarse_grid(rows, &far, &x);
         let report = space.solve(&coarse, ends, &mut x, &Effort { tolerance: GAP, ..*effort });
@@ -56,24 +55,25 @@ pub fn starts<'e, X: Model<M>, const M: usize>(
 /// The constraints on the coarse grid, tightened where limits change between its collocation points: by what `far` uses more
 /// of them on the fine grid, and to the least of the speed limits if x, which is `far` on the coarse grid, leaves room.
 fn on_coarse_grid<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64]) -> Constraints<M> {
-    let intervals = rows.intervals.chunks(GROUP).map(joined).collect();
-    let mut coarse = Constraints { intervals, ..*rows };
-    for (n, short) in rows.intervals.chunks(GROUP).enumerate() {
-        let used = coarse.utilisation(x, n);
+    let intervals: Vec<Interval<M>> = rows.intervals().collect();
+    let mut coarse = rows.clone();
+    coarse.replace(intervals.chunks(GROUP).map(joined));
+    let (all_used, all_most) = (coarse.utilisation(x), rows.utilisation(far));
+    for (n, (short, all_most)) in intervals.chunks(GROUP).zip(all_most.chunks(GROUP)).enumerate() {
+        let used = all_used[n];
         let mut factors = [1.0f64; 3];
-        for i in 0..short.len() {
-            let most = rows.utilisation(far, n * GROUP + i);
-            for (factor, (most, used)) in factors.iter_mut().zip(most.into_iter().zip(used)) {
+        for most in all_most {
+            for (factor, (most, used)) in factors.iter_mut().zip(most.iter().zip(used)) {
                 *factor = factor.max(most / used.max(LITTLE));
             }
         }
-        let least = |interval: &Interval<M>| interval.speed.values().iter().copied().fold(0.0, f64::max);
-        let own = least(&coarse.intervals[n]);
+        let least = |interval: &Interval<M>| interval.speed.iter().copied().fold(0.0, f64::max);
+        let own = least(&coarse.interval(n));
         if own > 0.0 {
             let slower = (short.iter().map(least).fold(own, f64::max) / own).sqrt();
             factors[0] = factors[0].max(slower.min(FULL / used[0].max(LITTLE)));
         }
-        coarse.intervals[n].tighten(factors);
+        coarse.tighten(n, factors);
     }
     coarse
 }
@@ -81,24 +81,21 @@ fn on_coarse_grid<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64])
 /// A long interval in place of short ones.
 fn joined<const M: usize>(short: &[Interval<M>]) -> Interval<M> {
     let h: f64 = short.iter().map(|interval| interval.h).sum();
-    // The short interval and the lane of the nearest collocation point.
+    // The short interval and the index of the nearest collocation point.
     let nearest = hermite::POINTS.map(|part| {
         let (mut at, mut s) = (0, part * h);
         while at + 1 < short.len() && s > short[at].h {
             s -= short[at].h;
             at += 1;
         }
-        let near = |lane: &usize| (hermite::POINTS[*lane] * short[at].h - s).abs();
-        (at, (0..4).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or(0))
+        let near = |p: &usize| (hermite::POINTS[*p] * short[at].h - s).abs();
+        (at, (0..hermite::COUNT).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or(0))
     });
-    let taken = |of: &dyn Fn(&Interval<M>) -> Lanes| {
-        Lanes::new(nearest.map(|(at, lane)| of(&short[at]).values()[lane]))
-    };
     Interval {
         h,
-        q: std::array::from_fn(|k| std::array::from_fn(|order| taken(&|interval| interval.q[k][order]))),
-        speed: taken(&|interval| interval.speed),
-        acceleration: taken(&|interval| interval.acceleration),
+        q: nearest.map(|(at, p)| short[at].q[p]),
+        speed: nearest.map(|(at, p)| short[at].speed[p]),
+        acceleration: nearest.map(|(at, p)| short[at].acceleration[p]),
         jerk: short.iter().map(|interval| interval.jerk).fold(1.0, f64::max),
     }
 }
@@ -111,16 +108,16 @@ fn restrict(x: &[f64]) -> Vec<f64> {
 
 /// A spline on the coarse grid at the stations of the fine grid.
 fn prolong<const M: usize>(x: &[f64], rows: &Constraints<M>) -> Vec<f64> {
-    let mut out = Vec::with_capacity(2 * rows.intervals.len() + 2);
-    for (n, short) in rows.intervals.chunks(GROUP).enumerate() {
-        let h: f64 = short.iter().map(|interval| interval.h).sum();
+    let lengths: Vec<f64> = (0..rows.count()).map(|n| rows.h(n)).collect();
+    let mut out = Vec::with_capacity(2 * rows.count() + 2);
+    for (n, short) in lengths.chunks(GROUP).enumerate() {
+        let h: f64 = short.iter().sum();
         let u = hermite::local(x, n, h);
         let mut s = 0.0;
-        for interval in short {
-            let [value, slope, _] =
-                hermite::at(s / h).map(|basis| (0..4).map(|k| basis[k] * u[k]).sum::<f64>());
+        for own in short {
+            let [value, slope, _] = hermite::at(s / h).map(|basis| hermite::combine(&basis, &u));
             out.extend([value, slope / h]);
-            s += interval.h;
+            s += own;
         }
     }
     out.extend(&x[x.len() - 2..]);
@@ -137,28 +134,26 @@ mod tests {
         let limits = Limits { velocity: [[1.0]; 2], acceleration: [[1.0]; 2], jerk: [1.0] };
         let interval = |(n, &h): (usize, &f64)| Interval {
             h,
-            q: [std::array::from_fn(|order| {
-                Lanes::new(std::array::from_fn(|lane| (100 * order + 4 * n + lane) as f64))
-            })],
-            speed: Lanes::new(std::array::from_fn(|lane| (4 * n + lane) as f64)),
-            acceleration: Lanes::ONE,
+            q: std::array::from_fn(|p| [std::array::from_fn(|order| (100 * order + 4 * n + p) as f64)]),
+            speed: std::array::from_fn(|p| (4 * n + p) as f64),
+            acceleration: [1.0; 4],
             jerk: 1.0 + n as f64,
         };
-        Constraints {
-            intervals: lengths.iter().enumerate().map(interval).collect(),
-            ..Constraints::new(&limits)
-        }
+        let mut rows = Constraints::new(&limits);
+        rows.replace(lengths.iter().enumerate().map(interval));
+        rows
     }
 
     #[test]
     fn a_long_interval_takes_the_nearest_collocation_points_by_hand() {
         // Points at 0, 0.47, 0.93, 1.4; those of the first interval are 1/3 apart.
-        let long = joined(&rows(&[1.0, 0.4]).intervals);
+        let short: Vec<_> = rows(&[1.0, 0.4]).intervals().collect();
+        let long = joined(&short);
         assert_eq!((long.h, long.jerk), (1.4, 2.0));
         let points = [0.0, 1.0, 3.0, 7.0];
-        assert_eq!(long.speed.values(), &points);
+        assert_eq!(long.speed, points);
         for order in 0..3 {
-            assert_eq!(long.q[0][order].values(), &points.map(|point| (100 * order) as f64 + point));
+            assert_eq!(long.q.map(|q| q[0][order]), points.map(|point| (100 * order) as f64 + point));
         }
     }
 
@@ -168,7 +163,7 @@ mod tests {
         let cubic = |s: f64| [2.0 + s * (0.5 - s * (0.3 - 0.2 * s)), 0.5 - s * (0.6 - 0.6 * s)];
         let mut s = 0.0;
         let mut fine = cubic(s).to_vec();
-        for interval in &rows.intervals {
+        for interval in rows.intervals() {
             s += interval.h;
             fine.extend(cubic(s));
         }

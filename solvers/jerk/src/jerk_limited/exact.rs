@@ -2,83 +2,106 @@
 
 use fearless_simd::Simd;
 
+use super::columns::Columns;
 use super::constraints::{Constraints, RowLayout};
-use super::forms::{expand, fall, pace, Local};
-use super::hermite::{combine, duration_on, AT_NODES, WEIGHTS};
+use super::forms::{fall, pace, Local};
+use super::hermite::{combine, AT_NODES, COUNT, WEIGHTS};
 use super::model::Model;
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register};
 
-/// w^(−1/2) at the collocation points of each interval, as the slacks were last evaluated.
+/// w^(−1/2) at the collocation points of each block, as the slacks were last evaluated.
 #[derive(Default)]
 pub struct Exact {
-    pace: Vec<Lanes>,
+    pace: Vec<[Lanes; COUNT]>,
 }
 
 impl<const M: usize> Model<M> for Exact {
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, _: S, rows: &Constraints<M>, _: &[f64]) {
-        self.pace.resize(rows.intervals.len(), Lanes::ONE);
+    fn begin<S: Simd>(&mut self, _: S, rows: &Constraints<M>, _: &Columns) {
+        self.pace.resize(rows.blocks.len(), [Lanes::ONE; COUNT]);
     }
 
     #[inline(always)]
     fn slack<S: Simd>(
         &mut self,
-        simd: S,
         rows: &Constraints<M>,
-        n: usize,
-        u: &[f64; 4],
+        block: usize,
+        p: usize,
+        motion: [Register<S>; 3],
         _: bool,
         out: &mut [Lanes],
     ) {
-        let [w, w1, _] = rows.intervals[n].motion(simd, u);
+        let [w, w1, _] = motion;
+        let own = &rows.blocks[block];
         let pace = pace(w);
-        rows.slack(n, u, pace, w + w1 * rows.intervals[n].inwards(simd), out);
-        self.pace[n] = pace.into();
+        rows.slack(own, p, motion, pace, w + w1 * own.inwards(w.simd(), p), out);
+        self.pace[block][p] = pace.into();
     }
 
     #[inline(always)]
-    fn slack_step<S: Simd>(&self, simd: S, rows: &Constraints<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
-        let [w, w1, _] = rows.intervals[n].motion(simd, d);
-        let last = w + w1 * rows.intervals[n].inwards(simd);
-        rows.slack_step(n, d, -(fall(self.pace[n].load(simd)) * w), last, out);
+    fn slack_step<S: Simd>(
+        &self,
+        rows: &Constraints<M>,
+        block: usize,
+        p: usize,
+        motion: [Register<S>; 3],
+        out: &mut [Lanes],
+    ) {
+        let [w, w1, _] = motion;
+        let own = &rows.blocks[block];
+        let last = w + w1 * own.inwards(w.simd(), p);
+        rows.slack_step(own, p, motion, -(fall(self.pace[block][p].load(w.simd())) * w), last, out);
     }
 
     #[inline(always)]
     fn local<S: Simd>(
         &mut self,
-        simd: S,
         rows: &Constraints<M>,
-        n: usize,
-        u: &[f64; 4],
+        block: usize,
+        u: &[Register<S>; 4],
         weight: &[Lanes],
         _: &[Lanes],
-    ) -> Local {
-        let mut form = rows.curvature(simd, n, weight);
-        let fall = fall(self.pace[n].load(simd));
-        let interval = &rows.intervals[n];
-        let (last, inwards) = (weight[RowLayout::<M>::POSITIVE].load(simd), interval.inwards(simd));
-        form[0] += last;
-        form[1] += last * inwards;
-        form[3] += last * inwards * inwards;
-        for k in 0..M {
-            // The slope of w^(−1/2) adds to the two rows of an axis's jerk.
-            let at = RowLayout::<M>::jerk(k);
-            let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
-            let (both, turn) = (up + down, (up - down) * fall);
-            let [q1, q2, q3] = interval.q[k];
-            let turn = turn * (rows.per_jerk[k] * interval.jerk);
-            form[0] += both * fall * fall + turn * q3 * 2.0;
-            form[1] += turn * q2 * 1.5;
-            form[2] += turn * q1 * 0.5;
+    ) -> Local<S> {
+        let simd = u[0].simd();
+        let own = &rows.blocks[block];
+        let h = own.h.load(simd);
+        let per_h = h.inverse();
+        let mut local = Local::zero(simd);
+        for p in 0..COUNT {
+            let weight = RowLayout::<M>::of(weight, 0, p);
+            let mut form = rows.curvature(simd, own, p, weight);
+            let fall = fall(self.pace[block][p].load(simd));
+            let (last, inwards) = (weight[RowLayout::<M>::POSITIVE].load(simd), own.inwards(simd, p));
+            form[0] += last;
+            form[1] += last * inwards;
+            form[3] += last * inwards * inwards;
+            for k in 0..M {
+                // The slope of w^(−1/2) adds to the two rows of an axis's jerk.
+                let at = RowLayout::<M>::jerk(k);
+                let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
+                let (both, turn) = (up + down, (up - down) * fall);
+                let [q1, q2, q3] = own.points[p].q[k];
+                let turn = turn * own.jerk * rows.per_jerk[k];
+                form[0] += both * fall * fall + turn * q3 * 2.0;
+                form[1] += turn * q2 * 1.5;
+                form[2] += turn * q1 * 0.5;
+            }
+            local.add(p, per_h, &form);
         }
-        let pace = combine(simd, &AT_NODES, u).sqrt().inverse();
-        let pace_sq = pace * pace;
-        let slope = WEIGHTS * pace * pace_sq * (-0.5 * interval.h);
-        let mut gradient = [0.0; 4];
-        for k in 0..4 {
-            gradient[k] = (AT_NODES[k] * slope).sum();
+        for (basis, weight) in AT_NODES.iter().zip(WEIGHTS) {
+            let pace = combine(basis, u).sqrt().inverse();
+            let pace_sq = pace * pace;
+            let slope = pace * pace_sq * h * (-0.5 * weight);
+            let bend = slope * pace_sq * -1.5;
+            for j in 0..4 {
+                local.gradient[j] += slope * basis[j];
+                let part = bend * basis[j];
+                for i in 0..=j {
+                    local.matrix[i][j] += part * basis[i];
+                }
+            }
         }
-        Local { matrix: expand(interval.h, &form, slope * pace_sq * -1.5), gradient }
+        local
     }
 
     #[inline(always)]
@@ -86,19 +109,21 @@ impl<const M: usize> Model<M> for Exact {
         &mut self,
         simd: S,
         rows: &Constraints<M>,
-        n: usize,
+        block: usize,
+        p: usize,
         aim: &[Lanes],
         _: usize,
     ) -> [Register<S>; 3] {
-        let (mut pull, jerk) = rows.pull(simd, n, aim);
+        let own = &rows.blocks[block];
+        let (mut pull, jerk) = rows.pull(simd, own, p, aim);
         let last = aim[RowLayout::<M>::POSITIVE].load(simd);
-        pull[0] += last - fall(self.pace[n].load(simd)) * jerk;
-        pull[1] += last * rows.intervals[n].inwards(simd);
+        pull[0] += last - fall(self.pace[block][p].load(simd)) * jerk;
+        pull[1] += last * own.inwards(simd, p);
         pull
     }
 
     #[inline(always)]
-    fn solved<S: Simd>(&mut self, _: S, _: &Constraints<M>, _: &[f64], _: [f64; 2]) {}
+    fn solved<S: Simd>(&mut self, _: S, _: &Constraints<M>, _: &Columns, _: [f64; 2]) {}
 
     #[inline(always)]
     fn attempt<S: Simd>(&mut self, _: S, _: f64) {}
@@ -106,11 +131,24 @@ impl<const M: usize> Model<M> for Exact {
     fn accept(&mut self) {}
 
     #[inline(always)]
-    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64], _: bool) -> f64 {
-        let mut time = 0.0;
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            time += duration_on(simd, x, n, interval.h);
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &Columns, _: bool) -> f64 {
+        let mut time = Register::all(simd, 0.0);
+        let mut least = Register::all(simd, f64::INFINITY);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let u = x.local(b, h);
+            let mut pace = Register::all(simd, 0.0);
+            for (basis, weight) in AT_NODES.iter().zip(WEIGHTS) {
+                let w = combine(basis, &u);
+                least = w.min(least);
+                pace += w.sqrt().inverse() * weight;
+            }
+            time += pace * h * block.live;
         }
-        time
+        if least.least() > 0.0 {
+            time.sum()
+        } else {
+            f64::INFINITY
+        }
     }
 }

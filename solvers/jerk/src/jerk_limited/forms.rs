@@ -1,55 +1,107 @@
-//! Forms of (w, w', w'') at the collocation points of an interval, in its local coefficients; powers of w.
+//! Forms of (w, w', w'') at a collocation point of neighbouring intervals, in their local coefficients; powers of w.
 
 use fearless_simd::Simd;
-use feedplan_geometry::lanes::Register;
+use feedplan_geometry::lanes::eight::Register;
 
-use super::hermite::{AT_NODES, BEND, SLOPE, VALUE};
+use super::hermite::{combine, Basis, BEND, COUNT, SLOPE, VALUE};
 
-/// The symmetric form of (w, w', w'') at each collocation point: 00 01 02 11 12 22.
+/// At the first and at the last collocation point w and w' are those of a station.
+const LAST: usize = COUNT - 1;
+
+/// The symmetric form of (w, w', w''): 00 01 02 11 12 22.
 pub type Form<S> = [Register<S>; 6];
 
 /// The upper half of a matrix, and a gradient, in the local coefficients (w, h w') at both ends.
-pub struct Local {
-    pub matrix: [[f64; 4]; 4],
-    pub gradient: [f64; 4],
+pub struct Local<S: Simd> {
+    pub matrix: [[Register<S>; 4]; 4],
+    pub gradient: [Register<S>; 4],
 }
 
-/// The upper half of a form of (w, w', w'') and of a form of w at the quadrature nodes, in local coefficients.
-#[inline(always)]
-pub fn expand<S: Simd>(h: f64, form: &Form<S>, at_nodes: Register<S>) -> [[f64; 4]; 4] {
-    let per_h = 1.0 / h;
-    let per_h2 = per_h * per_h;
-    let m = [
-        form[0],
-        form[1] * per_h,
-        form[2] * per_h2,
-        form[3] * per_h2,
-        form[4] * (per_h * per_h2),
-        form[5] * (per_h2 * per_h2),
-    ];
-    let mut matrix = [[0.0; 4]; 4];
-    for j in 0..4 {
-        let (v, s, b, node) = (VALUE[j], SLOPE[j], BEND[j], AT_NODES[j] * at_nodes);
-        let p0 = m[0] * v + m[1] * s + m[2] * b;
-        let p1 = m[1] * v + m[3] * s + m[4] * b;
-        let p2 = m[2] * v + m[4] * s + m[5] * b;
-        for i in 0..=j {
-            matrix[i][j] = (VALUE[i] * p0 + SLOPE[i] * p1 + BEND[i] * p2 + AT_NODES[i] * node).sum();
+impl<S: Simd> Local<S> {
+    #[inline(always)]
+    pub fn zero(simd: S) -> Self {
+        let zero = Register::all(simd, 0.0);
+        Self { matrix: [[zero; 4]; 4], gradient: [zero; 4] }
+    }
+
+    /// Adds a form at collocation point `p` of intervals of length 1/`per_h`.
+    #[inline(always)]
+    pub fn add(&mut self, p: usize, per_h: Register<S>, form: &Form<S>) {
+        let per_h2 = per_h * per_h;
+        let m = [
+            form[0],
+            form[1] * per_h,
+            form[2] * per_h2,
+            form[3] * per_h2,
+            form[4] * (per_h * per_h2),
+            form[5] * (per_h2 * per_h2),
+        ];
+        match p {
+            0 => self.add_at_end::<0>(&m, &BEND[0]),
+            LAST => self.add_at_end::<2>(&m, &BEND[LAST]),
+            _ => self.add_inside(&m, [&VALUE[p], &SLOPE[p], &BEND[p]]),
         }
     }
-    matrix
+
+    #[inline(always)]
+    fn add_inside(&mut self, m: &Form<S>, [value, slope, bend]: [&Basis; 3]) {
+        for j in 0..4 {
+            let (v, s, b) = (value[j], slope[j], bend[j]);
+            let p0 = m[0] * v + m[1] * s + m[2] * b;
+            let p1 = m[1] * v + m[3] * s + m[4] * b;
+            let p2 = m[2] * v + m[4] * s + m[5] * b;
+            for i in 0..=j {
+                self.matrix[i][j] += p0 * value[i] + p1 * slope[i] + p2 * bend[i];
+            }
+        }
+    }
+
+    /// The same where w and h w' are the local coefficients K and K + 1.
+    #[inline(always)]
+    fn add_at_end<const K: usize>(&mut self, m: &Form<S>, bend: &Basis) {
+        for j in 0..4 {
+            let part = m[5] * bend[j];
+            for i in 0..=j {
+                self.matrix[i][j] += part * bend[i];
+            }
+            for (k, with_bend) in [(K, m[2]), (K + 1, m[4])] {
+                let part = with_bend * if j == k { 2.0 * bend[j] } else { bend[j] };
+                self.matrix[j.min(k)][j.max(k)] += part;
+            }
+        }
+        self.matrix[K][K] += m[0];
+        self.matrix[K][K + 1] += m[1];
+        self.matrix[K + 1][K + 1] += m[3];
+    }
 }
 
-/// A linear form of (w, w', w'') in local coefficients.
+/// w, w', w'' at collocation point `p` for local coefficients u.
 #[inline(always)]
-pub fn project<S: Simd>(h: f64, linear: &[Register<S>; 3]) -> [f64; 4] {
-    let per_h = 1.0 / h;
+pub fn motion<S: Simd>(p: usize, per_h: Register<S>, u: &[Register<S>; 4]) -> [Register<S>; 3] {
+    let [w, slope] = match p {
+        0 => [u[0], u[1]],
+        LAST => [u[2], u[3]],
+        _ => [combine(&VALUE[p], u), combine(&SLOPE[p], u)],
+    };
+    [w, slope * per_h, combine(&BEND[p], u) * (per_h * per_h)]
+}
+
+/// Adds a linear form of (w, w', w'') at collocation point `p`, in local coefficients.
+#[inline(always)]
+pub fn project<S: Simd>(p: usize, per_h: Register<S>, linear: &[Register<S>; 3], out: &mut [Register<S>; 4]) {
     let [g0, g1, g2] = [linear[0], linear[1] * per_h, linear[2] * (per_h * per_h)];
-    let mut out = [0.0; 4];
     for k in 0..4 {
-        out[k] = (g0 * VALUE[k] + g1 * SLOPE[k] + g2 * BEND[k]).sum();
+        out[k] += g2 * BEND[p][k];
     }
-    out
+    match p {
+        0 => [out[0], out[1]] = [out[0] + g0, out[1] + g1],
+        LAST => [out[2], out[3]] = [out[2] + g0, out[3] + g1],
+        _ => {
+            for k in 0..4 {
+                out[k] += g0 * VALUE[p][k] + g1 * SLOPE[p][k];
+            }
+        }
+    }
 }
 
 /// w^(−1/2).

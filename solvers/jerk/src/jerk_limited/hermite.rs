@@ -1,48 +1,39 @@
-//! The cubic Hermite basis of one interval at its four collocation points and quadrature nodes; the time of an
-//! interval.
+//! The cubic Hermite basis of an interval at its four collocation points and quadrature nodes; the time of an interval.
 //!
 //! On an interval of length h with t in [0, 1], w = Σ u_k B_k(t) with u = (w, h w') at its start and at its end.
 
-use fearless_simd::{dispatch, Level, Simd};
+use std::ops::{Add, Mul};
 
-use feedplan_geometry::lanes::{Lanes, Register};
-
-/// Collocation points, where the limits are enforced, as parts of the interval's length.
-pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
+/// Collocation points of an interval, where the limits are enforced, …
+pub const COUNT: usize = 4;
+/// … as parts of its length.
+pub const POINTS: [f64; COUNT] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// Gauss–Legendre nodes and weights on [0, 1].
 const NODES: [f64; 4] =
     [0.069_431_844_202_973_71, 0.330_009_478_207_571_87, 0.669_990_521_792_428_1, 0.930_568_155_797_026_3];
-pub const WEIGHTS: Lanes = Lanes::new([
-    0.173_927_422_568_726_93,
-    0.326_072_577_431_273_1,
-    0.326_072_577_431_273_1,
-    0.173_927_422_568_726_93,
-]);
+pub const WEIGHTS: [f64; 4] =
+    [0.173_927_422_568_726_93, 0.326_072_577_431_273_1, 0.326_072_577_431_273_1, 0.173_927_422_568_726_93];
 
 /// Weights of the 3/8 rule at the collocation points.
-pub const MASS: Lanes = Lanes::new([0.125, 0.375, 0.375, 0.125]);
+pub const MASS: [f64; COUNT] = [0.125, 0.375, 0.375, 0.125];
 
-pub type Basis = [Lanes; 4];
+/// B_0 to B_3.
+pub type Basis = [f64; 4];
 
-/// B_k at the collocation points.
-pub const VALUE: Basis = basis(POINTS, 0);
+/// B_k at each collocation point.
+pub const VALUE: [Basis; COUNT] = basis(POINTS, 0);
 /// dB_k/dt there.
-pub const SLOPE: Basis = basis(POINTS, 1);
+pub const SLOPE: [Basis; COUNT] = basis(POINTS, 1);
 /// d²B_k/dt² there.
-pub const BEND: Basis = basis(POINTS, 2);
+pub const BEND: [Basis; COUNT] = basis(POINTS, 2);
 /// B_k at the nodes of the quadrature.
-pub const AT_NODES: Basis = basis(NODES, 0);
+pub const AT_NODES: [Basis; 4] = basis(NODES, 0);
 
-const fn basis(points: [f64; 4], derivative: usize) -> Basis {
-    let mut out = [Lanes::ZERO; 4];
+const fn basis(points: [f64; 4], derivative: usize) -> [Basis; 4] {
+    let mut out = [[0.0; 4]; 4];
     let mut i = 0;
     while i < 4 {
-        let row = at(points[i])[derivative];
-        let mut k = 0;
-        while k < 4 {
-            out[k].values_mut()[i] = row[k];
-            k += 1;
-        }
+        out[i] = at(points[i])[derivative];
         i += 1;
     }
     out
@@ -60,9 +51,8 @@ pub const fn at(t: f64) -> [[f64; 4]; 3] {
 
 /// Σ u_k B_k.
 #[inline(always)]
-pub fn combine<S: Simd>(simd: S, basis: &Basis, u: &[f64; 4]) -> Register<S> {
-    let [b0, b1, b2, b3] = *basis;
-    b0.load(simd) * u[0] + b1.load(simd) * u[1] + b2.load(simd) * u[2] + b3.load(simd) * u[3]
+pub fn combine<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(basis: &Basis, u: &[T; 4]) -> T {
+    u[0] * basis[0] + u[1] * basis[1] + u[2] * basis[2] + u[3] * basis[3]
 }
 
 /// The local coefficients of interval `n` of the spline x = (w_0, w'_0, w_1, w'_1, …).
@@ -79,18 +69,12 @@ pub fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
 
 /// ∫ ds/√w over interval n, in s; infinite where w is not positive.
 pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
-    dispatch!(Level::new(), simd => duration_on(simd, x, n, h))
-}
-
-/// The same on a level.
-#[inline(always)]
-pub fn duration_on<S: Simd>(simd: S, x: &[f64], n: usize, h: f64) -> f64 {
-    let w = combine(simd, &AT_NODES, &local(x, n, h));
-    if w.least() > 0.0 {
-        (WEIGHTS * w.sqrt().inverse()).sum() * h
-    } else {
-        f64::INFINITY
-    }
+    let u = local(x, n, h);
+    let at = |i: usize| match combine(&AT_NODES[i], &u) {
+        w if w > 0.0 => WEIGHTS[i] / w.sqrt(),
+        _ => f64::INFINITY,
+    };
+    (at(0) + at(1) + at(2) + at(3)) * h
 }
 
 #[cfg(test)]

@@ -7,7 +7,6 @@
 use feedplan_geometry::elementary::Elementary;
 use std::collections::VecDeque;
 
-use super::constraints::Constraints;
 use super::speed_envelope::Slopes;
 use super::window_end::WindowEnd;
 
@@ -148,10 +147,9 @@ fn least(tau: &[f64], rho: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The use of the limits by x on interval n, in terms of w, over what a first plan may use of them: w divided by it
-/// meets them.
-pub fn used<const M: usize>(rows: &Constraints<M>, x: &[f64], n: usize) -> f64 {
-    let [v, a, j] = rows.utilisation(x, n);
+/// The use of the limits of speed, acceleration and jerk on an interval, in terms of w, over what a first plan may use of
+/// them: w divided by it meets them.
+pub fn used([v, a, j]: [f64; 3]) -> f64 {
     (v * v / FULL).max(a.max(j.cbrt().powi(2)) / USE)
 }
 

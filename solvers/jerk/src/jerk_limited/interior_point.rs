@@ -9,7 +9,7 @@
 
 use std::time::Instant;
 
-use fearless_simd::{dispatch, Simd};
+use fearless_simd::dispatch;
 
 use super::band::EndCondition;
 use super::constraints::{Constraints, RowLayout};
@@ -73,31 +73,26 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         x: &mut [f64],
         effort: &Effort,
     ) -> Report {
-        dispatch!(self.level, simd => self.improve(simd, rows, ends, x, effort))
+        self.take(rows, x);
+        let report = self.improve(rows, ends, effort);
+        self.x.give(x);
+        report
     }
 
     /// A step, without regard to the limits, that balances the multipliers of a solution; see `newton`.
     pub fn settle(&mut self, rows: &Constraints<M>, ends: &[WindowEnd; 2], x: &mut [f64]) -> bool {
         let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
-        dispatch!(self.level, simd => self.balance(simd, rows, conditions, x))
+        self.x.take(x);
+        let settled = self.balance(rows, conditions);
+        self.x.give(x);
+        settled
     }
 
-    #[inline(always)]
-    fn improve<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        ends: [WindowEnd; 2],
-        x: &mut [f64],
-        effort: &Effort,
-    ) -> Report {
-        let count = rows.intervals.len();
-        let total = (count * 4 * RowLayout::<M>::COUNT + 2) as f64;
-        self.resize(count);
-        self.model.begin(simd, rows, x);
-        let mut time = self.time(simd, rows, ends, x, false);
-        let Some(mut logarithm) = self.enter(simd, rows, ends, x, effort.barrier * time / total, effort.warm)
-        else {
+    fn improve(&mut self, rows: &Constraints<M>, ends: [WindowEnd; 2], effort: &Effort) -> Report {
+        let total = (rows.count() * RowLayout::<M>::BLOCK + 2) as f64;
+        dispatch!(self.level, simd => self.model.begin(simd, rows, &self.x));
+        let mut time = self.time(rows, ends, false);
+        let Some(mut logarithm) = self.enter(rows, ends, effort.barrier * time / total, effort.warm) else {
             return Report { outcome: Outcome::NotInside, iterations: 0, time, excess: time };
         };
         let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
@@ -110,30 +105,27 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut iterations = 0;
         while iterations < effort.max_iterations && effort.deadline.is_none_or(|end| Instant::now() < end) {
             effort.watch.check();
-            let work = self.assemble(simd, rows, x, dual, least_dual);
+            let work = self.assemble(rows, dual, least_dual);
             dual = 0.0;
             let mu = work / total;
             let gap = work / time;
             excess = work;
-            let missing = missing(&ends, x);
-            let met = miss(&ends, x, &rows.intervals) < MET;
+            let missing = self.missing(&ends);
+            let met = self.miss(&ends, rows) < MET;
             if met && gap < effort.tolerance && gain.abs() < effort.tolerance.max(1e-6) * time {
                 outcome = Outcome::Converged;
                 break;
             }
             iterations += 1;
-            if !self.band.factor(conditions) {
+            if !self.factor(conditions) {
                 outcome = Outcome::Stalled;
                 break;
             }
 
             // Predictor: the longest pure Newton step gives the centring σ.
-            for (r, g) in self.rhs.iter_mut().zip(&self.gradient) {
-                *r = -g;
-            }
-            self.band.solve(&self.rhs, missing, &mut self.step);
-            self.model.solved(simd, rows, &self.step, [0.0; 2]);
-            let after = self.predict(simd, rows, work, 3.0 * mu) / total;
+            self.descend();
+            self.step_to(rows, missing, [0.0; 2]);
+            let after = self.predict(rows, work, 3.0 * mu) / total;
             let sigma = (after.max(0.0) / mu).powi(3).clamp(if met { 1e-3 } else { 0.3 }, 0.5);
             let least = floor * time / total;
             let target = least.max(sigma * mu);
@@ -141,24 +133,23 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             // Corrector: towards the target, with the predictor's second order unless the floor sets the target.
             let second = if least > sigma * mu { 0.0 } else { 1.0 };
             self.correct(target, second);
-            self.band.solve(&self.rhs, missing, &mut self.step);
-            self.model.solved(simd, rows, &self.step, [target, second]);
-            let longest = self.direction(simd, rows, target, second);
+            self.step_to(rows, missing, [target, second]);
+            let longest = self.direction(rows, target, second);
             let mut part = (STEP * longest.0).min(1.0);
-            let mut next = self.attempt(simd, rows, ends, x, part);
+            let mut next = self.attempt(rows, ends, part);
             for _ in 0..20 {
                 let valid = next.0.is_finite();
                 if valid && (!met || next.0 - target * (next.1 - logarithm) <= time * (1.0 + 1e-9)) {
                     break;
                 }
                 part *= 0.6;
-                next = self.attempt(simd, rows, ends, x, part);
+                next = self.attempt(rows, ends, part);
             }
             if !next.0.is_finite() {
                 outcome = Outcome::Stalled;
                 break;
             }
-            x.copy_from_slice(&self.trial);
+            std::mem::swap(&mut self.x, &mut self.trial);
             self.model.accept();
             logarithm = next.1;
             (dual, least_dual) = ((STEP * longest.1).min(1.0), LEAST_DUAL * target);
@@ -172,38 +163,31 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 break;
             }
         }
-        self.finish(simd, dual);
-        if miss(&ends, x, &rows.intervals) < MET {
-            snap_ends(&ends, x);
+        self.finish(dual);
+        if self.miss(&ends, rows) < MET {
+            self.snap_ends(&ends);
         } else {
             outcome = Outcome::Missed;
         }
-        Report { outcome, iterations, time: self.time(simd, rows, ends, x, false), excess }
+        Report { outcome, iterations, time: self.time(rows, ends, false), excess }
     }
 
     /// Slacks and multipliers of the start. Returns Σ ln s, or None unless the start is strictly inside.
-    #[inline(always)]
-    fn enter<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        ends: [WindowEnd; 2],
-        x: &[f64],
-        mu: f64,
-        warm: bool,
-    ) -> Option<f64> {
+    fn enter(&mut self, rows: &Constraints<M>, ends: [WindowEnd; 2], mu: f64, warm: bool) -> Option<f64> {
         let last = self.ends;
         self.ends = std::array::from_fn(|end| match ends[end] {
             WindowEnd::Fixed { .. } | WindowEnd::Free => None,
             WindowEnd::Rest { ramp, greatest } => {
-                let station = end * rows.intervals.len();
+                let station = end * rows.count();
                 Some(EndRow { station, ramp, greatest, slack: 1.0, dual: 0.0, step: 0.0 })
             }
         });
-        let logarithm = self.slacks(simd, rows, x, false)?;
+        let logarithm = self.slacks(rows, false)?;
         for (dual, slack) in self.state.dual.iter_mut().zip(&self.state.slack) {
-            let centred = slack.load(simd).inverse() * mu;
-            *dual = if warm { dual.load(simd).max(centred) } else { centred }.into();
+            for (dual, slack) in dual.values_mut().iter_mut().zip(slack.values()) {
+                let centred = mu / slack;
+                *dual = if warm { dual.max(centred) } else { centred };
+            }
         }
         for (row, last) in self.ends.iter_mut().zip(last) {
             if let Some(row) = row {
@@ -213,6 +197,45 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         }
         Some(logarithm)
     }
+
+    /// The station at an end.
+    fn station(&self, end: usize) -> usize {
+        end * self.band.intervals()
+    }
+
+    /// The steps of (w, w') that are missing at given ends.
+    fn missing(&self, ends: &[WindowEnd; 2]) -> [[f64; 2]; 2] {
+        std::array::from_fn(|end| match ends[end] {
+            WindowEnd::Rest { .. } | WindowEnd::Free => [0.0; 2],
+            WindowEnd::Fixed { w, slope } => {
+                let own = self.x.at(self.station(end));
+                [w - own[0], slope - own[1]]
+            }
+        })
+    }
+
+    /// The greatest relative error at given ends.
+    fn miss(&self, ends: &[WindowEnd; 2], rows: &Constraints<M>) -> f64 {
+        let lacks = self.missing(ends);
+        let h = [rows.h(0), rows.h(rows.count() - 1)];
+        let mut worst: f64 = 0.0;
+        for end in 0..2 {
+            if let WindowEnd::Fixed { w, .. } = ends[end] {
+                worst = worst.max(lacks[end][0].abs() / w).max(lacks[end][1].abs() * h[end] / w);
+            }
+        }
+        worst
+    }
+
+    /// Sets given ends exactly, without rounding.
+    fn snap_ends(&mut self, ends: &[WindowEnd; 2]) {
+        for (end, kind) in ends.iter().enumerate() {
+            if let WindowEnd::Fixed { w, slope } = *kind {
+                let station = self.station(end);
+                (self.x.w[station], self.x.slope[station]) = (w, slope);
+            }
+        }
+    }
 }
 
 /// The condition on the unknowns of an end; `sign` is −1 at the end of the path.
@@ -221,43 +244,5 @@ fn end_condition(kind: &WindowEnd, sign: f64) -> EndCondition {
         WindowEnd::Rest { ramp, .. } => EndCondition::Slope(sign * ramp.slope()),
         WindowEnd::Fixed { .. } => EndCondition::Given,
         WindowEnd::Free => EndCondition::Free,
-    }
-}
-
-/// The steps of (w, w') that are missing at given ends.
-fn missing(ends: &[WindowEnd; 2], x: &[f64]) -> [[f64; 2]; 2] {
-    std::array::from_fn(|end| match ends[end] {
-        WindowEnd::Rest { .. } | WindowEnd::Free => [0.0; 2],
-        WindowEnd::Fixed { w, slope } => {
-            let at = end * (x.len() - 2);
-            [w - x[at], slope - x[at + 1]]
-        }
-    })
-}
-
-/// The greatest relative error at given ends.
-fn miss<const M: usize>(
-    ends: &[WindowEnd; 2],
-    x: &[f64],
-    intervals: &[super::constraints::Interval<M>],
-) -> f64 {
-    let lacks = missing(ends, x);
-    let h = [intervals[0].h, intervals[intervals.len() - 1].h];
-    let mut worst: f64 = 0.0;
-    for end in 0..2 {
-        if let WindowEnd::Fixed { w, .. } = ends[end] {
-            worst = worst.max(lacks[end][0].abs() / w).max(lacks[end][1].abs() * h[end] / w);
-        }
-    }
-    worst
-}
-
-/// Sets given ends exactly, without rounding.
-fn snap_ends(ends: &[WindowEnd; 2], x: &mut [f64]) {
-    for (end, kind) in ends.iter().enumerate() {
-        if let WindowEnd::Fixed { w, slope } = *kind {
-            let at = end * (x.len() - 2);
-            (x[at], x[at + 1]) = (w, slope);
-        }
     }
 }

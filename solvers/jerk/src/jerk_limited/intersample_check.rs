@@ -3,44 +3,46 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::constraints::{Constraints, Interval};
-use super::hermite::{self, combine, local, Basis};
+use super::columns::Columns;
+use super::constraints::Constraints;
+use super::hermite::{self, combine, Basis, COUNT};
 use super::sides::Sides;
 use crate::path_problem::{Geometry, Limits};
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
-/// Samples of an interval, its ends included, in groups of four lanes.
-const GROUPS: usize = 3;
-const SAMPLES: usize = 4 * GROUPS;
+/// Samples of an interval, its ends included.
+const SAMPLES: usize = 12;
 /// Peaks are only sought where a sample uses more than this part of a limit.
 const NEAR: f64 = 0.97;
 
-const BASES: [[Basis; 3]; GROUPS] = bases();
+/// The basis and its first two derivatives at each sample.
+const BASES: [[Basis; 3]; SAMPLES] = bases();
 
-const fn bases() -> [[Basis; 3]; GROUPS] {
-    let mut out = [[[Lanes::ZERO; 4]; 3]; GROUPS];
+const fn bases() -> [[Basis; 3]; SAMPLES] {
+    let mut out = [[[0.0; 4]; 3]; SAMPLES];
     let mut i = 0;
     while i < SAMPLES {
-        let at = hermite::at(i as f64 / (SAMPLES - 1) as f64);
-        let mut d = 0;
-        while d < 3 {
-            let mut k = 0;
-            while k < 4 {
-                out[i / 4][d][k].values_mut()[i % 4] = at[d][k];
-                k += 1;
-            }
-            d += 1;
-        }
+        out[i] = hermite::at(i as f64 / (SAMPLES - 1) as f64);
         i += 1;
     }
     out
 }
 
-/// q', q'', q''' of each axis, and 1/w_max by the speed cap, at four samples.
+/// q', q'', q''' of each axis, and 1/w_max by the speed cap, at one sample of each interval of a block.
 #[derive(Clone, Copy, Debug)]
 struct Sample<const M: usize> {
     q: [[Lanes; 3]; M],
     cap: Lanes,
+}
+
+/// The limits on neighbouring intervals at all samples.
+#[derive(Clone, Copy, Debug)]
+struct Block<const M: usize> {
+    samples: [Sample<M>; SAMPLES],
+    /// 1/w_max at the stations on both sides.
+    at_stations: [Lanes; 2],
+    /// Factor by which the limits of jerk are tighter.
+    jerk_factor: Lanes,
 }
 
 /// The limits of a window at all samples.
@@ -48,20 +50,15 @@ struct Sample<const M: usize> {
 pub struct IntersampleCheck<const M: usize> {
     velocity: Sides<M>,
     acceleration: Sides<M>,
-    jerk: [f64; M],
-    samples: Vec<[Sample<M>; GROUPS]>,
-    /// 1/w_max at the stations on both sides of each interval.
-    at_stations: Vec<[f64; 2]>,
-    /// Factor by which the limits of jerk are tighter on each interval.
-    jerk_factor: Vec<f64>,
+    per_jerk: [f64; M],
+    blocks: Vec<Block<M>>,
 }
 
 impl<const M: usize> IntersampleCheck<M> {
     /// Without samples.
     pub fn new(limits: &Limits<M>) -> Self {
         let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::new);
-        let jerk = limits.jerk;
-        Self { velocity, acceleration, jerk, samples: vec![], at_stations: vec![], jerk_factor: vec![] }
+        Self { velocity, acceleration, per_jerk: limits.jerk.map(|jerk| 1.0 / jerk), blocks: vec![] }
     }
 
     /// Samples between `stations`; speed caps at stations and factors of jerk are those of `rows`.
@@ -72,70 +69,81 @@ impl<const M: usize> IntersampleCheck<M> {
         pieces: &[u32],
         rows: &Constraints<M>,
     ) {
-        self.samples.clear();
-        self.samples.reserve(pieces.len());
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let mut groups = [Sample { q: [[Lanes::ZERO; 3]; M], cap: Lanes::ZERO }; GROUPS];
-            for i in 0..SAMPLES {
-                let (sample, lane) = (&mut groups[i / 4], i % 4);
-                let s = stations[n] + interval.h * (i as f64 / (SAMPLES - 1) as f64);
-                let point = geometry.at(pieces[n] as usize, s);
-                for k in 0..M {
-                    sample.q[k][0].values_mut()[lane] = point.first[k];
-                    sample.q[k][1].values_mut()[lane] = point.second[k];
-                    sample.q[k][2].values_mut()[lane] = point.third[k];
+        self.blocks.clear();
+        self.blocks.reserve(rows.blocks.len());
+        let none = Sample { q: [[Lanes::ZERO; 3]; M], cap: Lanes::ZERO };
+        for (b, own) in rows.blocks.iter().enumerate() {
+            let first = b * LANES;
+            let mut samples = [none; SAMPLES];
+            for (lane, &piece) in pieces[first..].iter().take(LANES).enumerate() {
+                let (start, h) = (stations[first + lane], own.h.values()[lane]);
+                for (i, sample) in samples.iter_mut().enumerate() {
+                    let s = start + h * (i as f64 / (SAMPLES - 1) as f64);
+                    let point = geometry.at(piece as usize, s);
+                    for k in 0..M {
+                        let orders = [point.first[k], point.second[k], point.third[k]];
+                        for (to, q) in sample.q[k].iter_mut().zip(orders) {
+                            to.values_mut()[lane] = q;
+                        }
+                    }
+                    sample.cap.values_mut()[lane] = 1.0 / (point.speed_cap * point.speed_cap);
                 }
-                sample.cap.values_mut()[lane] = 1.0 / (point.speed_cap * point.speed_cap);
             }
-            self.samples.push(groups);
+            let at_stations = [0, COUNT - 1].map(|p| own.points[p].speed);
+            self.blocks.push(Block { samples, at_stations, jerk_factor: own.jerk });
         }
-        let at_stations = |interval: &Interval<M>| [0, 3].map(|lane| interval.speed.values()[lane]);
-        self.at_stations.clear();
-        self.at_stations.extend(rows.intervals.iter().map(at_stations));
-        self.jerk_factor.clear();
-        self.jerk_factor.extend(rows.intervals.iter().map(|interval| interval.jerk));
     }
 
-    /// The greatest use of the limits of speed, acceleration and jerk on interval n by the spline x.
+    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x.
     ///
     /// Peaks are sought for each axis alone: the maximum over several axes is not smooth.
-    pub fn utilisation(&self, x: &[f64], n: usize, h: f64) -> [f64; 3] {
-        dispatch!(Level::new(), simd => self.utilisation_on(simd, x, n, h))
+    pub fn utilisation(&self, rows: &Constraints<M>, x: &[f64]) -> Vec<[f64; 3]> {
+        dispatch!(Level::new(), simd => self.utilisation_on(simd, rows, x))
     }
 
     #[inline(always)]
-    pub(super) fn utilisation_on<S: Simd>(&self, simd: S, x: &[f64], n: usize, h: f64) -> [f64; 3] {
-        let u = local(x, n, h);
-        let per_h = 1.0 / h;
-        let mut cap = [0.0; SAMPLES];
-        let mut axes = [[[0.0; SAMPLES]; 3]; M];
-        let Self { velocity, acceleration, jerk, .. } = self;
-        for (group, (sample, basis)) in self.samples[n].iter().zip(&BASES).enumerate() {
-            let w = combine(simd, &basis[0], &u);
-            let w1 = combine(simd, &basis[1], &u) * per_h;
-            let w2 = combine(simd, &basis[2], &u) * (per_h * per_h);
-            let v = w.max(Register::all(simd, 0.0)).sqrt();
-            let at = 4 * group..4 * group + 4;
-            cap[at.clone()].copy_from_slice(&(w * sample.cap).values());
+    pub(super) fn utilisation_on<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64]) -> Vec<[f64; 3]> {
+        let x = Columns::new(x);
+        let mut out = vec![[0.0; 3]; rows.count()];
+        let zero = Register::all(simd, 0.0);
+        for (b, (block, out)) in self.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
+            let h = rows.blocks[b].h.load(simd);
+            let (u, per_h) = (x.local(b, h), h.inverse());
+            let mut motion = [[zero; 4]; SAMPLES];
+            let mut uses = [zero; SAMPLES];
+            for (i, basis) in BASES.iter().enumerate() {
+                let w = combine(&basis[0], &u);
+                let half = combine(&basis[1], &u) * per_h * 0.5;
+                let bend = combine(&basis[2], &u) * (per_h * per_h) * 0.5;
+                motion[i] = [w, half, bend, w.max(zero).sqrt()];
+                uses[i] = w * block.samples[i].cap;
+            }
+            let [from, to] = block.at_stations;
+            let at_stations = (u[0] * from).max(u[2] * to);
+            let mut worst = [peak(&uses, [1.0; 2]).max(at_stations).max(zero).sqrt(), zero, zero];
             for k in 0..M {
-                let [q1, q2, q3] = sample.q[k];
-                let a = q2 * w + q1 * w1 * 0.5;
-                let j = (q3 * w + q2 * w1 * 1.5 + q1 * w2 * 0.5) * v;
-                axes[k][0][at.clone()].copy_from_slice(&(q1 * v * velocity.per_mean[k]).values());
-                axes[k][1][at.clone()].copy_from_slice(&(a * acceleration.per_mean[k]).values());
-                axes[k][2][at.clone()].copy_from_slice(&(j * (self.jerk_factor[n] / jerk[k])).values());
+                for i in 0..SAMPLES {
+                    uses[i] = motion[i][3] * block.samples[i].q[k][0] * self.velocity.per_mean[k];
+                }
+                worst[0] = peak(&uses, self.velocity.per_most[k]).max(worst[0]);
+                for i in 0..SAMPLES {
+                    let ([w, half, ..], [q1, q2, _]) = (motion[i], block.samples[i].q[k]);
+                    uses[i] = (q2 * w + q1 * half) * self.acceleration.per_mean[k];
+                }
+                worst[1] = peak(&uses, self.acceleration.per_most[k]).max(worst[1]);
+                let jerk = block.jerk_factor.load(simd) * self.per_jerk[k];
+                for i in 0..SAMPLES {
+                    let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], block.samples[i].q[k]);
+                    uses[i] = (q3 * w + q2 * half * 3.0 + q1 * bend) * v * jerk;
+                }
+                worst[2] = peak(&uses, [1.0; 2]).max(worst[2]);
+            }
+            let worst = worst.map(Register::values);
+            for (lane, out) in out.iter_mut().enumerate() {
+                *out = worst.map(|worst| worst[lane]);
             }
         }
-        let [from, to] = self.at_stations[n];
-        let speed_sq = peak(&cap, [1.0; 2]).max(x[2 * n] * from).max(x[2 * n + 2] * to);
-        let mut worst = [speed_sq.max(0.0).sqrt(), 0.0, 0.0];
-        for (k, uses) in axes.iter().enumerate() {
-            let per_most = [velocity.per_most[k], acceleration.per_most[k], [1.0; 2]];
-            for ((worst, values), per_most) in worst.iter_mut().zip(uses).zip(per_most) {
-                *worst = f64::max(*worst, peak(values, per_most));
-            }
-        }
-        worst
+        out
     }
 }
 
@@ -169,32 +177,33 @@ const fn halfway() -> [([f64; STENCIL], usize); SAMPLES - 1] {
     out
 }
 
-/// The greatest use of the limits by a smooth function with these values at the samples; `per_high` and `per_low` are 1
+/// The greatest use of the limits by smooth functions with these values at the samples; `per_high` and `per_low` are 1
 /// over the limits of positive and of negative values. Takes the values, those interpolated half-way between, and the
 /// peaks of the parabolas through each three.
-fn peak(f: &[f64; SAMPLES], [per_high, per_low]: [f64; 2]) -> f64 {
-    let (low, high) =
-        f.iter().fold((0.0f64, 0.0f64), |(low, high), &value| (low.min(value), high.max(value)));
-    let greatest = (high * per_high).max(-low * per_low);
-    if greatest <= NEAR {
-        return greatest;
+#[inline(always)]
+fn peak<S: Simd>(f: &[Register<S>; SAMPLES], [per_high, per_low]: [f64; 2]) -> Register<S> {
+    let zero = Register::all(f[0].simd(), 0.0);
+    let (low, high) = f.iter().fold((zero, zero), |(low, high), &value| (value.min(low), value.max(high)));
+    let mut worst = (high * per_high).max(-low * per_low);
+    if worst.greatest() <= NEAR {
+        return worst;
     }
-    let mut fine = [0.0; 2 * SAMPLES - 1];
+    let mut fine = [zero; 2 * SAMPLES - 1];
     for i in 0..SAMPLES {
         fine[2 * i] = f[i];
     }
     for (i, (weights, first)) in HALFWAY.iter().enumerate() {
-        fine[2 * i + 1] = weights.iter().zip(&f[*first..]).map(|(weight, value)| weight * value).sum();
-    }
-    let mut worst = greatest;
-    for i in 1..fine.len() - 1 {
-        let sign = fine[i].signum();
-        let bend = sign * (2.0 * fine[i] - fine[i - 1] - fine[i + 1]);
-        let rise = fine[i + 1] - fine[i - 1];
-        if rise.abs() < 2.0 * bend {
-            let per_limit = if sign > 0.0 { per_high } else { per_low };
-            worst = worst.max((fine[i].abs() + rise * rise / (8.0 * bend)) * per_limit);
+        for (weight, value) in weights.iter().zip(&f[*first..]) {
+            fine[2 * i + 1] += *value * *weight;
         }
+    }
+    let least = Register::all(f[0].simd(), f64::MIN_POSITIVE);
+    for i in 1..fine.len() - 1 {
+        let bend = fine[i] + fine[i] - fine[i - 1] - fine[i + 1];
+        // A parabola whose peak is beyond its neighbours has less than one of them after this.
+        let rise = (fine[i + 1] - fine[i - 1]).abs().min(bend.abs() * 2.0);
+        let top = fine[i] + rise * rise * ((bend + least) * 8.0).inverse();
+        worst = (top * per_high).max(-top * per_low).max(worst);
     }
     worst
 }
@@ -203,29 +212,32 @@ fn peak(f: &[f64; SAMPLES], [per_high, per_low]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    fn values(f: impl Fn(f64) -> f64) -> [f64; SAMPLES] {
-        std::array::from_fn(|i| f(i as f64 / (SAMPLES - 1) as f64))
+    /// The greatest use by eight functions; each is alone in the others' place, too.
+    fn peaks(functions: [&dyn Fn(f64) -> f64; LANES], per_most: [f64; 2]) -> [f64; LANES] {
+        let at = |i: usize| Lanes::new(functions.map(|f| f(i as f64 / (SAMPLES - 1) as f64)));
+        dispatch!(Level::new(), simd => peak(&std::array::from_fn(|i| at(i).load(simd)), per_most).values())
     }
 
     #[test]
     fn peaks_of_polynomials_between_samples_are_found() {
         // 1 − (t − c)²/2 + (t − c)³/10 has its peak 1 at c.
         for i in 0..100 {
-            let c = 0.01 * i as f64;
-            let bump = values(|t| 1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3));
-            let found = peak(&bump, [1.0; 2]);
-            assert!((found - 1.0).abs() < 5e-6, "{found} for a peak at {c}");
-            assert_eq!(peak(&bump.map(|value| -value), [1.0; 2]), found);
-            assert_eq!(peak(&bump, [2.0, 0.5]), 2.0 * found);
-            assert_eq!(
-                peak(&bump.map(|value| -value), [2.0, 0.5]),
-                bump.iter().fold(0.0, |a, b| b.max(a)) * 0.5
-            );
+            let c = 0.01 * f64::from(i);
+            let bump = |t: f64| 1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3);
+            let (down, half) = (|t: f64| -bump(t), |t: f64| 0.5 * bump(t));
+            let (line, none) = (|t: f64| 0.98 * t, |_| 0.0);
+            let all: [&dyn Fn(f64) -> f64; LANES] = [&bump, &down, &half, &line, &none, &none, &none, &bump];
+            let [one, other, low, straight, still, .., last] = peaks(all, [1.0; 2]);
+            assert!((one - 1.0).abs() < 5e-6, "{one} for a peak at {c}");
+            assert_eq!((one, one, 0.0), (other, last, still));
+            assert!((low - 0.5).abs() < 3e-6 && (straight - 0.98).abs() < 1e-15, "{low} and {straight}");
+            let [twice, half, ..] = peaks(all, [2.0, 0.5]);
+            assert_eq!((twice, half), (2.0 * one, 0.5 * one));
         }
     }
 
     #[test]
     fn values_far_from_a_limit_are_taken_as_they_are() {
-        assert_eq!(peak(&values(|t| 0.5 * t), [1.0; 2]), 0.5);
+        assert_eq!(peaks([&|t| 0.5 * t; LANES], [1.0; 2]), [0.5; LANES]);
     }
 }

@@ -2,18 +2,18 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::constraints::{Constraints, RowLayout};
+use super::constraints::{Block, Constraints, RowLayout};
 use super::exact::Exact;
-use super::hermite::{duration_on, local};
 use super::interior_point::Effort;
 use super::intersample_check::IntersampleCheck;
-use super::lower_bound::lagrangian;
+use super::lower_bound::lagrangian_on;
 use super::model::Model;
 use super::prepare::Prepared;
 use super::relaxed::Relaxed;
 use super::window::Window;
 use super::working_space::InteriorPoint;
 use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
+use feedplan_geometry::lanes::eight::Lanes;
 use feedplan_geometry::watch::Watch;
 
 /// A space curve that turns to both sides, its derivatives known by the length.
@@ -70,16 +70,14 @@ fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: 
 /// What the checks of a plan and its bound find on each interval.
 #[inline(always)]
 fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints<3>, between: &IntersampleCheck<3>) -> Vec<f64> {
-    let mut out = vec![];
-    for (n, interval) in rows.intervals.iter().enumerate() {
-        out.push(duration_on(simd, x, n, interval.h));
-        out.extend(rows.utilisation_on(simd, x, n));
-        out.extend(between.utilisation_on(simd, x, n, interval.h));
-        let u = local(x, n, interval.h);
-        let mut dual = vec![interval.speed; RowLayout::<3>::COUNT];
-        let (time, value, slope) = lagrangian(simd, rows, n, &u, &u, &mut dual);
-        out.extend([time, value]);
-        out.extend(slope);
+    let mut out = rows.utilisation_on(simd, x).concat();
+    out.extend(between.utilisation_on(simd, rows, x).concat());
+    let row = |h: &Lanes| h.map(|h| 0.3 * h);
+    let all_rows = |block: &Block<3>| vec![row(&block.h); RowLayout::<3>::BLOCK];
+    let mut dual: Vec<Lanes> = rows.blocks.iter().flat_map(all_rows).collect();
+    for terms in lagrangian_on(simd, rows, x, x, &mut dual) {
+        out.extend([terms.time, terms.value]);
+        out.extend(terms.slope);
     }
     out
 }

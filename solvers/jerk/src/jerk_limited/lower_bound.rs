@@ -22,19 +22,20 @@
 
 use std::ops::Range;
 
-use fearless_simd::{dispatch, Simd};
+use fearless_simd::{dispatch, Level, Simd};
 
 use super::coarse;
-use super::constraints::{Constraints, RowLayout};
+use super::columns::Columns;
+use super::constraints::{Constraints, Interval, RowLayout};
 use super::exact::Exact;
-use super::forms::{fall, pace, project};
-use super::hermite::{local, MASS};
+use super::forms::{fall, motion, pace, project};
+use super::hermite::{COUNT, MASS};
 use super::interior_point::{Effort, Outcome};
 use super::relaxed::Relaxed;
 use super::speed_limit;
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
 /// How the solution of the relaxation begins and ends.
 struct Start {
@@ -185,33 +186,31 @@ fn tangent<const M: usize>(
     space: &mut InteriorPoint<Relaxed, M>,
 ) -> (Part, f64) {
     let Planned { rows, at_ends, x: plan, .. } = *planned;
+    let whole = x;
     let x = &x[2 * core.start..2 * core.end + 2];
     let (mut time, mut fastest, mut least) = (0.0, 0.0, 0.0);
     let mut slope = vec![0.0; x.len()];
     let mut boxes = [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1);
     let mut change = Vec::with_capacity(core.len());
+    let terms = lagrangian(rows, plan, whole, &mut space.state.dual);
     for n in core.clone() {
-        let h = rows.intervals[n].h;
+        let interval = rows.interval(n);
+        let h = interval.h;
         let from = 2 * (n - core.start);
-        let dual = RowLayout::<M>::of_mut(&mut space.state.dual, n);
-        let (passed, value, own) = dispatch!(
-            space.level,
-            simd => lagrangian(simd, rows, n, &local(plan, n, h), &local(x, n - core.start, h), dual)
-        );
-        time += passed;
-        least += value;
+        time += terms[n].time;
+        least += terms[n].value;
         for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
-            slope[from + k] += own[k] * scale;
+            slope[from + k] += terms[n].slope[k] * scale;
         }
         // How much w can rise and fall on the interval: the 3/8 rule is exact for the quadratic w'.
         let mut moves = [0.0; 2];
-        for lane in 0..4 {
-            let [w, rise, fall] = limits_at(rows, n, lane);
-            fastest += MASS.values()[lane] * h / w.sqrt();
-            moves[0] += MASS.values()[lane] * rise * h;
-            moves[1] += MASS.values()[lane] * fall * h;
-            if lane == 0 || lane == 3 {
-                let at = from + lane / 3 * 2;
+        for p in 0..COUNT {
+            let [w, rise, fall] = limits_at(rows, &interval, p);
+            fastest += MASS[p] * h / w.sqrt();
+            moves[0] += MASS[p] * rise * h;
+            moves[1] += MASS[p] * fall * h;
+            if p == 0 || p == COUNT - 1 {
+                let at = from + p / (COUNT - 1) * 2;
                 boxes[at][1] = boxes[at][1].min(w);
                 boxes[at + 1] = [boxes[at + 1][0].max(-fall), boxes[at + 1][1].min(rise)];
             }
@@ -259,17 +258,21 @@ fn tangent<const M: usize>(
 /// The part by which the multipliers of jerk exceed the weights of the time.
 fn excess<const M: usize>(rows: &Constraints<M>, dual: &[Lanes]) -> f64 {
     let (mut excess, mut length) = (0.0, 0.0);
-    for (n, interval) in rows.intervals.iter().enumerate() {
-        let rest = rest::<M>(interval.h, RowLayout::<M>::of(dual, n));
-        excess += rest.values().iter().map(|rest| (-rest).max(0.0)).sum::<f64>();
-        length += interval.h;
+    for (b, block) in rows.blocks.iter().enumerate() {
+        for p in 0..COUNT {
+            let rest = rest::<M>(&block.h, RowLayout::<M>::of(dual, b, p), p);
+            for (rest, live) in rest.values().iter().zip(block.live.values()) {
+                excess += (-rest).max(0.0) * live;
+            }
+        }
+        length += block.h.values().iter().zip(block.live.values()).map(|(h, live)| h * live).sum::<f64>();
     }
     excess / length
 }
 
-/// c less the multipliers of jerk at the collocation points of an interval of length h.
-fn rest<const M: usize>(h: f64, dual: &[Lanes]) -> Lanes {
-    let mut rest = MASS.map(|mass| mass * h);
+/// c less the multipliers of jerk at collocation point p of intervals of length h.
+fn rest<const M: usize>(h: &Lanes, dual: &[Lanes], p: usize) -> Lanes {
+    let mut rest = h.map(|h| MASS[p] * h);
     for k in 0..M {
         for row in [RowLayout::<M>::jerk(k), RowLayout::<M>::jerk(k) + 1] {
             for (rest, own) in rest.values_mut().iter_mut().zip(dual[row].values()) {
@@ -291,65 +294,97 @@ fn loosen<const M: usize>(planned: &Planned<M>, out: &mut Vec<Lanes>) {
             }
         }
     };
-    for (n, (own, tight)) in planned.rows.intervals.iter().zip(&planned.tight.intervals).enumerate() {
-        let dual = RowLayout::<M>::of_mut(out, n);
-        scale(&mut dual[RowLayout::<M>::SPEED], &tight.speed, &own.speed);
-        let jerk = [tight, own].map(|limits| Lanes::all(limits.jerk));
-        for k in 0..M {
-            for side in 0..2 {
-                let row = &mut dual[RowLayout::<M>::acceleration(k) + side];
-                scale(row, &tight.acceleration, &own.acceleration);
-                scale(&mut dual[RowLayout::<M>::jerk(k) + side], &jerk[0], &jerk[1]);
+    for (b, (own, tight)) in planned.rows.blocks.iter().zip(&planned.tight.blocks).enumerate() {
+        for p in 0..COUNT {
+            let dual = RowLayout::<M>::of_mut(out, b, p);
+            let [at, tight_at] = [&own.points[p], &tight.points[p]];
+            scale(&mut dual[RowLayout::<M>::SPEED], &tight_at.speed, &at.speed);
+            for k in 0..M {
+                for side in 0..2 {
+                    let row = &mut dual[RowLayout::<M>::acceleration(k) + side];
+                    scale(row, &tight_at.acceleration, &at.acceleration);
+                    scale(&mut dual[RowLayout::<M>::jerk(k) + side], &tight.jerk, &own.jerk);
+                }
             }
+            dual[RowLayout::<M>::POSITIVE] = rest::<M>(&own.h, dual, p).map(|rest| rest.max(0.0));
         }
-        dual[RowLayout::<M>::POSITIVE] = rest::<M>(own.h, dual).map(|rest| rest.max(0.0));
     }
 }
 
-/// The plan's time on interval n, and value and local slope of the Lagrangian there, its multipliers made admissible.
+/// On an interval the plan's time in s, and value and local slope of the Lagrangian.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Terms {
+    pub time: f64,
+    pub value: f64,
+    pub slope: [f64; 4],
+}
+
+/// The terms of all intervals at a spline x; the multipliers are made admissible.
+fn lagrangian<const M: usize>(
+    rows: &Constraints<M>,
+    plan: &[f64],
+    x: &[f64],
+    dual: &mut [Lanes],
+) -> Vec<Terms> {
+    dispatch!(Level::new(), simd => lagrangian_on(simd, rows, plan, x, dual))
+}
+
 #[inline(always)]
-pub(super) fn lagrangian<S: Simd, const M: usize>(
+pub(super) fn lagrangian_on<S: Simd, const M: usize>(
     simd: S,
     rows: &Constraints<M>,
-    n: usize,
-    plan: &[f64; 4],
-    u: &[f64; 4],
+    plan: &[f64],
+    x: &[f64],
     dual: &mut [Lanes],
-) -> (f64, f64, [f64; 4]) {
-    let interval = &rows.intervals[n];
-    let cost = MASS.load(simd) * interval.h;
-    let time = (cost * pace(interval.motion(simd, plan)[0])).sum();
-    let mut jerk = Register::all(simd, 0.0);
-    for k in 0..M {
-        let at = RowLayout::<M>::jerk(k);
-        jerk += dual[at].load(simd) + dual[at + 1];
+) -> Vec<Terms> {
+    let [plan, x] = [plan, x].map(Columns::new);
+    let mut out = vec![Terms::default(); rows.count()];
+    let zero = Register::all(simd, 0.0);
+    for (b, (block, out)) in rows.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
+        let h = block.h.load(simd);
+        let per_h = h.inverse();
+        let [plan, u] = [&plan, &x].map(|spline| spline.local(b, h));
+        let (mut time, mut value, mut slope) = (zero, zero, [zero; 4]);
+        for p in 0..COUNT {
+            let dual = RowLayout::<M>::of_mut(dual, b, p);
+            let cost = h * MASS[p];
+            time += cost * pace(motion(p, per_h, &plan)[0]);
+            let mut jerk = zero;
+            for k in 0..M {
+                let at = RowLayout::<M>::jerk(k);
+                jerk += dual[at].load(simd) + dual[at + 1];
+            }
+            // The Lagrangian is bounded below in y only if the multipliers of its rows add up to its cost.
+            let most = cost * jerk.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
+            let fit = Register::all(simd, 1.0).min(most);
+            let mut fixed = -dual[RowLayout::<M>::SPEED].load(simd);
+            for k in 0..M {
+                let (at, to) = (RowLayout::<M>::acceleration(k), RowLayout::<M>::jerk(k));
+                let [up, down] = rows.acceleration.most[k];
+                fixed += -(dual[at].load(simd) * up + dual[at + 1].load(simd) * down);
+                (dual[to], dual[to + 1]) = ((dual[to] * fit).into(), (dual[to + 1] * fit).into());
+            }
+            let last = (cost - jerk * fit).max(zero);
+            let [w, w1, w2] = motion(p, per_h, &u);
+            let (pull, _) = rows.pull(simd, block, p, dual);
+            let pace = pace(w);
+            value += fixed + last * pace - pull[0] * w - pull[1] * w1 - pull[2] * w2;
+            project(p, per_h, &[-pull[0] - last * fall(pace), -pull[1], -pull[2]], &mut slope);
+        }
+        let (time, value, slope) = (time.values(), value.values(), slope.map(Register::values));
+        for (lane, out) in out.iter_mut().enumerate() {
+            *out = Terms { time: time[lane], value: value[lane], slope: slope.map(|slope| slope[lane]) };
+        }
     }
-    // The Lagrangian is bounded below in y only if the multipliers of its rows add up to its cost.
-    let most = cost * jerk.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
-    let fit = Register::all(simd, 1.0).min(most);
-    let mut fixed = -dual[RowLayout::<M>::SPEED].load(simd);
-    for k in 0..M {
-        let (at, to) = (RowLayout::<M>::acceleration(k), RowLayout::<M>::jerk(k));
-        let [up, down] = rows.acceleration.most[k];
-        fixed += -(dual[at].load(simd) * up + dual[at + 1].load(simd) * down);
-        (dual[to], dual[to + 1]) = ((dual[to] * fit).into(), (dual[to + 1] * fit).into());
-    }
-    let last = (cost - jerk * fit).max(Register::all(simd, 0.0));
-    let [w, w1, w2] = interval.motion(simd, u);
-    let (pull, _) = rows.pull(simd, n, dual);
-    let pace = pace(w);
-    let value = (fixed + last * pace - pull[0] * w - pull[1] * w1 - pull[2] * w2).sum();
-    let slope = project(interval.h, &[-pull[0] - last * fall(pace), -pull[1], -pull[2]]);
-    (time, value, slope)
+    out
 }
 
-/// The greatest w, w' and −w' by the limits of speed and acceleration at a lane of interval n.
-fn limits_at<const M: usize>(rows: &Constraints<M>, n: usize, lane: usize) -> [f64; 3] {
-    let interval = &rows.intervals[n];
-    let w = 1.0 / interval.speed.values()[lane];
+/// The greatest w, w' and −w' by the limits of speed and acceleration at collocation point p of an interval.
+fn limits_at<const M: usize>(rows: &Constraints<M>, interval: &Interval<M>, p: usize) -> [f64; 3] {
+    let w = 1.0 / interval.speed[p];
     let (mut rise, mut fall) = (f64::INFINITY, f64::INFINITY);
     for k in 0..M {
-        let [q1, q2, _] = interval.q[k].map(|q| q.values()[lane]);
+        let [q1, q2, _] = interval.q[p][k];
         let most = rows.acceleration.most[k].map(|most| most / rows.acceleration.per_mean[k]);
         let against = usize::from(q1 < 0.0);
         rise = rise.min(2.0 * (most[against] + q2.abs() * w) / q1.abs());
@@ -370,8 +405,7 @@ fn narrow(change: &[[f64; 2]], boxes: &mut [[f64; 2]]) {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::Level;
-
+    use super::super::hermite::local;
     use super::super::prepare::Prepared;
     use super::super::window::{ramps, Window};
     use super::*;
@@ -401,18 +435,28 @@ mod tests {
 
     /// Σ c max(w^(−1/2), |L(w)|/J) over some intervals: jerk beyond its limit takes time instead.
     fn relaxed_time(rows: &Constraints<2>, x: &[f64], core: &Range<usize>) -> f64 {
+        relaxed_times(rows, x)[core.clone()].iter().sum()
+    }
+
+    /// The same of each interval.
+    fn relaxed_times(rows: &Constraints<2>, x: &[f64]) -> Vec<f64> {
+        let x = Columns::new(x);
         dispatch!(Level::new(), simd => {
-            let mut time = 0.0;
-            for n in core.clone() {
-                let interval = &rows.intervals[n];
-                let motion = interval.motion(simd, &local(x, n, interval.h));
-                let mut y = pace(motion[0]);
-                for [_, jerk] in rows.axes(interval, motion) {
-                    y = y.max(jerk.abs());
+            let mut times = vec![];
+            for (b, block) in rows.blocks.iter().enumerate() {
+                let h = block.h.load(simd);
+                let mut time = Register::all(simd, 0.0);
+                for p in 0..COUNT {
+                    let motion = motion(p, h.inverse(), &x.local(b, h));
+                    let mut y = pace(motion[0]);
+                    for [_, jerk] in rows.axes(block, p, motion) {
+                        y = y.max(jerk.abs());
+                    }
+                    time += y * h * MASS[p];
                 }
-                time += (MASS.load(simd) * y).sum() * interval.h;
+                times.extend(time.values());
             }
-            time
+            times
         })
     }
 
@@ -421,10 +465,8 @@ mod tests {
     fn around(plan: &[f64], rows: &Constraints<2>, count: usize) -> Vec<Vec<f64>> {
         let mut random = random();
         let keeps = |x: &[f64]| {
-            (0..rows.intervals.len()).all(|n| {
-                let used = rows.utilisation(x, n);
-                used[0] <= 1.0 && used[1] <= 1.0 && (x[2 * n] > 0.0 && x[2 * n + 2] > 0.0)
-            })
+            let within = rows.utilisation(x).iter().all(|used| used[0] <= 1.0 && used[1] <= 1.0);
+            within && x.iter().step_by(2).all(|&w| w > 0.0)
         };
         let mut out = vec![];
         while out.len() < count {
@@ -439,7 +481,7 @@ mod tests {
                 x[2 * n] *= factor;
                 x[2 * n + 1] *= factor;
                 if !rough && n > 0 && n < last {
-                    let h = rows.intervals[n - 1].h + rows.intervals[n].h;
+                    let h = rows.h(n - 1) + rows.h(n);
                     x[2 * n + 1] -= size * plan[2 * n] * angle.cos() * waves * 2.0 / (last as f64 * h);
                 }
             }
@@ -486,28 +528,38 @@ mod tests {
         planned(2.2, |own, _| {
             let mut random = random();
             let profiles = around(own.x, own.rows, 40);
-            for (n, interval) in own.rows.intervals.iter().enumerate().step_by(7) {
+            let (count, blocks) = (own.rows.count(), &own.rows.blocks);
+            for _ in 0..20 {
                 // Of one row or all, up to more than the weights of the time.
-                let (most, one) = (interval.h * (1.0 + random()), 8.0 * random());
+                let (most, one) = (1.0 + random(), 8.0 * random());
                 let of_row = |row: usize| if one < 0.0 || row == one as usize { most } else { 0.0 };
+                let rows_of = |h: Lanes, p: usize| {
+                    (0..RowLayout::<2>::COUNT).map(move |row| h.map(|h| MASS[p] * h * of_row(row)))
+                };
                 let dual: Vec<Lanes> =
-                    (0..RowLayout::<2>::COUNT).map(|row| MASS.map(|mass| mass * of_row(row))).collect();
+                    blocks.iter().flat_map(|own| (0..COUNT).flat_map(|p| rows_of(own.h, p))).collect();
                 let found: Vec<_> = profiles
                     .iter()
                     .map(|z| {
-                        let u = local(z, n, interval.h);
-                        let (_, value, slope) = dispatch!(
-                            Level::new(),
-                            simd => lagrangian(simd, own.rows, n, &u, &u, &mut dual.clone())
-                        );
-                        let time = relaxed_time(own.rows, z, &(n..n + 1));
-                        assert!(value <= time + 1e-12, "{value} and {time} s on interval {n}");
-                        (u, value, slope)
+                        let terms = lagrangian(own.rows, z, z, &mut dual.clone());
+                        for (Terms { value, .. }, time) in terms.iter().zip(relaxed_times(own.rows, z)) {
+                            assert!(*value <= time + 1e-12, "{value} and {time} s");
+                        }
+                        (z, terms)
                     })
                     .collect();
                 for (from, to) in found.iter().zip(&found[1..]) {
-                    let tangent = from.1 + (0..4).map(|k| from.2[k] * (to.0[k] - from.0[k])).sum::<f64>();
-                    assert!(tangent <= to.1 + 1e-12, "{tangent} and {} s on interval {n}", to.1);
+                    for n in 0..count {
+                        let [u, v] = [from.0, to.0].map(|z| local(z, n, own.rows.h(n)));
+                        let [terms, next] = [from.1[n], to.1[n]];
+                        let tangent =
+                            terms.value + (0..4).map(|k| terms.slope[k] * (v[k] - u[k])).sum::<f64>();
+                        assert!(
+                            tangent <= next.value + 1e-12,
+                            "{tangent} and {} s on interval {n}",
+                            next.value
+                        );
+                    }
                 }
             }
         });
@@ -517,7 +569,7 @@ mod tests {
     fn no_profile_beats_the_bound_even_if_jerk_only_costs_time() {
         for turn in [0.6, 2.2] {
             planned(turn, |own, effort| {
-                let count = own.rows.intervals.len();
+                let count = own.rows.count();
                 let mut space = InteriorPoint::default();
                 let bound = part(own, 0..count, effort, &mut space).least;
                 let times: Vec<f64> = around(own.x, own.rows, 300)
@@ -545,7 +597,7 @@ mod tests {
     #[test]
     fn parts_add_up_and_hold_for_all_speeds_at_their_ends() {
         planned(2.2, |own, effort| {
-            let count = own.rows.intervals.len();
+            let count = own.rows.count();
             let mut space = InteriorPoint::default();
             let whole = part(own, 0..count, effort, &mut space);
             let cores = [0..count / 3, count / 3..2 * count / 3, 2 * count / 3..count];

@@ -1,69 +1,76 @@
 //! The passes of a Newton iteration of `interior_point` over the intervals: matrix, predictor, corrector, step lengths.
 
-use fearless_simd::Simd;
+use fearless_simd::{dispatch, Simd};
 
 use super::band::EndCondition;
 use super::constraints::{Constraints, RowLayout};
-use super::forms::project;
-use super::hermite::local;
+use super::forms::{motion, project};
+use super::hermite::COUNT;
 use super::model::Model;
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register};
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Assembles matrix and gradient at x, after `part` of the multipliers' step with λ ≥ `least_dual`/s; returns Σ λ
     /// s.
+    pub(super) fn assemble(&mut self, rows: &Constraints<M>, part: f64, least_dual: f64) -> f64 {
+        dispatch!(self.level, simd => self.assemble_on(simd, rows, part, least_dual))
+    }
+
     #[inline(always)]
-    pub(super) fn assemble<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        x: &[f64],
-        part: f64,
-        least_dual: f64,
-    ) -> f64 {
-        self.band.clear(rows.intervals.len() + 1);
-        self.gradient.fill(0.0);
+    fn assemble_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, part: f64, least_dual: f64) -> f64 {
         let state = &mut self.state;
         let mut work = Register::all(simd, 0.0);
         let floor = Register::all(simd, least_dual);
-        let weight = &mut self.scratch[..];
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let slack = RowLayout::<M>::of_mut(&mut state.slack, n);
-            let dual = RowLayout::<M>::of_mut(&mut state.dual, n);
-            let step = RowLayout::<M>::of(&state.step, n);
-            for k in 0..RowLayout::<M>::COUNT {
-                let inverse = slack[k].load(simd).inverse();
-                let multiplier = (dual[k] + step[k].load(simd) * part).max(floor * inverse);
-                work += multiplier * slack[k];
-                weight[k] = (multiplier * inverse).into();
-                (dual[k], slack[k]) = (multiplier.into(), inverse.into());
+        let weight = &mut self.scratch[..RowLayout::<M>::BLOCK];
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let all = b * RowLayout::<M>::BLOCK..(b + 1) * RowLayout::<M>::BLOCK;
+            let slack = &mut state.slack[all.clone()];
+            let dual = &mut state.dual[all.clone()];
+            let step = &state.step[all];
+            let mut own = Register::all(simd, 0.0);
+            // Rows are pairs: one division gives the inverses of both.
+            for k in (0..RowLayout::<M>::BLOCK).step_by(2) {
+                let both = [slack[k].load(simd), slack[k + 1].load(simd)];
+                let per_product = (both[0] * both[1]).inverse();
+                for (k, slack_here, other) in [(k, both[0], both[1]), (k + 1, both[1], both[0])] {
+                    let inverse = per_product * other;
+                    let multiplier = (dual[k] + step[k].load(simd) * part).max(floor * inverse);
+                    own += multiplier * slack_here;
+                    weight[k] = (multiplier * inverse).into();
+                    (dual[k], slack[k]) = (multiplier.into(), inverse.into());
+                }
             }
-            let local = self.model.local(simd, rows, n, &local(x, n, interval.h), weight, dual);
-            self.band.add(n, interval.h, &local.matrix);
-            for (k, scale) in [1.0, interval.h, 1.0, interval.h].into_iter().enumerate() {
-                self.gradient[2 * n + k] += local.gradient[k] * scale;
-            }
+            work += own * block.live;
+            let h = block.h.load(simd);
+            let local = self.model.local(rows, b, &self.x.local(b, h), weight, dual);
+            self.band.set(b, h, &local);
+            self.gradient.set(b, h, local.gradient);
         }
+        self.band.close();
+        self.gradient.close(rows.count());
         let mut work = work.sum();
         for row in self.ends.iter_mut().flatten() {
             row.dual = (row.dual + part * row.step).max(least_dual / row.slack);
             work += row.dual * row.slack;
-            let w = x[2 * row.station];
+            let w = self.x.w[row.station];
             let fall = row.ramp.way() / (w * w.sqrt());
-            self.gradient[2 * row.station] -= 0.5 * fall;
-            self.band.diagonal[row.station][0] +=
-                0.75 * fall / w + row.dual / row.slack / (row.greatest * row.greatest);
+            self.gradient.start.w[row.station] -= 0.5 * fall;
+            self.band
+                .add(row.station, 0.75 * fall / w + row.dual / row.slack / (row.greatest * row.greatest));
         }
         work
     }
 
     /// Returns Σ λ s, now `work`, after the predictor's longest step. Keeps the predictor's products −ds dλ, each at
     /// most `most` in size, and the pulls of these products and of the centring on each station.
+    pub(super) fn predict(&mut self, rows: &Constraints<M>, work: f64, most: f64) -> f64 {
+        dispatch!(self.level, simd => self.predict_on(simd, rows, work, most))
+    }
+
     #[inline(always)]
-    pub(super) fn predict<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, work: f64, most: f64) -> f64 {
-        self.pulls.fill([[0.0; 2]; 2]);
+    fn predict_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, work: f64, most: f64) -> f64 {
         let state = &mut self.state;
         let change = &mut self.scratch[..RowLayout::<M>::COUNT];
         let zero = Register::all(simd, 0.0);
@@ -71,35 +78,43 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let (mut least, mut greatest) = (zero, zero);
         // Sums of λ ds and λ ds²/s: with dλ = −λ (1 + ds/s) they give λ s after any step.
         let mut sums = [zero; 2];
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
-            let inverse = RowLayout::<M>::of(&state.slack, n);
-            let dual = RowLayout::<M>::of(&state.dual, n);
-            let product = RowLayout::<M>::of_mut(&mut state.step, n);
-            for k in 0..RowLayout::<M>::COUNT {
-                let step = change[k].load(simd);
-                let part = step * inverse[k];
-                least = least.min(part);
-                greatest = greatest.max(part);
-                let first = dual[k] * step;
-                let second = first * part;
-                sums[0] += first;
-                sums[1] += second;
-                let both = (first + second).max(low).min(high);
-                (product[k], change[k]) = (both.into(), (both * inverse[k]).into());
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (d, per_h) = (self.step.local(b, h), h.inverse());
+            let mut pulls = [[zero; 4]; 2];
+            for p in 0..COUNT {
+                self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
+                let inverse = RowLayout::<M>::of(&state.slack, b, p);
+                let dual = RowLayout::<M>::of(&state.dual, b, p);
+                let product = RowLayout::<M>::of_mut(&mut state.step, b, p);
+                for k in 0..RowLayout::<M>::COUNT {
+                    let step = change[k].load(simd);
+                    let part = step * inverse[k];
+                    least = least.min(part);
+                    greatest = greatest.max(part);
+                    let first = dual[k] * step;
+                    let second = first * part;
+                    sums[0] += first;
+                    sums[1] += second;
+                    let both = (first + second).max(low).min(high);
+                    (product[k], change[k]) = (both.into(), (both * inverse[k]).into());
+                }
+                let centre = self.model.pull(simd, rows, b, p, inverse, 0);
+                project(p, per_h, &centre, &mut pulls[0]);
+                let second = self.model.pull(simd, rows, b, p, change, 1);
+                project(p, per_h, &second, &mut pulls[1]);
             }
-            let pulls =
-                [self.model.pull(simd, rows, n, inverse, 0), self.model.pull(simd, rows, n, change, 1)];
-            for (which, pull) in pulls.iter().enumerate() {
-                let [w0, d0, w1, d1] = project(interval.h, pull);
-                add(&mut self.pulls[n][which], [w0, d0 * interval.h]);
-                add(&mut self.pulls[n + 1][which], [w1, d1 * interval.h]);
+            for (terms, own) in self.pulls.iter_mut().zip(pulls) {
+                terms.set(b, h, own);
             }
+        }
+        for terms in &mut self.pulls {
+            terms.close(rows.count());
         }
         let mut sums = [sums[0].sum(), sums[1].sum()];
         let (mut primal, mut dual) = (-least.least(), 1.0 + greatest.greatest());
         for row in self.ends.iter_mut().flatten() {
-            let change = -self.step[2 * row.station] / row.greatest;
+            let change = -self.step.w[row.station] / row.greatest;
             let part = change / row.slack;
             primal = primal.max(-part);
             dual = dual.max(1.0 + part);
@@ -108,28 +123,50 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             sums[1] += second;
             row.step = (first + second).clamp(-most, most);
             let pull = -1.0 / (row.slack * row.greatest);
-            self.pulls[row.station][0][0] += pull;
-            self.pulls[row.station][1][0] += pull * row.step;
+            self.pulls[0].start.w[row.station] += pull;
+            self.pulls[1].start.w[row.station] += pull * row.step;
         }
         let (p, d) = ((1.0 / primal).min(1.0), (1.0 / dual).min(1.0));
         work + p * sums[0] - d * (work + sums[0]) - p * d * (sums[0] + sums[1])
     }
 
+    /// The predictor's right-hand side.
+    pub(super) fn descend(&mut self) {
+        let Self { rhs, gradient, .. } = self;
+        let columns = [
+            (&mut rhs.w, &gradient.start.w, &gradient.end.w),
+            (&mut rhs.slope, &gradient.start.slope, &gradient.end.slope),
+        ];
+        for (rhs, start, end) in columns {
+            for ((rhs, start), end) in rhs.iter_mut().zip(start).zip(end) {
+                *rhs = -(start + end);
+            }
+        }
+    }
+
     /// The corrector's right-hand side: λ s of every row to `target`, and `second` times the predictor's products.
-    #[inline(always)]
     pub(super) fn correct(&mut self, target: f64, second: f64) {
-        for ((rhs, gradient), pulls) in
-            self.rhs.chunks_exact_mut(2).zip(self.gradient.chunks_exact(2)).zip(&self.pulls)
-        {
-            for i in 0..2 {
-                rhs[i] = target * pulls[0][i] + second * pulls[1][i] - gradient[i];
+        self.descend();
+        for (terms, part) in self.pulls.iter().zip([target, second]) {
+            let columns = [
+                (&mut self.rhs.w, &terms.start.w, &terms.end.w),
+                (&mut self.rhs.slope, &terms.start.slope, &terms.end.slope),
+            ];
+            for (rhs, start, end) in columns {
+                for ((rhs, start), end) in rhs.iter_mut().zip(start).zip(end) {
+                    *rhs += part * (start + end);
+                }
             }
         }
     }
 
     /// Computes the steps of the multipliers; returns the longest steps that keep slacks and multipliers positive.
+    pub(super) fn direction(&mut self, rows: &Constraints<M>, target: f64, second: f64) -> (f64, f64) {
+        dispatch!(self.level, simd => self.direction_on(simd, rows, target, second))
+    }
+
     #[inline(always)]
-    pub(super) fn direction<S: Simd>(
+    fn direction_on<S: Simd>(
         &mut self,
         simd: S,
         rows: &Constraints<M>,
@@ -141,32 +178,38 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let state = &mut self.state;
         let mut least = Register::all(simd, -1e-12);
         let mut dual_most = 1e-12;
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
-            let inverse = RowLayout::<M>::of(&state.slack, n);
-            let dual = RowLayout::<M>::of(&state.dual, n);
-            let step = RowLayout::<M>::of_mut(&mut state.step, n);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (d, per_h) = (self.step.local(b, h), h.inverse());
             let known = Register::all(simd, dual_most);
             let mut beyond = Register::all(simd, 0.0);
-            for k in 0..RowLayout::<M>::COUNT {
-                let part = change[k].load(simd) * inverse[k];
-                least = least.min(part);
-                let aim = (goal + step[k].load(simd) * second) * inverse[k];
-                let next = aim - dual[k] * (Lanes::ONE + part);
-                beyond = beyond.min(next + dual[k] * known);
-                step[k] = next.into();
+            for p in 0..COUNT {
+                self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
+                let inverse = RowLayout::<M>::of(&state.slack, b, p);
+                let dual = RowLayout::<M>::of(&state.dual, b, p);
+                let step = RowLayout::<M>::of_mut(&mut state.step, b, p);
+                for k in 0..RowLayout::<M>::COUNT {
+                    let part = change[k].load(simd) * inverse[k];
+                    least = least.min(part);
+                    let aim = (goal + step[k].load(simd) * second) * inverse[k];
+                    let next = aim - dual[k] * (Lanes::ONE + part);
+                    beyond = beyond.min(next + dual[k] * known);
+                    step[k] = next.into();
+                }
             }
             // Few intervals need a shorter step than all before; only these divide. No lane is above 0.
             if beyond.sum() < 0.0 {
-                for k in 0..RowLayout::<M>::COUNT {
-                    let part = step[k] * dual[k].load(simd).inverse();
-                    dual_most = (-part).greatest().max(dual_most);
+                let all = b * RowLayout::<M>::BLOCK..(b + 1) * RowLayout::<M>::BLOCK;
+                let mut most = known;
+                for (step, dual) in state.step[all.clone()].iter().zip(&state.dual[all]) {
+                    most = (-(step.load(simd) * dual.load(simd).inverse())).max(most);
                 }
+                dual_most = most.greatest();
             }
         }
         let (mut primal, mut dual) = (-least.least(), dual_most);
         for row in self.ends.iter_mut().flatten() {
-            let change = -self.step[2 * row.station] / row.greatest / row.slack;
+            let change = -self.step.w[row.station] / row.greatest / row.slack;
             primal = primal.max(-change);
             row.step = (target + row.step * second) / row.slack - row.dual * (1.0 + change);
             dual = dual.max(-row.step / row.dual);
@@ -177,99 +220,115 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Moves x and the multipliers by a Newton step that keeps λ s: to first order the gradient of the Lagrangian
     /// vanishes there. The multipliers stay at 0 or above, and w above 0, but x may leave the limits. False where there
     /// is no such step.
-    #[inline(always)]
-    pub(super) fn balance<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        conditions: [EndCondition; 2],
-        x: &mut [f64],
-    ) -> bool {
-        if self.slacks(simd, rows, x, false).is_none() {
+    pub(super) fn balance(&mut self, rows: &Constraints<M>, conditions: [EndCondition; 2]) -> bool {
+        if self.slacks(rows, false).is_none() {
             return false;
         }
         self.state.step.fill(Lanes::ZERO);
-        self.assemble(simd, rows, x, 0.0, 0.0);
-        if !self.band.factor(conditions) {
+        self.assemble(rows, 0.0, 0.0);
+        if !self.factor(conditions) {
             return false;
         }
-        self.pulls.fill([[0.0; 2]; 2]);
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let pull = self.model.pull(simd, rows, n, RowLayout::<M>::of(&self.state.dual, n), 0);
-            let [w0, d0, w1, d1] = project(interval.h, &pull);
-            add(&mut self.pulls[n][0], [w0, d0 * interval.h]);
-            add(&mut self.pulls[n + 1][0], [w1, d1 * interval.h]);
-        }
-        for row in self.ends.iter().flatten() {
-            self.pulls[row.station][0][0] -= row.dual / row.greatest;
-        }
+        dispatch!(self.level, simd => self.pull_on(simd, rows));
         self.correct(1.0, 0.0);
-        self.band.solve(&self.rhs, [[0.0; 2]; 2], &mut self.step);
-        for ((to, from), step) in self.trial.iter_mut().zip(x.iter()).zip(&self.step) {
-            *to = from + step;
-        }
-        if self.trial.iter().step_by(2).any(|&w| w.is_nan() || w <= 0.0) {
+        self.step_to(rows, [[0.0; 2]; 2], [1.0, 0.0]);
+        self.try_step(1.0);
+        if self.trial.w.iter().any(|&w| w.is_nan() || w <= 0.0) {
             return false;
         }
-        x.copy_from_slice(&self.trial);
-        self.model.solved(simd, rows, &self.step, [1.0, 0.0]);
+        std::mem::swap(&mut self.x, &mut self.trial);
+        dispatch!(self.level, simd => self.keep_products(simd, rows));
+        true
+    }
+
+    /// The pulls of the multipliers on each station.
+    #[inline(always)]
+    fn pull_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>) {
+        let zero = Register::all(simd, 0.0);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let per_h = h.inverse();
+            let mut own = [zero; 4];
+            for p in 0..COUNT {
+                let dual = RowLayout::<M>::of(&self.state.dual, b, p);
+                let pull = self.model.pull(simd, rows, b, p, dual, 0);
+                project(p, per_h, &pull, &mut own);
+            }
+            self.pulls[0].set(b, h, own);
+        }
+        self.pulls[0].close(rows.count());
+        for row in self.ends.iter().flatten() {
+            self.pulls[0].start.w[row.station] -= row.dual / row.greatest;
+        }
+    }
+
+    /// Changes the multipliers so that to first order λ s stays as it was before the step, and accepts the step.
+    #[inline(always)]
+    fn keep_products<S: Simd>(&mut self, simd: S, rows: &Constraints<M>) {
         let change = &mut self.scratch[..RowLayout::<M>::COUNT];
         let zero = Register::all(simd, 0.0);
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
-            let inverse = RowLayout::<M>::of(&self.state.slack, n);
-            let dual = RowLayout::<M>::of_mut(&mut self.state.dual, n);
-            for k in 0..RowLayout::<M>::COUNT {
-                let part = change[k].load(simd) * inverse[k];
-                dual[k] = (dual[k] * (Lanes::ONE - part)).max(zero).into();
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (d, per_h) = (self.step.local(b, h), h.inverse());
+            for p in 0..COUNT {
+                self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
+                let inverse = RowLayout::<M>::of(&self.state.slack, b, p);
+                let dual = RowLayout::<M>::of_mut(&mut self.state.dual, b, p);
+                for k in 0..RowLayout::<M>::COUNT {
+                    let part = change[k].load(simd) * inverse[k];
+                    dual[k] = (dual[k] * (Lanes::ONE - part)).max(zero).into();
+                }
             }
         }
         for row in self.ends.iter_mut().flatten() {
-            let part = -self.step[2 * row.station] / row.greatest / row.slack;
+            let part = -self.step.w[row.station] / row.greatest / row.slack;
             row.dual = (row.dual * (1.0 - part)).max(0.0);
         }
         self.model.attempt(simd, 1.0);
         self.model.accept();
-        true
+    }
+
+    /// Factors the matrix; false if it is not positive definite.
+    pub(super) fn factor(&mut self, conditions: [EndCondition; 2]) -> bool {
+        dispatch!(self.level, _simd => self.band.factor(conditions))
+    }
+
+    /// The step for the right-hand side; `missing` are the steps at given ends, `pulls` the parts of both pulls in it.
+    pub(super) fn step_to(&mut self, rows: &Constraints<M>, missing: [[f64; 2]; 2], pulls: [f64; 2]) {
+        self.band.solve(&self.rhs, missing, &mut self.step);
+        dispatch!(self.level, simd => self.model.solved(simd, rows, &self.step, pulls));
     }
 
     /// Time and Σ ln s after a part of the step; the time is infinite where a limit is broken.
-    #[inline(always)]
-    pub(super) fn attempt<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        ends: [WindowEnd; 2],
-        x: &[f64],
-        part: f64,
-    ) -> (f64, f64) {
-        let mut trial = std::mem::take(&mut self.trial);
-        for ((to, from), step) in trial.iter_mut().zip(x).zip(&self.step) {
-            *to = from + part * step;
-        }
-        self.model.attempt(simd, part);
-        let logarithm = self.slacks(simd, rows, &trial, true);
-        self.trial = trial;
-        match logarithm {
-            Some(logarithm) => (self.time(simd, rows, ends, &self.trial, true), logarithm),
+    pub(super) fn attempt(&mut self, rows: &Constraints<M>, ends: [WindowEnd; 2], part: f64) -> (f64, f64) {
+        self.try_step(part);
+        dispatch!(self.level, simd => self.model.attempt(simd, part));
+        match self.slacks(rows, true) {
+            Some(logarithm) => (self.time(rows, ends, true), logarithm),
             None => (f64::INFINITY, 0.0),
         }
     }
 
+    /// The trial is x and a part of the step.
+    fn try_step(&mut self, part: f64) {
+        let Self { trial, x, step, .. } = self;
+        let columns = [(&mut trial.w, &x.w, &step.w), (&mut trial.slope, &x.slope, &step.slope)];
+        for (to, from, step) in columns {
+            for ((to, from), step) in to.iter_mut().zip(from).zip(step) {
+                *to = from + part * step;
+            }
+        }
+    }
+
     /// Adds a part of the multipliers' last step.
-    #[inline(always)]
-    pub(super) fn finish<S: Simd>(&mut self, simd: S, part: f64) {
+    pub(super) fn finish(&mut self, part: f64) {
         for (dual, step) in self.state.dual.iter_mut().zip(&self.state.step) {
-            *dual = (*dual + step.load(simd) * part).into();
+            for (dual, step) in dual.values_mut().iter_mut().zip(step.values()) {
+                *dual += step * part;
+            }
         }
         for row in self.ends.iter_mut().flatten() {
             row.dual += part * row.step;
         }
     }
-}
-
-#[inline(always)]
-fn add(to: &mut [f64; 2], more: [f64; 2]) {
-    to[0] += more[0];
-    to[1] += more[1];
 }

@@ -85,13 +85,14 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     fn begin(&mut self) -> Result<(), Fault> {
         let (limits, slopes) = (&self.problem.limits, self.slopes);
         let mut caps =
-            self.each(|rows, n, _| rows.intervals[n].envelope_cap(limits, slopes.k), f64::INFINITY);
+            self.each(|rows, _| rows.intervals().map(|own| own.envelope_cap(limits, slopes.k)).collect());
         self.speeds = caps.iter().map(|r| r.power(2.0 / 3.0)).collect();
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
             self.watch.check();
             self.x = initial_plan::smooth(&self.grid.stations, &caps, slopes, &self.ends);
-            self.used = self.each(|rows, n, x| initial_plan::used(rows, x, n), 0.0);
+            self.used =
+                self.each(|rows, x| rows.utilisation(x).into_iter().map(initial_plan::used).collect());
             worst = self.used.iter().copied().fold(0.0, f64::max);
             if worst <= 1.0 {
                 return Ok(());
@@ -111,18 +112,16 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         Ok(())
     }
 
-    /// f(constraints of some intervals, index among them, x at their stations) for every interval.
-    fn each(&self, f: impl Fn(&Constraints<M>, usize, &[f64]) -> f64 + Sync, fill: f64) -> Vec<f64> {
-        let mut out = vec![fill; self.grid.pieces.len()];
+    /// f(constraints of some intervals, x at their stations) for all intervals.
+    fn each(&self, f: impl Fn(&Constraints<M>, &[f64]) -> Vec<f64> + Sync) -> Vec<f64> {
+        let mut out = vec![0.0; self.grid.pieces.len()];
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             self.watch.check();
             let first = chunk * CHUNK;
             let mut rows = Constraints::new(&self.problem.limits);
             self.take(first..first + out.len(), &mut rows);
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);
-            for (n, out) in out.iter_mut().enumerate() {
-                *out = f(&rows, n, x);
-            }
+            out.copy_from_slice(&f(&rows, x));
         });
         out
     }

@@ -8,24 +8,26 @@
 
 use fearless_simd::Simd;
 
+use super::columns::Columns;
 use super::constraints::{Constraints, RowLayout};
-use super::forms::{expand, fall, pace, project, Local};
-use super::hermite::{local, MASS};
+use super::forms::{fall, motion, pace, project, Local};
+use super::hermite::{COUNT, MASS};
 use super::model::Model;
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register};
 
-/// The variables y of the relaxation, four lanes for each interval.
+/// The variables of the relaxation at the collocation points of each block.
 pub struct Relaxed {
-    pub y: Vec<Lanes>,
+    pub y: Vec<[Lanes; COUNT]>,
     /// y starts above its least possible value by this part of it.
     pub above: f64,
-    step: Vec<Lanes>,
-    trial: Vec<Lanes>,
+    step: Vec<[Lanes; COUNT]>,
+    trial: Vec<[Lanes; COUNT]>,
     /// w^(−1/2), as the slacks were last evaluated.
-    pace: Vec<Lanes>,
-    /// Second derivatives by y and y, and by y and (w, w', w''); then the pulls of the rows on y.
-    cross: Vec<[Lanes; 4]>,
-    pulls: Vec<[Lanes; 2]>,
+    pace: Vec<[Lanes; COUNT]>,
+    /// 1 over the second derivative by y and y, and the second derivatives by y and (w, w', w'').
+    cross: Vec<[[Lanes; 4]; COUNT]>,
+    /// The pulls of the rows on y.
+    pulls: Vec<[[Lanes; 2]; COUNT]>,
 }
 
 impl Default for Relaxed {
@@ -37,86 +39,105 @@ impl Default for Relaxed {
 
 impl<const M: usize> Model<M> for Relaxed {
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, x: &[f64]) {
-        let count = rows.intervals.len();
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, x: &Columns) {
+        let count = rows.blocks.len();
         for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
-            lanes.resize(count, Lanes::ONE);
+            lanes.resize(count, [Lanes::ONE; COUNT]);
         }
-        self.pulls.resize(count, [Lanes::ZERO; 2]);
-        self.cross.resize(count, [Lanes::ONE; 4]);
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let motion = interval.motion(simd, &local(x, n, interval.h));
-            let mut least = pace(motion[0]);
-            for [_, jerk] in rows.axes(interval, motion) {
-                least = least.max(jerk.abs());
+        self.pulls.resize(count, [[Lanes::ZERO; 2]; COUNT]);
+        self.cross.resize(count, [[Lanes::ONE; 4]; COUNT]);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (u, per_h) = (x.local(b, h), h.inverse());
+            for p in 0..COUNT {
+                let motion = motion(p, per_h, &u);
+                let mut least = pace(motion[0]);
+                for [_, jerk] in rows.axes(block, p, motion) {
+                    least = least.max(jerk.abs());
+                }
+                self.y[b][p] = (least * (1.0 + self.above)).into();
             }
-            self.y[n] = (least * (1.0 + self.above)).into();
         }
     }
 
     #[inline(always)]
     fn slack<S: Simd>(
         &mut self,
-        simd: S,
         rows: &Constraints<M>,
-        n: usize,
-        u: &[f64; 4],
+        block: usize,
+        p: usize,
+        motion: [Register<S>; 3],
         trial: bool,
         out: &mut [Lanes],
     ) {
-        let pace = pace(rows.intervals[n].motion(simd, u)[0]);
-        let y = if trial { self.trial[n] } else { self.y[n] }.load(simd);
-        rows.slack(n, u, y, y - pace, out);
-        self.pace[n] = pace.into();
+        let pace = pace(motion[0]);
+        let y = if trial { &self.trial } else { &self.y }[block][p].load(pace.simd());
+        rows.slack(&rows.blocks[block], p, motion, y, y - pace, out);
+        self.pace[block][p] = pace.into();
     }
 
     #[inline(always)]
-    fn slack_step<S: Simd>(&self, simd: S, rows: &Constraints<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
-        let w = rows.intervals[n].motion(simd, d)[0];
-        let step = self.step[n].load(simd);
-        rows.slack_step(n, d, step, step + fall(self.pace[n].load(simd)) * w, out);
+    fn slack_step<S: Simd>(
+        &self,
+        rows: &Constraints<M>,
+        block: usize,
+        p: usize,
+        motion: [Register<S>; 3],
+        out: &mut [Lanes],
+    ) {
+        let w = motion[0];
+        let step = self.step[block][p].load(w.simd());
+        let last = step + fall(self.pace[block][p].load(w.simd())) * w;
+        rows.slack_step(&rows.blocks[block], p, motion, step, last, out);
     }
 
     #[inline(always)]
     fn local<S: Simd>(
         &mut self,
-        simd: S,
         rows: &Constraints<M>,
-        n: usize,
-        _: &[f64; 4],
+        block: usize,
+        u: &[Register<S>; 4],
         weight: &[Lanes],
         dual: &[Lanes],
-    ) -> Local {
-        let interval = &rows.intervals[n];
+    ) -> Local<S> {
+        let simd = u[0].simd();
+        let own = &rows.blocks[block];
+        let h = own.h.load(simd);
+        let per_h = h.inverse();
         let zero = Register::all(simd, 0.0);
-        let mut form = rows.curvature(simd, n, weight);
-        let (last, pace) = (weight[RowLayout::<M>::POSITIVE].load(simd), self.pace[n].load(simd));
-        let fall = fall(pace);
-        let mut cross = [last, last * fall, zero, zero];
-        form[0] += last * fall * fall + dual[RowLayout::<M>::POSITIVE] * fall * pace * pace * 1.5;
-        for k in 0..M {
-            let at = RowLayout::<M>::jerk(k);
-            let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
-            let (both, turn) = (up + down, down - up);
-            let turn = turn * (rows.per_jerk[k] * interval.jerk);
-            let [q1, q2, q3] = interval.q[k];
-            cross[0] += both;
-            cross[1] += turn * q3;
-            cross[2] += turn * q2 * 1.5;
-            cross[3] += turn * q1 * 0.5;
+        let mut local = Local::zero(simd);
+        for p in 0..COUNT {
+            let [weight, dual] = [weight, dual].map(|rows| RowLayout::<M>::of(rows, 0, p));
+            let mut form = rows.curvature(simd, own, p, weight);
+            let (last, pace) = (weight[RowLayout::<M>::POSITIVE].load(simd), self.pace[block][p].load(simd));
+            let fall = fall(pace);
+            let mut cross = [last, last * fall, zero, zero];
+            form[0] += last * fall * fall + dual[RowLayout::<M>::POSITIVE] * fall * pace * pace * 1.5;
+            for k in 0..M {
+                let at = RowLayout::<M>::jerk(k);
+                let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
+                let (both, turn) = (up + down, down - up);
+                let turn = turn * own.jerk * rows.per_jerk[k];
+                let [q1, q2, q3] = own.points[p].q[k];
+                cross[0] += both;
+                cross[1] += turn * q3;
+                cross[2] += turn * q2 * 1.5;
+                cross[3] += turn * q1 * 0.5;
+            }
+            let per = cross[0].inverse();
+            let [p0, p1, p2] = [cross[1] * per, cross[2] * per, cross[3] * per];
+            form[0] += -(p0 * cross[1]);
+            form[1] += -(p0 * cross[2]);
+            form[2] += -(p0 * cross[3]);
+            form[3] += -(p1 * cross[2]);
+            form[4] += -(p1 * cross[3]);
+            form[5] += -(p2 * cross[3]);
+            self.cross[block][p] = [per, cross[1], cross[2], cross[3]].map(Lanes::from);
+            local.add(p, per_h, &form);
+            let cost = h * -MASS[p];
+            project(p, per_h, &[p0 * cost, p1 * cost, p2 * cost], &mut local.gradient);
         }
-        self.cross[n] = cross.map(Lanes::from);
-        let per = cross[0].inverse();
-        let [p0, p1, p2] = [cross[1] * per, cross[2] * per, cross[3] * per];
-        form[0] += -(p0 * cross[1]);
-        form[1] += -(p0 * cross[2]);
-        form[2] += -(p0 * cross[3]);
-        form[3] += -(p1 * cross[2]);
-        form[4] += -(p1 * cross[3]);
-        form[5] += -(p2 * cross[3]);
-        let cost = MASS.load(simd) * interval.h;
-        let linear = [-(p0 * cost), -(p1 * cost), -(p2 * cost)];
-        Local { matrix: expand(interval.h, &form, zero), gradient: project(interval.h, &linear) }
+        local
     }
 
     #[inline(always)]
@@ -124,37 +145,44 @@ impl<const M: usize> Model<M> for Relaxed {
         &mut self,
         simd: S,
         rows: &Constraints<M>,
-        n: usize,
+        block: usize,
+        p: usize,
         aim: &[Lanes],
         which: usize,
     ) -> [Register<S>; 3] {
-        let (mut pull, jerk) = rows.pull(simd, n, aim);
+        let (mut pull, jerk) = rows.pull(simd, &rows.blocks[block], p, aim);
         let last = aim[RowLayout::<M>::POSITIVE].load(simd);
-        pull[0] += last * fall(self.pace[n].load(simd));
-        self.pulls[n][which] = (jerk + last).into();
-        let cross = &self.cross[n];
-        let part = (jerk + last) * cross[0].load(simd).inverse();
+        pull[0] += last * fall(self.pace[block][p].load(simd));
+        self.pulls[block][p][which] = (jerk + last).into();
+        let [per, cross @ ..] = &self.cross[block][p];
+        let part = (jerk + last) * *per;
         for k in 0..3 {
-            pull[k] += -(part * cross[k + 1]);
+            pull[k] += -(part * cross[k]);
         }
         pull
     }
 
     #[inline(always)]
-    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, step: &[f64], pulls: [f64; 2]) {
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let [w, w1, w2] = interval.motion(simd, &local(step, n, interval.h));
-            let [own, c0, c1, c2] = self.cross[n];
-            let [centre, product] = self.pulls[n];
-            let aim = centre.load(simd) * pulls[0] + product.load(simd) * pulls[1];
-            let free = aim - MASS.load(simd) * interval.h - c0 * w - c1 * w1 - c2 * w2;
-            self.step[n] = (free * own.load(simd).inverse()).into();
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, step: &Columns, pulls: [f64; 2]) {
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (u, per_h) = (step.local(b, h), h.inverse());
+            for p in 0..COUNT {
+                let [w, w1, w2] = motion(p, per_h, &u);
+                let [per, c0, c1, c2] = self.cross[b][p];
+                let [centre, product] = self.pulls[b][p];
+                let aim = centre.load(simd) * pulls[0] + product.load(simd) * pulls[1];
+                let free = aim - h * MASS[p] - c0 * w - c1 * w1 - c2 * w2;
+                self.step[b][p] = (free * per * block.live).into();
+            }
         }
     }
 
     #[inline(always)]
     fn attempt<S: Simd>(&mut self, simd: S, part: f64) {
-        for ((trial, y), step) in self.trial.iter_mut().zip(&self.y).zip(&self.step) {
+        let all = |vector| <[[Lanes; COUNT]]>::as_flattened(vector);
+        let trial = self.trial.as_flattened_mut().iter_mut();
+        for ((trial, y), step) in trial.zip(all(&self.y)).zip(all(&self.step)) {
             *trial = (*y + step.load(simd) * part).into();
         }
     }
@@ -164,15 +192,24 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64], trial: bool) -> f64 {
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &Columns, trial: bool) -> f64 {
         let y = if trial { &self.trial } else { &self.y };
-        let mut time = 0.0;
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            if interval.motion(simd, &local(x, n, interval.h))[0].least() <= 0.0 {
-                return f64::INFINITY;
+        let mut time = Register::all(simd, 0.0);
+        let mut least = Register::all(simd, f64::INFINITY);
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (u, per_h) = (x.local(b, h), h.inverse());
+            let mut cost = Register::all(simd, 0.0);
+            for p in 0..COUNT {
+                least = motion(p, per_h, &u)[0].min(least);
+                cost += y[b][p].load(simd) * MASS[p];
             }
-            time += (MASS * y[n].load(simd)).sum() * interval.h;
+            time += cost * h * block.live;
         }
-        time
+        if least.least() > 0.0 {
+            time.sum()
+        } else {
+            f64::INFINITY
+        }
     }
 }

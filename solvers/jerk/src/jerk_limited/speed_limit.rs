@@ -12,6 +12,7 @@
 //! The relaxation (`relaxed`) lets jerk exceed its limit where that costs time. It is closer with these speeds.
 
 use super::constraints::Constraints;
+use super::hermite::COUNT;
 
 /// Rounds of all passes.
 const ROUNDS: usize = 4;
@@ -56,11 +57,7 @@ pub fn lower<const M: usize>(rows: &mut Constraints<M>) {
         convex(&mut points);
     }
     for (n, point) in points.iter().enumerate() {
-        // Limits that do not apply are 0.
-        let speed = &mut rows.intervals[n / 4].speed.values_mut()[n % 4];
-        if *speed > 0.0 {
-            *speed = speed.max(1.0 / point.w);
-        }
+        rows.lower(n / COUNT, n % COUNT, point.w);
     }
 }
 
@@ -91,20 +88,19 @@ fn points<const M: usize>(rows: &Constraints<M>) -> (Vec<Point<M>>, Vec<Step<M>>
     let most =
         |k: usize, side: bool| rows.acceleration.most[k][usize::from(side)] / rows.acceleration.per_mean[k];
     let along = |direction: &[f64; M]| (0..M).map(|k| direction[k].abs() * jerk[k]).sum::<f64>();
-    let mut points: Vec<Point<M>> = Vec::with_capacity(4 * rows.intervals.len());
-    let mut steps = Vec::with_capacity(4 * rows.intervals.len());
+    let mut points: Vec<Point<M>> = Vec::with_capacity(COUNT * rows.count());
+    let mut steps = Vec::with_capacity(COUNT * rows.count());
     let mut slope = 0.0;
-    for interval in &rows.intervals {
-        for lane in 0..4 {
-            let [first, second] =
-                [0, 1].map(|order| std::array::from_fn(|k| interval.q[k][order].values()[lane]));
+    for interval in rows.intervals() {
+        for p in 0..COUNT {
+            let [first, second] = [0, 1].map(|order| interval.q[p].map(|q| q[order]));
             let bend = length(&second);
             let normal = second.map(|second: f64| second / bend.max(f64::MIN_POSITIVE));
             let across: f64 = (0..M).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
-            let w = (1.0 / interval.speed.values()[lane]).min(across / bend);
+            let w = (1.0 / interval.speed[p]).min(across / bend);
             let mut next = Point { first, normal, bend, w, convex: 0.0, s: 0.0, integral: 0.0 };
             if let Some(last) = points.last() {
-                let h = if lane == 0 { 0.0 } else { interval.h / 3.0 };
+                let h = if p == 0 { 0.0 } else { interval.h / 3.0 };
                 let change = 3.0 * 0.5 * (along(&last.first) + along(&next.first)) * h;
                 next.s = last.s + h;
                 next.integral = last.integral + h * (slope + 0.5 * change);
@@ -217,7 +213,7 @@ mod tests {
         let mut rows = Constraints::new(&limits);
         rows.sample(&Clothoid(c), &limits, &stations, &[0; 40], &[1.0; 40], cap);
         lower(&mut rows);
-        (0..40).map(|n| 1.0 / rows.intervals[n].speed.values()[0]).collect()
+        rows.intervals().map(|interval| 1.0 / interval.speed[0]).collect()
     }
 
     /// Two lines along the second axis; the first one moves the first axis by rounding.
@@ -241,8 +237,8 @@ mod tests {
         let mut rows = Constraints::new(&limits);
         rows.sample(&Rounded, &limits, &stations, &[0, 0, 1, 1], &[1.0; 4], |_| f64::INFINITY);
         lower(&mut rows);
-        for interval in &rows.intervals {
-            assert!(interval.speed.values().iter().all(|per_w| (1e4 * per_w - 1.0).abs() < 1e-9));
+        for interval in rows.intervals() {
+            assert!(interval.speed.iter().all(|per_w| (1e4 * per_w - 1.0).abs() < 1e-9));
         }
     }
 

@@ -73,7 +73,7 @@ impl<const M: usize> Window<M> {
         let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
         let (mut attempts, spent) = coarse::starts(&self.rows, ends, inside(x), &rough, space);
         verdict.iterations = spent;
-        let mut times = vec![0; self.rows.intervals.len()];
+        let mut times = vec![0; self.rows.count()];
         for round in 0..ROUNDS {
             let Some((y, report)) = self.attempt(ends, attempts, space, &mut verdict.iterations) else {
                 break;
@@ -135,9 +135,7 @@ impl<const M: usize> Window<M> {
         y: &[f64],
         effort: &Effort<'e>,
     ) -> Vec<(Vec<f64>, Effort<'e>)> {
-        let is_inside = |z: &[f64]| {
-            (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
-        };
+        let is_inside = |z: &[f64]| self.rows.utilisation(z).as_flattened().iter().all(|&used| used < 1.0);
         let far = inside(x);
         let ways = ways_back(ends, far.clone());
         let is_near = |part: f64| ways.iter().find(|way| is_inside(&blend(way, y, part)));
@@ -166,10 +164,7 @@ impl<const M: usize> Window<M> {
 
     /// Whether x uses no limit of the machine by more than `most`.
     pub fn holds(&self, x: &[f64], most: f64) -> bool {
-        (0..self.rows.intervals.len()).all(|n| {
-            let worst = self.check.utilisation(x, n, self.rows.intervals[n].h);
-            worst.iter().all(|&part| part <= most)
-        })
+        self.check.utilisation(&self.rows, x).as_flattened().iter().all(|&used| used <= most)
     }
 
     /// Tightens the limits where x exceeds them between the collocation points, and counts how often; false if x
@@ -177,13 +172,13 @@ impl<const M: usize> Window<M> {
     /// collocation points.
     fn tighten(&mut self, x: &[f64], times: &mut [i32], rough: bool) -> bool {
         let mut holds = true;
-        for (n, times) in times.iter_mut().enumerate() {
+        let at = if rough { self.rows.utilisation(x) } else { vec![] };
+        let all = self.check.utilisation(&self.rows, x);
+        for (n, (times, mut used)) in times.iter_mut().zip(all).enumerate() {
             let margin = MARGIN.map(|least| least * RISE.powi(*times));
-            let mut used = self.check.utilisation(x, n, self.rows.intervals[n].h);
             holds &= used.iter().all(|&used| used <= HELD);
             if rough {
-                let at = self.rows.utilisation(x, n);
-                for (used, at) in used.iter_mut().zip(at) {
+                for (used, at) in used.iter_mut().zip(at[n]) {
                     if at > ROUGH.1 && *used < FIRM * at {
                         *used /= at;
                     }
@@ -195,15 +190,14 @@ impl<const M: usize> Window<M> {
                 );
             if factors != [1.0; 3] {
                 *times += 1;
-                self.rows.intervals[n].tighten(factors);
+                self.rows.tighten(n, factors);
             }
         }
         holds
     }
 
     fn time(&self, ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
-        let inside: f64 =
-            self.rows.intervals.iter().enumerate().map(|(n, interval)| duration(x, n, interval.h)).sum();
+        let inside: f64 = (0..self.rows.count()).map(|n| duration(x, n, self.rows.h(n))).sum();
         inside + ramps(ends, x)
     }
 }

@@ -1,17 +1,20 @@
 //! The working space of the interior-point method: slacks, multipliers, steps and the matrix of one window.
 
-use fearless_simd::{Level, Simd};
+use fearless_simd::{dispatch, Level, Simd};
 use feedplan_geometry::elementary::Elementary;
-use feedplan_geometry::lanes::{Lanes, LogProduct, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register};
+use feedplan_geometry::lanes::LogProduct;
 
 use super::band::Band;
+use super::columns::{Columns, Terms};
 use super::constraints::{Constraints, RowLayout};
-use super::hermite::local;
+use super::forms::motion;
+use super::hermite::COUNT;
 use super::model::Model;
 use super::rest_ramp::Ramp;
 use super::window_end::WindowEnd;
 
-/// Slacks and multipliers, by the rows of each interval (`RowLayout`).
+/// Slacks and multipliers, by the rows of each block (`RowLayout`).
 #[derive(Default)]
 pub struct State {
     /// Slacks from `attempt` to `assemble`; after that 1/slack.
@@ -28,13 +31,14 @@ pub struct InteriorPoint<X, const M: usize> {
     pub(super) model: X,
     pub(super) band: Band,
     pub(super) state: State,
-    pub(super) gradient: Vec<f64>,
-    pub(super) rhs: Vec<f64>,
-    pub(super) step: Vec<f64>,
-    pub(super) trial: Vec<f64>,
-    /// Pulls on (w, w') of each station: by the centring with λ s = 1, and by the predictor's products.
-    pub(super) pulls: Vec<[[f64; 2]; 2]>,
-    /// The rows of one interval: small enough for the nearest cache.
+    pub(super) x: Columns,
+    pub(super) gradient: Terms,
+    pub(super) rhs: Columns,
+    pub(super) step: Columns,
+    pub(super) trial: Columns,
+    /// Pulls by the centring with λ s = 1, and by the predictor's products.
+    pub(super) pulls: [Terms; 2],
+    /// The rows of one block: small enough for the nearest cache.
     pub(super) scratch: Vec<Lanes>,
     pub(super) ends: [Option<EndRow>; 2],
 }
@@ -58,54 +62,66 @@ impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
             model: X::default(),
             band: Band::default(),
             state: State::default(),
-            gradient: vec![],
-            rhs: vec![],
-            step: vec![],
-            trial: vec![],
-            pulls: vec![],
-            scratch: vec![],
+            x: Columns::default(),
+            gradient: Terms::default(),
+            rhs: Columns::default(),
+            step: Columns::default(),
+            trial: Columns::default(),
+            pulls: Default::default(),
+            scratch: vec![Lanes::ONE; RowLayout::<M>::BLOCK],
             ends: [None; 2],
         }
     }
 }
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
-    #[inline(always)]
-    pub(super) fn resize(&mut self, count: usize) {
+    /// Takes the spline x, with room for all numbers on its stations.
+    pub(super) fn take(&mut self, rows: &Constraints<M>, x: &[f64]) {
+        let (count, blocks) = (rows.count(), rows.blocks.len());
         let state = &mut self.state;
         for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
-            vector.resize(count * RowLayout::<M>::COUNT, Lanes::ONE);
+            vector.resize(blocks * RowLayout::<M>::BLOCK, Lanes::ONE);
         }
         state.step.fill(Lanes::ZERO);
-        self.scratch.resize(RowLayout::<M>::COUNT, Lanes::ONE);
-        self.pulls.resize(count + 1, [[0.0; 2]; 2]);
-        for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {
-            vector.resize(2 * count + 2, 0.0);
+        self.band.resize(count);
+        self.gradient.resize(count);
+        for pulls in &mut self.pulls {
+            pulls.resize(count);
         }
+        for columns in [&mut self.x, &mut self.trial] {
+            columns.resize(count, 1.0);
+        }
+        for columns in [&mut self.rhs, &mut self.step] {
+            columns.resize(count, 0.0);
+        }
+        self.x.take(x);
     }
 
     /// Slacks of x, or of the trial. Returns Σ ln s, or None if a limit is broken.
+    pub(super) fn slacks(&mut self, rows: &Constraints<M>, trial: bool) -> Option<f64> {
+        dispatch!(self.level, simd => self.slacks_on(simd, rows, trial))
+    }
+
     #[inline(always)]
-    pub(super) fn slacks<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        x: &[f64],
-        trial: bool,
-    ) -> Option<f64> {
+    fn slacks_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, trial: bool) -> Option<f64> {
+        let x = if trial { &self.trial } else { &self.x };
         let mut product = LogProduct::default();
         let (mut least, mut sum) = (Register::all(simd, f64::INFINITY), Register::all(simd, 0.0));
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let slack = RowLayout::<M>::of_mut(&mut self.state.slack, n);
-            self.model.slack(simd, rows, n, &local(x, n, interval.h), trial, slack);
-            let mut all = slack[0].load(simd);
-            least = all.min(least);
-            for slack in &slack[1..] {
-                least = slack.load(simd).min(least);
-                all = all * *slack;
+        for (b, block) in rows.blocks.iter().enumerate() {
+            let h = block.h.load(simd);
+            let (u, per_h) = (x.local(b, h), h.inverse());
+            for p in 0..COUNT {
+                let slack = RowLayout::<M>::of_mut(&mut self.state.slack, b, p);
+                self.model.slack(rows, b, p, motion(p, per_h, &u), trial, slack);
+                let mut all = slack[0].load(simd);
+                least = all.min(least);
+                for slack in &slack[1..] {
+                    least = slack.load(simd).min(least);
+                    all = all * *slack;
+                }
+                sum += all;
+                product.take(all.values());
             }
-            sum += all;
-            product.take(all.values());
         }
         // A NaN is refused as well.
         if least.least() <= 0.0 || sum.sum().is_nan() {
@@ -113,7 +129,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         }
         let mut logarithm = product.ln();
         for row in self.ends.iter_mut().flatten() {
-            row.slack = 1.0 - x[2 * row.station] / row.greatest;
+            row.slack = 1.0 - x.w[row.station] / row.greatest;
             if row.slack <= 0.0 {
                 return None;
             }
@@ -122,19 +138,13 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         Some(logarithm)
     }
 
-    /// The time of a spline with its ramps, in s; infinite where w is not positive.
-    #[inline(always)]
-    pub(super) fn time<S: Simd>(
-        &self,
-        simd: S,
-        rows: &Constraints<M>,
-        ends: [WindowEnd; 2],
-        x: &[f64],
-        trial: bool,
-    ) -> f64 {
-        let mut time = self.model.time(simd, rows, x, trial);
-        for (kind, w) in ends.iter().zip([x[0], x[x.len() - 2]]) {
+    /// The time of x, or of the trial, with its ramps, in s; infinite where w is not positive.
+    pub(super) fn time(&self, rows: &Constraints<M>, ends: [WindowEnd; 2], trial: bool) -> f64 {
+        let x = if trial { &self.trial } else { &self.x };
+        let mut time = dispatch!(self.level, simd => self.model.time(simd, rows, x, trial));
+        for (kind, station) in ends.iter().zip([0, rows.count()]) {
             if let WindowEnd::Rest { ramp, .. } = kind {
+                let w = x.w[station];
                 time += if w > 0.0 { ramp.way() / w.sqrt() } else { f64::INFINITY };
             }
         }

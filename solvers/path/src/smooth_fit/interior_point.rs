@@ -16,11 +16,11 @@
 //! Lengths of neighbours differ little. Where they differ, slacks do not fit their rows exactly; the next steps correct that.
 
 use fearless_simd::{dispatch, Level, Simd};
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
 
 use super::band::Band;
 use super::problem::Problem;
-use super::quads::{Columns, LocalMatrix, Quads, LANES};
+use super::quads::{Columns, LocalMatrix, Quads};
 use super::spline::{DEGREE, ORDER};
 
 /// It ends when the sum of all s λ is below this part of the energy,

@@ -5,15 +5,12 @@
 use std::ops::Range;
 
 use fearless_simd::Simd;
-use feedplan_geometry::lanes::{Lanes, Register};
+use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
 
 use super::band::Band;
 use super::problem::Problem;
 use super::rows::Row;
 use super::spline::ORDER;
-
-/// Intervals of a quad.
-pub const LANES: usize = 4;
 
 /// Numbers for the coefficients that the intervals of a quad see, by axis.
 pub type Around<S, const D: usize> = [[Register<S>; D]; ORDER];

@@ -1,0 +1,99 @@
+//! Numbers at the stations of a window, in columns: the n-th stations that a block of intervals sees are neighbours, so that
+//! they are read and written as one vector.
+
+use fearless_simd::Simd;
+
+use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
+
+/// (w, w') at each station: of a spline, a step or a gradient. Beyond the last station up to a whole block there are the same
+/// numbers everywhere.
+#[derive(Clone, Debug, Default)]
+pub struct Columns {
+    pub w: Vec<f64>,
+    pub slope: Vec<f64>,
+}
+
+impl Columns {
+    /// A spline x = (w_0, w'_0, w_1, …), and (1, 0) beyond its end.
+    pub fn new(x: &[f64]) -> Self {
+        let mut columns = Self::default();
+        columns.resize(x.len() / 2 - 1, 1.0);
+        columns.take(x);
+        columns
+    }
+
+    /// Room for the stations of so many intervals, and (`w`, 0) beyond the last of them.
+    pub fn resize(&mut self, intervals: usize, w: f64) {
+        let length = (intervals.div_ceil(LANES) + 1) * LANES;
+        self.w.resize(length, w);
+        self.slope.resize(length, 0.0);
+        self.w[intervals + 1..].fill(w);
+        self.slope[intervals + 1..].fill(0.0);
+    }
+
+    pub fn take(&mut self, x: &[f64]) {
+        for ((w, slope), x) in self.w.iter_mut().zip(&mut self.slope).zip(x.chunks_exact(2)) {
+            (*w, *slope) = (x[0], x[1]);
+        }
+    }
+
+    pub fn give(&self, x: &mut [f64]) {
+        for ((w, slope), x) in self.w.iter().zip(&self.slope).zip(x.chunks_exact_mut(2)) {
+            (x[0], x[1]) = (*w, *slope);
+        }
+    }
+
+    pub fn at(&self, station: usize) -> [f64; 2] {
+        [self.w[station], self.slope[station]]
+    }
+
+    /// The local coefficients of the intervals of a block, of length h.
+    #[inline(always)]
+    pub fn local<S: Simd>(&self, block: usize, h: Register<S>) -> [Register<S>; 4] {
+        let at = block * LANES;
+        let load = |column: &[f64], at: usize| eight(column, at).load(h.simd());
+        [load(&self.w, at), load(&self.slope, at) * h, load(&self.w, at + 1), load(&self.slope, at + 1) * h]
+    }
+}
+
+/// Terms of each interval at the station where it starts and at the station where it ends.
+#[derive(Clone, Debug, Default)]
+pub struct Terms {
+    pub start: Columns,
+    pub end: Columns,
+}
+
+impl Terms {
+    pub fn resize(&mut self, intervals: usize) {
+        self.start.resize(intervals, 0.0);
+        self.end.resize(intervals, 0.0);
+        (self.end.w[0], self.end.slope[0]) = (0.0, 0.0);
+    }
+
+    /// Sets the terms of a block, given by its local coefficients.
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, block: usize, h: Register<S>, [w0, d0, w1, d1]: [Register<S>; 4]) {
+        let at = block * LANES;
+        store(&mut self.start.w, at, w0);
+        store(&mut self.start.slope, at, d0 * h);
+        store(&mut self.end.w, at + 1, w1);
+        store(&mut self.end.slope, at + 1, d1 * h);
+    }
+
+    /// Takes away the terms beyond the last interval.
+    #[inline(always)]
+    pub fn close(&mut self, intervals: usize) {
+        self.start.w[intervals..].fill(0.0);
+        self.start.slope[intervals..].fill(0.0);
+    }
+}
+
+#[inline(always)]
+fn eight(column: &[f64], at: usize) -> Lanes {
+    Lanes::new(column[at..at + LANES].try_into().expect("eight numbers"))
+}
+
+#[inline(always)]
+pub fn store<S: Simd>(column: &mut [f64], at: usize, values: Register<S>) {
+    column[at..at + LANES].copy_from_slice(&values.values());
+}
