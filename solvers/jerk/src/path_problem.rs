@@ -29,6 +29,9 @@ pub trait Geometry<const M: usize>: Sync {
     fn at(&self, piece: usize, s: f64) -> PathPoint<M>;
 }
 
+/// The most axes of a path.
+pub const MOST_AXES: usize = 9;
+
 /// Greatest magnitudes of each axis, in mm/s, mm/s² and mm/s³; all but jerk for positive and for negative values.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {

@@ -28,12 +28,12 @@ const BACK: [f64; 3] = [0.05, 0.15, 0.4];
 
 /// Splines to start from, each with its effort: the nearest to the coarse solution first, the valid plan `far` last. With the
 /// iterations spent, as a number of those on the fine grid.
-pub fn starts<'e, X: Model<M>, const M: usize>(
-    rows: &Constraints<M>,
+pub fn starts<'e, X: Model>(
+    rows: &Constraints,
     ends: [WindowEnd; 2],
     far: Vec<f64>,
     effort: &Effort<'e>,
-    space: &mut InteriorPoint<X, M>,
+    space: &mut InteriorPoint<X>,
 ) -> (Vec<(Vec<f64>, Effort<'e>)>, usize) {
     let mut starts = vec![];
     let mut iterations = 0;
@@ -54,8 +54,8 @@ pub fn starts<'e, X: Model<M>, const M: usize>(
 
 /// The constraints on the coarse grid, tightened where limits change between its collocation points: by what `far` uses more
 /// of them on the fine grid, and to the least of the speed limits if x, which is `far` on the coarse grid, leaves room.
-fn on_coarse_grid<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64]) -> Constraints<M> {
-    let intervals: Vec<Interval<M>> = rows.intervals().collect();
+fn on_coarse_grid(rows: &Constraints, far: &[f64], x: &[f64]) -> Constraints {
+    let intervals: Vec<Interval> = rows.intervals().collect();
     let mut coarse = rows.clone();
     coarse.replace(intervals.chunks(GROUP).map(joined));
     let (all_used, all_most) = (coarse.utilisation(x), rows.utilisation(far));
@@ -67,7 +67,7 @@ fn on_coarse_grid<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64])
                 *factor = factor.max(most / used.max(LITTLE));
             }
         }
-        let least = |interval: &Interval<M>| interval.speed.iter().copied().fold(0.0, f64::max);
+        let least = |interval: &Interval| interval.speed.iter().copied().fold(0.0, f64::max);
         let own = least(&coarse.interval(n));
         if own > 0.0 {
             let slower = (short.iter().map(least).fold(own, f64::max) / own).sqrt();
@@ -79,7 +79,7 @@ fn on_coarse_grid<const M: usize>(rows: &Constraints<M>, far: &[f64], x: &[f64])
 }
 
 /// A long interval in place of short ones.
-fn joined<const M: usize>(short: &[Interval<M>]) -> Interval<M> {
+fn joined(short: &[Interval]) -> Interval {
     let h: f64 = short.iter().map(|interval| interval.h).sum();
     // The short interval and the index of the nearest collocation point.
     let nearest = hermite::POINTS.map(|part| {
@@ -107,7 +107,7 @@ fn restrict(x: &[f64]) -> Vec<f64> {
 }
 
 /// A spline on the coarse grid at the stations of the fine grid.
-fn prolong<const M: usize>(x: &[f64], rows: &Constraints<M>) -> Vec<f64> {
+fn prolong(x: &[f64], rows: &Constraints) -> Vec<f64> {
     let lengths: Vec<f64> = (0..rows.count()).map(|n| rows.h(n)).collect();
     let mut out = Vec::with_capacity(2 * rows.count() + 2);
     for (n, short) in lengths.chunks(GROUP).enumerate() {
@@ -127,14 +127,18 @@ fn prolong<const M: usize>(x: &[f64], rows: &Constraints<M>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path_problem::Limits;
+    use crate::path_problem::{Limits, MOST_AXES};
 
     /// Intervals of these lengths; q' counts the collocation points, 4 for each interval.
-    fn rows(lengths: &[f64]) -> Constraints<1> {
+    fn rows(lengths: &[f64]) -> Constraints {
         let limits = Limits { velocity: [[1.0]; 2], acceleration: [[1.0]; 2], jerk: [1.0] };
         let interval = |(n, &h): (usize, &f64)| Interval {
             h,
-            q: std::array::from_fn(|p| [std::array::from_fn(|order| (100 * order + 4 * n + p) as f64)]),
+            q: std::array::from_fn(|p| {
+                let mut q = [[0.0; 3]; MOST_AXES];
+                q[0] = std::array::from_fn(|order| (100 * order + 4 * n + p) as f64);
+                q
+            }),
             speed: std::array::from_fn(|p| (4 * n + p) as f64),
             acceleration: [1.0; 4],
             jerk: 1.0 + n as f64,

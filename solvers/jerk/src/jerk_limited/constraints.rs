@@ -23,7 +23,7 @@ use super::forms::{self, Form};
 use super::hermite::{COUNT, POINTS};
 use super::sides::Sides;
 use super::window_end::WindowEnd;
-use crate::path_problem::{Geometry, Limits, PathPoint};
+use crate::path_problem::{Geometry, Limits, PathPoint, MOST_AXES};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
 /// Steps from a collocation point along the tangent of w to an inner Bernstein coefficient, as parts of the interval.
@@ -31,11 +31,11 @@ const INWARDS: [f64; COUNT] = [1.0 / 3.0, 0.0, 0.0, -1.0 / 3.0];
 
 /// The limits on the interval between two stations, at each collocation point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval<const M: usize> {
+pub struct Interval {
     /// Its length, in mm.
     pub h: f64,
-    /// q', q'', q''' of each axis.
-    pub q: [[[f64; 3]; M]; COUNT],
+    /// q', q'', q''' of each axis; 0 beyond the last axis.
+    pub q: [[[f64; 3]; MOST_AXES]; COUNT],
     /// 1/w_max.
     pub speed: [f64; COUNT],
     /// Factor by which the acceleration limit is tighter than the machine's: 1 or more, 0 where it does not apply.
@@ -44,70 +44,82 @@ pub struct Interval<const M: usize> {
     pub jerk: f64,
 }
 
-/// The same of neighbouring intervals.
+/// The same of neighbouring intervals, but for the derivatives of the axes.
 #[derive(Clone, Copy, Debug)]
-pub struct Block<const M: usize> {
+pub struct Block {
     pub h: Lanes,
     pub jerk: Lanes,
-    pub points: [Point<M>; COUNT],
+    pub points: [Point; COUNT],
     /// 1 for each interval, 0 for each lane beyond the last one.
     pub live: Lanes,
 }
 
 /// The same at one collocation point of each.
 #[derive(Clone, Copy, Debug)]
-pub struct Point<const M: usize> {
-    pub q: [[Lanes; 3]; M],
+pub struct Point {
     pub speed: Lanes,
     pub acceleration: Lanes,
 }
 
 /// The constraints on the intervals of a window.
 #[derive(Clone, Debug)]
-pub struct Constraints<const M: usize> {
+pub struct Constraints {
     count: usize,
-    pub blocks: Vec<Block<M>>,
-    pub acceleration: Sides<M>,
+    pub blocks: Vec<Block>,
+    /// q', q'', q''' of each axis at each collocation point of each block.
+    q: Vec<[Lanes; 3]>,
+    pub acceleration: Vec<Sides>,
     /// 1/J of each axis.
-    pub per_jerk: [f64; M],
+    pub per_jerk: Vec<f64>,
 }
 
-/// Indices of the rows at one collocation point: for each axis the upper and the lower limit of its acceleration, then of
-/// its jerk; then speed, then w ≥ 0.
-pub struct RowLayout<const M: usize>;
+/// Indices of the rows at one collocation point: for each axis the upper and the lower limit of its acceleration and of its
+/// jerk, then speed, then w ≥ 0.
+#[derive(Clone, Copy, Debug)]
+pub struct RowLayout {
+    axes: usize,
+}
 
-impl<const M: usize> RowLayout<M> {
-    pub const SPEED: usize = 4 * M;
-    pub const POSITIVE: usize = 4 * M + 1;
-    pub const COUNT: usize = 4 * M + 2;
-    /// Rows of a block.
-    pub const BLOCK: usize = COUNT * Self::COUNT;
+impl RowLayout {
+    /// Rows of an axis.
+    pub const OF_AXIS: usize = 4;
 
     #[inline(always)]
-    pub const fn acceleration(axis: usize) -> usize {
-        4 * axis
+    pub const fn speed(self) -> usize {
+        Self::OF_AXIS * self.axes
     }
 
     #[inline(always)]
-    pub const fn jerk(axis: usize) -> usize {
-        4 * axis + 2
+    pub const fn positive(self) -> usize {
+        self.speed() + 1
+    }
+
+    #[inline(always)]
+    pub const fn count(self) -> usize {
+        self.speed() + 2
+    }
+
+    /// Rows of an interval, and of a block.
+    #[inline(always)]
+    pub const fn all(self) -> usize {
+        COUNT * self.count()
     }
 
     /// The rows of a block at collocation point p.
     #[inline(always)]
-    pub fn of(all: &[Lanes], block: usize, p: usize) -> &[Lanes] {
-        &all[block * Self::BLOCK + p * Self::COUNT..][..Self::COUNT]
+    pub fn of(self, all: &[Lanes], block: usize, p: usize) -> &[Lanes] {
+        &all[(block * COUNT + p) * self.count()..][..self.count()]
     }
 
     #[inline(always)]
-    pub fn of_mut(all: &mut [Lanes], block: usize, p: usize) -> &mut [Lanes] {
-        &mut all[block * Self::BLOCK + p * Self::COUNT..][..Self::COUNT]
+    pub fn of_mut(self, all: &mut [Lanes], block: usize, p: usize) -> &mut [Lanes] {
+        &mut all[(block * COUNT + p) * self.count()..][..self.count()]
     }
 }
 
-impl<const M: usize> Interval<M> {
+impl Interval {
     /// The greatest r = w^(3/4) if the slope of r is at most k.
-    pub fn envelope_cap(&self, limits: &Limits<M>, k: f64) -> f64 {
+    pub fn envelope_cap<const M: usize>(&self, limits: &Limits<M>, k: f64) -> f64 {
         let cap = |p: usize| {
             let of = |order: usize| std::array::from_fn(|axis| self.q[p][axis][order]);
             let speed_cap = 1.0 / self.speed[p].sqrt();
@@ -117,12 +129,12 @@ impl<const M: usize> Interval<M> {
     }
 }
 
-impl<const M: usize> Block<M> {
+impl Block {
     /// No limits, on intervals that are so short that w and its slope at their start cannot make it negative in them.
     const NONE: Self = Self {
         h: Lanes::all(1e-12),
         jerk: Lanes::ONE,
-        points: [Point { q: [[Lanes::ZERO; 3]; M], speed: Lanes::ZERO, acceleration: Lanes::ZERO }; COUNT],
+        points: [Point { speed: Lanes::ZERO, acceleration: Lanes::ZERO }; COUNT],
         live: Lanes::ZERO,
     };
 
@@ -134,15 +146,33 @@ impl<const M: usize> Block<M> {
     }
 }
 
-impl<const M: usize> Constraints<M> {
+impl Constraints {
     /// Without intervals.
-    pub fn new(limits: &Limits<M>) -> Self {
+    pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
         Self {
             count: 0,
             blocks: vec![],
-            acceleration: Sides::new(&limits.acceleration),
-            per_jerk: limits.jerk.map(|j| 1.0 / j),
+            q: vec![],
+            acceleration: Sides::of(&limits.acceleration).to_vec(),
+            per_jerk: limits.jerk.map(|j| 1.0 / j).to_vec(),
         }
+    }
+
+    /// The number of axes.
+    #[inline(always)]
+    pub fn axes(&self) -> usize {
+        self.per_jerk.len()
+    }
+
+    #[inline(always)]
+    pub fn layout(&self) -> RowLayout {
+        RowLayout { axes: self.axes() }
+    }
+
+    /// q', q'', q''' of each axis at collocation point p of a block.
+    #[inline(always)]
+    pub fn q(&self, block: usize, p: usize) -> &[[Lanes; 3]] {
+        &self.q[(block * COUNT + p) * self.axes()..][..self.axes()]
     }
 
     /// The number of intervals.
@@ -155,19 +185,25 @@ impl<const M: usize> Constraints<M> {
         self.blocks[n / LANES].h.values()[n % LANES]
     }
 
-    pub fn interval(&self, n: usize) -> Interval<M> {
+    pub fn interval(&self, n: usize) -> Interval {
         let (block, lane) = (&self.blocks[n / LANES], n % LANES);
         let at = |lanes: &Lanes| lanes.values()[lane];
+        let mut q = [[[0.0; 3]; MOST_AXES]; COUNT];
+        for (p, q) in q.iter_mut().enumerate() {
+            for (to, from) in q.iter_mut().zip(self.q(n / LANES, p)) {
+                *to = from.map(|lanes| at(&lanes));
+            }
+        }
         Interval {
             h: at(&block.h),
-            q: std::array::from_fn(|p| block.points[p].q.map(|q| q.map(|q| at(&q)))),
+            q,
             speed: std::array::from_fn(|p| at(&block.points[p].speed)),
             acceleration: std::array::from_fn(|p| at(&block.points[p].acceleration)),
             jerk: at(&block.jerk),
         }
     }
 
-    pub fn intervals(&self) -> impl Iterator<Item = Interval<M>> + '_ {
+    pub fn intervals(&self) -> impl Iterator<Item = Interval> + '_ {
         (0..self.count).map(|n| self.interval(n))
     }
 
@@ -190,37 +226,45 @@ impl<const M: usize> Constraints<M> {
     }
 
     /// Takes these intervals instead.
-    pub fn replace(&mut self, intervals: impl Iterator<Item = Interval<M>>) {
-        self.count = 0;
-        self.blocks.clear();
+    pub fn replace(&mut self, intervals: impl Iterator<Item = Interval>) {
+        self.clear();
         for interval in intervals {
             self.push(&interval);
         }
     }
 
-    fn push(&mut self, interval: &Interval<M>) {
-        let lane = self.count % LANES;
+    fn clear(&mut self) {
+        self.count = 0;
+        self.blocks.clear();
+        self.q.clear();
+    }
+
+    fn push(&mut self, interval: &Interval) {
+        let (b, lane, axes) = (self.count / LANES, self.count % LANES, self.axes());
         if lane == 0 {
             self.blocks.push(Block::NONE);
+            self.q.resize((b + 1) * COUNT * axes, [Lanes::ZERO; 3]);
         }
-        let block = &mut self.blocks[self.count / LANES];
+        let block = &mut self.blocks[b];
         let put = |to: &mut Lanes, value: f64| to.values_mut()[lane] = value;
         put(&mut block.h, interval.h);
         put(&mut block.jerk, interval.jerk);
         put(&mut block.live, 1.0);
         for (p, point) in block.points.iter_mut().enumerate() {
-            for (to, q) in point.q.as_flattened_mut().iter_mut().zip(interval.q[p].as_flattened()) {
-                put(to, *q);
-            }
             put(&mut point.speed, interval.speed[p]);
             put(&mut point.acceleration, interval.acceleration[p]);
+            for (to, q) in self.q[(b * COUNT + p) * axes..][..axes].iter_mut().zip(&interval.q[p]) {
+                for (to, q) in to.iter_mut().zip(q) {
+                    put(to, *q);
+                }
+            }
         }
         self.count += 1;
     }
 
     /// Takes the intervals between `stations`. Interval n lies on `pieces[n]`, with limits of jerk tightened by
     /// `jerk_factor[n]`; `station_cap` is the speed cap at a station, infinite without one.
-    pub fn sample(
+    pub fn sample<const M: usize>(
         &mut self,
         geometry: &impl Geometry<M>,
         limits: &Limits<M>,
@@ -247,7 +291,7 @@ impl<const M: usize> Constraints<M> {
                 speed[p] = speed[p].max(1.0 / (cap * cap));
             }
             let q = points.map(|PathPoint { first, second, third, .. }| {
-                std::array::from_fn(|k| [first[k], second[k], third[k]])
+                std::array::from_fn(|k| if k < M { [first[k], second[k], third[k]] } else { [0.0; 3] })
             });
             Interval { h, q, speed, acceleration: [1.0; COUNT], jerk: jerk_factor[n] }
         }));
@@ -257,107 +301,101 @@ impl<const M: usize> Constraints<M> {
     pub fn copy(&mut self, others: &Self, range: Range<usize>) {
         // Blocks that are the same in both are copied whole.
         let whole = if range.start % LANES == 0 { range.len() / LANES } else { 0 };
-        self.blocks.clear();
-        self.blocks.extend_from_slice(&others.blocks[range.start / LANES..][..whole]);
+        let (first, q) = (range.start / LANES, COUNT * self.axes());
+        self.clear();
+        self.blocks.extend_from_slice(&others.blocks[first..][..whole]);
+        self.q.extend_from_slice(&others.q[first * q..][..whole * q]);
         self.count = whole * LANES;
         for n in range.start + self.count..range.end {
             self.push(&others.interval(n));
         }
     }
 
-    /// Acceleration and jerk/√w of each axis at collocation point p of a block, over A and J.
+    /// Acceleration and jerk/√w of an axis at collocation point p of a block, over A and J.
     #[inline(always)]
-    pub fn axes<S: Simd>(
+    pub fn axis<S: Simd>(
         &self,
-        block: &Block<M>,
+        block: usize,
         p: usize,
+        k: usize,
         [w, w1, w2]: [Register<S>; 3],
-    ) -> [[Register<S>; 2]; M] {
-        let point = &block.points[p];
-        let (half, bend, more) = (w1 * 0.5, w2 * 0.5, w1 * 1.5);
-        let mut out = [[Register::all(w.simd(), 0.0); 2]; M];
-        for k in 0..M {
-            let [q1, q2, q3] = point.q[k];
-            out[k] = [
-                (q2 * w + q1 * half) * self.acceleration.per_mean[k] * point.acceleration,
-                (q3 * w + q2 * more + q1 * bend) * self.per_jerk[k] * block.jerk,
-            ];
-        }
-        out
+    ) -> [Register<S>; 2] {
+        let own = &self.blocks[block];
+        let [q1, q2, q3] = self.q(block, p)[k];
+        [
+            (q2 * w + q1 * (w1 * 0.5)) * self.acceleration[k].per_mean * own.points[p].acceleration,
+            (q3 * w + q2 * (w1 * 1.5) + q1 * (w2 * 0.5)) * self.per_jerk[k] * own.jerk,
+        ]
     }
 
     /// The slacks at collocation point p of a block, with w^(−1/2) = `pace` and the last row as given.
     #[inline(always)]
     pub fn slack<S: Simd>(
         &self,
-        block: &Block<M>,
+        block: usize,
         p: usize,
         motion: [Register<S>; 3],
         pace: Register<S>,
         last: Register<S>,
         out: &mut [Lanes],
     ) {
-        let simd = pace.simd();
-        let axes = self.axes(block, p, motion);
-        let out = &mut out[..RowLayout::<M>::COUNT];
-        for k in 0..M {
-            let [a, j] = axes[k];
-            let (at, to) = (RowLayout::<M>::acceleration(k), RowLayout::<M>::jerk(k));
-            let [up, down] = self.acceleration.most[k];
-            out[at] = (Register::all(simd, up) - a).into();
-            out[at + 1] = (Register::all(simd, down) + a).into();
-            (out[to], out[to + 1]) = ((pace - j).into(), (pace + j).into());
+        let (simd, layout) = (pace.simd(), self.layout());
+        let (rows, rest) = out.split_at_mut(layout.speed());
+        for (k, rows) in rows.chunks_exact_mut(RowLayout::OF_AXIS).enumerate() {
+            let [a, j] = self.axis(block, p, k, motion);
+            let [up, down] = self.acceleration[k].most;
+            rows[0] = (Register::all(simd, up) - a).into();
+            rows[1] = (Register::all(simd, down) + a).into();
+            rows[2] = (pace - j).into();
+            rows[3] = (pace + j).into();
         }
-        out[RowLayout::<M>::SPEED] = (Lanes::ONE - motion[0] * block.points[p].speed).into();
-        out[RowLayout::<M>::POSITIVE] = last.into();
+        rest[0] = (Lanes::ONE - motion[0] * self.blocks[block].points[p].speed).into();
+        rest[1] = last.into();
     }
 
     /// The change of the slacks for a step with this motion.
     #[inline(always)]
     pub fn slack_step<S: Simd>(
         &self,
-        block: &Block<M>,
+        block: usize,
         p: usize,
         motion: [Register<S>; 3],
         pace: Register<S>,
         last: Register<S>,
         out: &mut [Lanes],
     ) {
-        let axes = self.axes(block, p, motion);
-        let out = &mut out[..RowLayout::<M>::COUNT];
-        for k in 0..M {
-            let [a, j] = axes[k];
-            let (at, to) = (RowLayout::<M>::acceleration(k), RowLayout::<M>::jerk(k));
-            (out[at], out[at + 1]) = ((-a).into(), a.into());
-            (out[to], out[to + 1]) = ((pace - j).into(), (pace + j).into());
+        let (rows, rest) = out.split_at_mut(self.layout().speed());
+        for (k, rows) in rows.chunks_exact_mut(RowLayout::OF_AXIS).enumerate() {
+            let [a, j] = self.axis(block, p, k, motion);
+            (rows[0], rows[1]) = ((-a).into(), a.into());
+            (rows[2], rows[3]) = ((pace - j).into(), (pace + j).into());
         }
-        out[RowLayout::<M>::SPEED] = (-(motion[0] * block.points[p].speed)).into();
-        out[RowLayout::<M>::POSITIVE] = last.into();
+        rest[0] = (-(motion[0] * self.blocks[block].points[p].speed)).into();
+        rest[1] = last.into();
     }
 
     /// Σ weight ∇s ∇sᵀ over the linear parts of the rows at collocation point p of a block.
     #[inline(always)]
-    pub fn curvature<S: Simd>(&self, simd: S, block: &Block<M>, p: usize, weight: &[Lanes]) -> Form<S> {
-        let point = &block.points[p];
-        let weight = &weight[..RowLayout::<M>::COUNT];
+    pub fn curvature<S: Simd>(&self, simd: S, block: usize, p: usize, weight: &[Lanes]) -> Form<S> {
+        let (own, layout) = (&self.blocks[block], self.layout());
+        let point = &own.points[p];
         let acceleration = point.acceleration.load(simd);
         let tight = acceleration * acceleration;
-        let jerk = block.jerk.load(simd);
+        let jerk = own.jerk.load(simd);
         let tight_jerk = jerk * jerk;
         let mut m = [Register::all(simd, 0.0); 6];
-        m[0] = weight[RowLayout::<M>::SPEED].load(simd) * point.speed * point.speed;
-        for k in 0..M {
-            let [q1, q2, q3] = point.q[k].map(|q| q.load(simd));
+        m[0] = weight[layout.speed()].load(simd) * point.speed * point.speed;
+        for ((k, weight), q) in weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(self.q(block, p)) {
+            let [q1, q2, q3] = q.map(|q| q.load(simd));
             let (half, more) = (q1 * 0.5, q2 * 1.5);
-            let at = RowLayout::<M>::acceleration(k);
-            let both =
-                (weight[at].load(simd) + weight[at + 1]) * tight * self.acceleration.per_mean[k].powi(2);
+            let per = self.acceleration[k].per_mean;
+            let both = (weight[0].load(simd) + weight[1]) * tight * (per * per);
             let (b2, b1) = (both * q2, both * half);
             m[0] += b2 * q2;
             m[1] += b2 * half;
             m[3] += b1 * half;
-            let at = RowLayout::<M>::jerk(k);
-            let both = (weight[at].load(simd) + weight[at + 1]) * tight_jerk * self.per_jerk[k].powi(2);
+            let per = self.per_jerk[k];
+            let both = (weight[2].load(simd) + weight[3]) * tight_jerk * (per * per);
             let (b0, b1) = (both * q3, both * more);
             m[0] += b0 * q3;
             m[1] += b0 * more;
@@ -375,25 +413,24 @@ impl<const M: usize> Constraints<M> {
     pub fn pull<S: Simd>(
         &self,
         simd: S,
-        block: &Block<M>,
+        block: usize,
         p: usize,
         aim: &[Lanes],
     ) -> ([Register<S>; 3], Register<S>) {
-        let point = &block.points[p];
-        let aim = &aim[..RowLayout::<M>::COUNT];
+        let (own, layout) = (&self.blocks[block], self.layout());
+        let point = &own.points[p];
         let zero = Register::all(simd, 0.0);
-        let mut g = [-(aim[RowLayout::<M>::SPEED].load(simd) * point.speed), zero, zero];
+        let mut g = [-(aim[layout.speed()].load(simd) * point.speed), zero, zero];
         let mut jerk = zero;
-        for k in 0..M {
-            let [q1, q2, q3] = point.q[k];
-            let at = RowLayout::<M>::acceleration(k);
-            let a = (aim[at + 1].load(simd) - aim[at]) * point.acceleration * self.acceleration.per_mean[k];
-            let at = RowLayout::<M>::jerk(k);
-            let j = (aim[at + 1].load(simd) - aim[at]) * block.jerk * self.per_jerk[k];
+        for ((k, aim), &[q1, q2, q3]) in
+            aim.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(self.q(block, p))
+        {
+            let a = (aim[1].load(simd) - aim[0]) * point.acceleration * self.acceleration[k].per_mean;
+            let j = (aim[3].load(simd) - aim[2]) * own.jerk * self.per_jerk[k];
             g[0] += a * q2 + j * q3;
             g[1] += a * q1 * 0.5 + j * q2 * 1.5;
             g[2] += j * q1 * 0.5;
-            jerk += aim[at].load(simd) + aim[at + 1];
+            jerk += aim[2].load(simd) + aim[3];
         }
         (g, jerk)
     }
@@ -416,8 +453,9 @@ impl<const M: usize> Constraints<M> {
                 let motion = forms::motion(p, per_h, &u);
                 let v = motion[0].max(zero).sqrt();
                 worst[0] = (motion[0] * block.points[p].speed).max(worst[0]);
-                for (k, [a, j]) in self.axes(block, p, motion).into_iter().enumerate() {
-                    let [per_up, per_down] = self.acceleration.per_most[k];
+                for (k, limit) in self.acceleration.iter().enumerate() {
+                    let [a, j] = self.axis(b, p, k, motion);
+                    let [per_up, per_down] = limit.per_most;
                     worst[1] = (a * per_up).max(-a * per_down).max(worst[1]);
                     worst[2] = (j * v).abs().max(worst[2]);
                 }

@@ -15,16 +15,16 @@ pub struct Exact {
     pace: Vec<[Lanes; COUNT]>,
 }
 
-impl<const M: usize> Model<M> for Exact {
+impl Model for Exact {
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, _: S, rows: &Constraints<M>, _: &Columns) {
+    fn begin<S: Simd>(&mut self, _: S, rows: &Constraints, _: &Columns) {
         self.pace.resize(rows.blocks.len(), [Lanes::ONE; COUNT]);
     }
 
     #[inline(always)]
     fn slack<S: Simd>(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         motion: [Register<S>; 3],
@@ -34,14 +34,14 @@ impl<const M: usize> Model<M> for Exact {
         let [w, w1, _] = motion;
         let own = &rows.blocks[block];
         let pace = pace(w);
-        rows.slack(own, p, motion, pace, w + w1 * own.inwards(w.simd(), p), out);
+        rows.slack(block, p, motion, pace, w + w1 * own.inwards(w.simd(), p), out);
         self.pace[block][p] = pace.into();
     }
 
     #[inline(always)]
     fn slack_step<S: Simd>(
         &self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         motion: [Register<S>; 3],
@@ -50,37 +50,37 @@ impl<const M: usize> Model<M> for Exact {
         let [w, w1, _] = motion;
         let own = &rows.blocks[block];
         let last = w + w1 * own.inwards(w.simd(), p);
-        rows.slack_step(own, p, motion, -(fall(self.pace[block][p].load(w.simd())) * w), last, out);
+        rows.slack_step(block, p, motion, -(fall(self.pace[block][p].load(w.simd())) * w), last, out);
     }
 
     #[inline(always)]
     fn local<S: Simd>(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         u: &[Register<S>; 4],
         weight: &[Lanes],
         _: &[Lanes],
     ) -> Local<S> {
         let simd = u[0].simd();
-        let own = &rows.blocks[block];
+        let (own, layout) = (&rows.blocks[block], rows.layout());
         let h = own.h.load(simd);
         let per_h = h.inverse();
         let mut local = Local::zero(simd);
         for p in 0..COUNT {
-            let weight = RowLayout::<M>::of(weight, 0, p);
-            let mut form = rows.curvature(simd, own, p, weight);
+            let weight = layout.of(weight, 0, p);
+            let mut form = rows.curvature(simd, block, p, weight);
             let fall = fall(self.pace[block][p].load(simd));
-            let (last, inwards) = (weight[RowLayout::<M>::POSITIVE].load(simd), own.inwards(simd, p));
+            let (last, inwards) = (weight[layout.positive()].load(simd), own.inwards(simd, p));
             form[0] += last;
             form[1] += last * inwards;
             form[3] += last * inwards * inwards;
-            for k in 0..M {
+            for ((k, weight), &[q1, q2, q3]) in
+                weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(rows.q(block, p))
+            {
                 // The slope of w^(−1/2) adds to the two rows of an axis's jerk.
-                let at = RowLayout::<M>::jerk(k);
-                let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
+                let [up, down] = [weight[2].load(simd), weight[3].load(simd)];
                 let (both, turn) = (up + down, (up - down) * fall);
-                let [q1, q2, q3] = own.points[p].q[k];
                 let turn = turn * own.jerk * rows.per_jerk[k];
                 form[0] += both * fall * fall + turn * q3 * 2.0;
                 form[1] += turn * q2 * 1.5;
@@ -108,22 +108,22 @@ impl<const M: usize> Model<M> for Exact {
     fn pull<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         aim: &[Lanes],
         _: usize,
     ) -> [Register<S>; 3] {
         let own = &rows.blocks[block];
-        let (mut pull, jerk) = rows.pull(simd, own, p, aim);
-        let last = aim[RowLayout::<M>::POSITIVE].load(simd);
+        let (mut pull, jerk) = rows.pull(simd, block, p, aim);
+        let last = aim[rows.layout().positive()].load(simd);
         pull[0] += last - fall(self.pace[block][p].load(simd)) * jerk;
         pull[1] += last * own.inwards(simd, p);
         pull
     }
 
     #[inline(always)]
-    fn solved<S: Simd>(&mut self, _: S, _: &Constraints<M>, _: &Columns, _: [f64; 2]) {}
+    fn solved<S: Simd>(&mut self, _: S, _: &Constraints, _: &Columns, _: [f64; 2]) {}
 
     #[inline(always)]
     fn attempt<S: Simd>(&mut self, _: S, _: f64) {}
@@ -131,7 +131,7 @@ impl<const M: usize> Model<M> for Exact {
     fn accept(&mut self) {}
 
     #[inline(always)]
-    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &Columns, _: bool) -> f64 {
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints, x: &Columns, _: bool) -> f64 {
         let mut time = Register::all(simd, 0.0);
         let mut least = Register::all(simd, f64::INFINITY);
         for (b, block) in rows.blocks.iter().enumerate() {

@@ -99,7 +99,7 @@ impl Grid {
         &self,
         problem: &Problem<G, M>,
         range: Range<usize>,
-        rows: &mut Constraints<M>,
+        rows: &mut Constraints,
     ) {
         let stations = &self.stations[range.start..=range.end];
         let (pieces, jerk_factor) = (&self.pieces[range.clone()], &self.jerk_factor[range.clone()]);

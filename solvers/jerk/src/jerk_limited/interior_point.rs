@@ -12,7 +12,7 @@ use std::time::Instant;
 use fearless_simd::dispatch;
 
 use super::band::EndCondition;
-use super::constraints::{Constraints, RowLayout};
+use super::constraints::Constraints;
 use super::model::Model;
 use super::window_end::WindowEnd;
 use super::working_space::{EndRow, InteriorPoint};
@@ -64,11 +64,11 @@ const LEAST_STEP: f64 = 1e-6;
 /// λ s stays above this part of the complementarity aimed at.
 pub(super) const LEAST_DUAL: f64 = 1e-4;
 
-impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
+impl<X: Model> InteriorPoint<X> {
     /// Improves the valid plan x = (w_0, w'_0, w_1, …) in place. The start need not meet given ends.
     pub fn solve(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         ends: [WindowEnd; 2],
         x: &mut [f64],
         effort: &Effort,
@@ -80,7 +80,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// A step, without regard to the limits, that balances the multipliers of a solution; see `newton`.
-    pub fn settle(&mut self, rows: &Constraints<M>, ends: &[WindowEnd; 2], x: &mut [f64]) -> bool {
+    pub fn settle(&mut self, rows: &Constraints, ends: &[WindowEnd; 2], x: &mut [f64]) -> bool {
         let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
         self.x.take(x);
         let settled = self.balance(rows, conditions);
@@ -88,8 +88,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         settled
     }
 
-    fn improve(&mut self, rows: &Constraints<M>, ends: [WindowEnd; 2], effort: &Effort) -> Report {
-        let total = (rows.count() * RowLayout::<M>::BLOCK + 2) as f64;
+    fn improve(&mut self, rows: &Constraints, ends: [WindowEnd; 2], effort: &Effort) -> Report {
+        let total = (rows.count() * rows.layout().all() + 2) as f64;
         dispatch!(self.level, simd => self.model.begin(simd, rows, &self.x));
         let mut time = self.time(rows, ends, false);
         let Some(mut logarithm) = self.enter(rows, ends, effort.barrier * time / total, effort.warm) else {
@@ -173,7 +173,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Slacks and multipliers of the start. Returns Σ ln s, or None unless the start is strictly inside.
-    fn enter(&mut self, rows: &Constraints<M>, ends: [WindowEnd; 2], mu: f64, warm: bool) -> Option<f64> {
+    fn enter(&mut self, rows: &Constraints, ends: [WindowEnd; 2], mu: f64, warm: bool) -> Option<f64> {
         let last = self.ends;
         self.ends = std::array::from_fn(|end| match ends[end] {
             WindowEnd::Fixed { .. } | WindowEnd::Free => None,
@@ -215,7 +215,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// The greatest relative error at given ends.
-    fn miss(&self, ends: &[WindowEnd; 2], rows: &Constraints<M>) -> f64 {
+    fn miss(&self, ends: &[WindowEnd; 2], rows: &Constraints) -> f64 {
         let lacks = self.missing(ends);
         let h = [rows.h(0), rows.h(rows.count() - 1)];
         let mut worst: f64 = 0.0;

@@ -28,17 +28,11 @@ const fn bases() -> [[Basis; 3]; SAMPLES] {
     out
 }
 
-/// q', q'', q''' of each axis, and 1/w_max by the speed cap, at one sample of each interval of a block.
+/// The limits on neighbouring intervals.
 #[derive(Clone, Copy, Debug)]
-struct Sample<const M: usize> {
-    q: [[Lanes; 3]; M],
-    cap: Lanes,
-}
-
-/// The limits on neighbouring intervals at all samples.
-#[derive(Clone, Copy, Debug)]
-struct Block<const M: usize> {
-    samples: [Sample<M>; SAMPLES],
+struct Block {
+    /// 1/w_max by the speed cap at each sample.
+    caps: [Lanes; SAMPLES],
     /// 1/w_max at the stations on both sides.
     at_stations: [Lanes; 2],
     /// Factor by which the limits of jerk are tighter.
@@ -47,62 +41,75 @@ struct Block<const M: usize> {
 
 /// The limits of a window at all samples.
 #[derive(Clone, Debug)]
-pub struct IntersampleCheck<const M: usize> {
-    velocity: Sides<M>,
-    acceleration: Sides<M>,
-    per_jerk: [f64; M],
-    blocks: Vec<Block<M>>,
+pub struct IntersampleCheck {
+    axes: Vec<Axis>,
+    blocks: Vec<Block>,
+    /// q', q'', q''' of each axis at all samples of each block.
+    q: Vec<[[Lanes; 3]; SAMPLES]>,
 }
 
-impl<const M: usize> IntersampleCheck<M> {
+/// The limits of an axis.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    velocity: Sides,
+    acceleration: Sides,
+    per_jerk: f64,
+}
+
+impl IntersampleCheck {
     /// Without samples.
-    pub fn new(limits: &Limits<M>) -> Self {
-        let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::new);
-        Self { velocity, acceleration, per_jerk: limits.jerk.map(|jerk| 1.0 / jerk), blocks: vec![] }
+    pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
+        let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::of);
+        let axis = |k: usize| Axis {
+            velocity: velocity[k],
+            acceleration: acceleration[k],
+            per_jerk: 1.0 / limits.jerk[k],
+        };
+        Self { axes: (0..M).map(axis).collect(), blocks: vec![], q: vec![] }
     }
 
     /// Samples between `stations`; speed caps at stations and factors of jerk are those of `rows`.
-    pub fn sample(
+    pub fn sample<const M: usize>(
         &mut self,
         geometry: &impl Geometry<M>,
         stations: &[f64],
         pieces: &[u32],
-        rows: &Constraints<M>,
+        rows: &Constraints,
     ) {
         self.blocks.clear();
-        self.blocks.reserve(rows.blocks.len());
-        let none = Sample { q: [[Lanes::ZERO; 3]; M], cap: Lanes::ZERO };
+        self.q.clear();
+        self.q.resize(rows.blocks.len() * M, [[Lanes::ZERO; 3]; SAMPLES]);
         for (b, own) in rows.blocks.iter().enumerate() {
             let first = b * LANES;
-            let mut samples = [none; SAMPLES];
+            let mut caps = [Lanes::ZERO; SAMPLES];
             for (lane, &piece) in pieces[first..].iter().take(LANES).enumerate() {
                 let (start, h) = (stations[first + lane], own.h.values()[lane]);
-                for (i, sample) in samples.iter_mut().enumerate() {
+                for (i, cap) in caps.iter_mut().enumerate() {
                     let s = start + h * (i as f64 / (SAMPLES - 1) as f64);
                     let point = geometry.at(piece as usize, s);
-                    for k in 0..M {
+                    for (k, q) in self.q[b * M..(b + 1) * M].iter_mut().enumerate() {
                         let orders = [point.first[k], point.second[k], point.third[k]];
-                        for (to, q) in sample.q[k].iter_mut().zip(orders) {
+                        for (to, q) in q[i].iter_mut().zip(orders) {
                             to.values_mut()[lane] = q;
                         }
                     }
-                    sample.cap.values_mut()[lane] = 1.0 / (point.speed_cap * point.speed_cap);
+                    cap.values_mut()[lane] = 1.0 / (point.speed_cap * point.speed_cap);
                 }
             }
             let at_stations = [0, COUNT - 1].map(|p| own.points[p].speed);
-            self.blocks.push(Block { samples, at_stations, jerk_factor: own.jerk });
+            self.blocks.push(Block { caps, at_stations, jerk_factor: own.jerk });
         }
     }
 
     /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x.
     ///
     /// Peaks are sought for each axis alone: the maximum over several axes is not smooth.
-    pub fn utilisation(&self, rows: &Constraints<M>, x: &[f64]) -> Vec<[f64; 3]> {
+    pub fn utilisation(&self, rows: &Constraints, x: &[f64]) -> Vec<[f64; 3]> {
         dispatch!(Level::new(), simd => self.utilisation_on(simd, rows, x))
     }
 
     #[inline(always)]
-    pub(super) fn utilisation_on<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64]) -> Vec<[f64; 3]> {
+    pub(super) fn utilisation_on<S: Simd>(&self, simd: S, rows: &Constraints, x: &[f64]) -> Vec<[f64; 3]> {
         let x = Columns::new(x);
         let mut out = vec![[0.0; 3]; rows.count()];
         let zero = Register::all(simd, 0.0);
@@ -116,24 +123,25 @@ impl<const M: usize> IntersampleCheck<M> {
                 let half = combine(&basis[1], &u) * per_h * 0.5;
                 let bend = combine(&basis[2], &u) * (per_h * per_h) * 0.5;
                 motion[i] = [w, half, bend, w.max(zero).sqrt()];
-                uses[i] = w * block.samples[i].cap;
+                uses[i] = w * block.caps[i];
             }
             let [from, to] = block.at_stations;
             let at_stations = (u[0] * from).max(u[2] * to);
             let mut worst = [peak(&uses, [1.0; 2]).max(at_stations).max(zero).sqrt(), zero, zero];
-            for k in 0..M {
+            let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
+            for (Axis { velocity, acceleration, per_jerk }, q) in axes {
                 for i in 0..SAMPLES {
-                    uses[i] = motion[i][3] * block.samples[i].q[k][0] * self.velocity.per_mean[k];
+                    uses[i] = motion[i][3] * q[i][0] * velocity.per_mean;
                 }
-                worst[0] = peak(&uses, self.velocity.per_most[k]).max(worst[0]);
+                worst[0] = peak(&uses, velocity.per_most).max(worst[0]);
                 for i in 0..SAMPLES {
-                    let ([w, half, ..], [q1, q2, _]) = (motion[i], block.samples[i].q[k]);
-                    uses[i] = (q2 * w + q1 * half) * self.acceleration.per_mean[k];
+                    let ([w, half, ..], [q1, q2, _]) = (motion[i], q[i]);
+                    uses[i] = (q2 * w + q1 * half) * acceleration.per_mean;
                 }
-                worst[1] = peak(&uses, self.acceleration.per_most[k]).max(worst[1]);
-                let jerk = block.jerk_factor.load(simd) * self.per_jerk[k];
+                worst[1] = peak(&uses, acceleration.per_most).max(worst[1]);
+                let jerk = block.jerk_factor.load(simd) * *per_jerk;
                 for i in 0..SAMPLES {
-                    let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], block.samples[i].q[k]);
+                    let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
                     uses[i] = (q3 * w + q2 * half * 3.0 + q1 * bend) * v * jerk;
                 }
                 worst[2] = peak(&uses, [1.0; 2]).max(worst[2]);

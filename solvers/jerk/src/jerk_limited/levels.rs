@@ -2,7 +2,7 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::constraints::{Block, Constraints, RowLayout};
+use super::constraints::{Block, Constraints};
 use super::exact::Exact;
 use super::interior_point::Effort;
 use super::intersample_check::IntersampleCheck;
@@ -48,7 +48,7 @@ fn levels() -> Vec<Level> {
 }
 
 /// What an interior point leaves from a plan, as bits.
-fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Constraints<3>) -> Vec<u64> {
+fn solved<X: Model>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Constraints) -> Vec<u64> {
     let effort = Effort {
         tolerance: 1e-7,
         max_iterations: 60,
@@ -57,7 +57,7 @@ fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: 
         warm: false,
         watch: Watch::default(),
     };
-    let mut space = InteriorPoint::<X, 3> { level, ..InteriorPoint::default() };
+    let mut space = InteriorPoint::<X> { level, ..InteriorPoint::default() };
     let mut x: Vec<f64> = prepared.x.iter().map(|x| 0.97 * x).collect();
     let report = space.solve(rows, prepared.ends, &mut x, &effort);
     assert!(report.iterations > 5, "{report:?}");
@@ -69,11 +69,11 @@ fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: 
 
 /// What the checks of a plan and its bound find on each interval.
 #[inline(always)]
-fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints<3>, between: &IntersampleCheck<3>) -> Vec<f64> {
+fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints, between: &IntersampleCheck) -> Vec<f64> {
     let mut out = rows.utilisation_on(simd, x).concat();
     out.extend(between.utilisation_on(simd, rows, x).concat());
     let row = |h: &Lanes| h.map(|h| 0.3 * h);
-    let all_rows = |block: &Block<3>| vec![row(&block.h); RowLayout::<3>::BLOCK];
+    let all_rows = |block: &Block| vec![row(&block.h); rows.layout().all()];
     let mut dual: Vec<Lanes> = rows.blocks.iter().flat_map(all_rows).collect();
     for terms in lagrangian_on(simd, rows, x, x, &mut dual) {
         out.extend([terms.time, terms.value]);

@@ -107,24 +107,24 @@ fn lowest(slope: f64, [low, high]: [f64; 2]) -> f64 {
 }
 
 /// What is known of a window that was planned.
-pub struct Planned<'a, const M: usize> {
+pub struct Planned<'a> {
     /// The limits as they are, and as they were tightened for the plan.
-    pub rows: &'a Constraints<M>,
-    pub tight: &'a Constraints<M>,
+    pub rows: &'a Constraints,
+    pub tight: &'a Constraints,
     pub ends: [WindowEnd; 2],
     /// Whether an end is one of the path.
     pub at_ends: [bool; 2],
     pub x: &'a [f64],
     /// With the multipliers under the tightened limits.
-    pub solved: &'a InteriorPoint<Exact, M>,
+    pub solved: &'a InteriorPoint<Exact>,
 }
 
 /// The part of the intervals `core` of a window.
-pub fn part<const M: usize>(
-    planned: &Planned<M>,
+pub fn part(
+    planned: &Planned,
     core: Range<usize>,
     effort: &Effort,
-    space: &mut InteriorPoint<Relaxed, M>,
+    space: &mut InteriorPoint<Relaxed>,
 ) -> Part {
     loosen(planned, &mut space.state.dual);
     let tight = excess(planned.rows, &space.state.dual) <= TIGHT;
@@ -179,11 +179,11 @@ pub fn part<const M: usize>(
 }
 
 /// The part by the tangent at x, and what the boxes take from it, in s.
-fn tangent<const M: usize>(
-    planned: &Planned<M>,
+fn tangent(
+    planned: &Planned,
     core: &Range<usize>,
     x: &[f64],
-    space: &mut InteriorPoint<Relaxed, M>,
+    space: &mut InteriorPoint<Relaxed>,
 ) -> (Part, f64) {
     let Planned { rows, at_ends, x: plan, .. } = *planned;
     let whole = x;
@@ -256,11 +256,12 @@ fn tangent<const M: usize>(
 }
 
 /// The part by which the multipliers of jerk exceed the weights of the time.
-fn excess<const M: usize>(rows: &Constraints<M>, dual: &[Lanes]) -> f64 {
+fn excess(rows: &Constraints, dual: &[Lanes]) -> f64 {
+    let layout = rows.layout();
     let (mut excess, mut length) = (0.0, 0.0);
     for (b, block) in rows.blocks.iter().enumerate() {
         for p in 0..COUNT {
-            let rest = rest::<M>(&block.h, RowLayout::<M>::of(dual, b, p), p);
+            let rest = rest(&block.h, layout.of(dual, b, p), layout, p);
             for (rest, live) in rest.values().iter().zip(block.live.values()) {
                 excess += (-rest).max(0.0) * live;
             }
@@ -271,11 +272,11 @@ fn excess<const M: usize>(rows: &Constraints<M>, dual: &[Lanes]) -> f64 {
 }
 
 /// c less the multipliers of jerk at collocation point p of intervals of length h.
-fn rest<const M: usize>(h: &Lanes, dual: &[Lanes], p: usize) -> Lanes {
+fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> Lanes {
     let mut rest = h.map(|h| MASS[p] * h);
-    for k in 0..M {
-        for row in [RowLayout::<M>::jerk(k), RowLayout::<M>::jerk(k) + 1] {
-            for (rest, own) in rest.values_mut().iter_mut().zip(dual[row].values()) {
+    for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
+        for row in &of_axis[2..] {
+            for (rest, own) in rest.values_mut().iter_mut().zip(row.values()) {
                 *rest -= own;
             }
         }
@@ -284,7 +285,7 @@ fn rest<const M: usize>(h: &Lanes, dual: &[Lanes], p: usize) -> Lanes {
 }
 
 /// Takes the multipliers of the limits as they are that pull like those of the tightened limits.
-fn loosen<const M: usize>(planned: &Planned<M>, out: &mut Vec<Lanes>) {
+fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
     out.clone_from(&planned.solved.state.dual);
     let scale = |dual: &mut Lanes, tight: &Lanes, own: &Lanes| {
         for (lane, dual) in dual.values_mut().iter_mut().enumerate() {
@@ -294,19 +295,22 @@ fn loosen<const M: usize>(planned: &Planned<M>, out: &mut Vec<Lanes>) {
             }
         }
     };
+    let layout = planned.rows.layout();
     for (b, (own, tight)) in planned.rows.blocks.iter().zip(&planned.tight.blocks).enumerate() {
         for p in 0..COUNT {
-            let dual = RowLayout::<M>::of_mut(out, b, p);
+            let dual = layout.of_mut(out, b, p);
             let [at, tight_at] = [&own.points[p], &tight.points[p]];
-            scale(&mut dual[RowLayout::<M>::SPEED], &tight_at.speed, &at.speed);
-            for k in 0..M {
-                for side in 0..2 {
-                    let row = &mut dual[RowLayout::<M>::acceleration(k) + side];
+            scale(&mut dual[layout.speed()], &tight_at.speed, &at.speed);
+            for of_axis in dual[..layout.speed()].chunks_exact_mut(RowLayout::OF_AXIS) {
+                let (acceleration, jerk) = of_axis.split_at_mut(2);
+                for row in acceleration {
                     scale(row, &tight_at.acceleration, &at.acceleration);
-                    scale(&mut dual[RowLayout::<M>::jerk(k) + side], &tight.jerk, &own.jerk);
+                }
+                for row in jerk {
+                    scale(row, &tight.jerk, &own.jerk);
                 }
             }
-            dual[RowLayout::<M>::POSITIVE] = rest::<M>(&own.h, dual, p).map(|rest| rest.max(0.0));
+            dual[layout.positive()] = rest(&own.h, dual, layout, p).map(|rest| rest.max(0.0));
         }
     }
 }
@@ -320,24 +324,20 @@ pub(super) struct Terms {
 }
 
 /// The terms of all intervals at a spline x; the multipliers are made admissible.
-fn lagrangian<const M: usize>(
-    rows: &Constraints<M>,
-    plan: &[f64],
-    x: &[f64],
-    dual: &mut [Lanes],
-) -> Vec<Terms> {
+fn lagrangian(rows: &Constraints, plan: &[f64], x: &[f64], dual: &mut [Lanes]) -> Vec<Terms> {
     dispatch!(Level::new(), simd => lagrangian_on(simd, rows, plan, x, dual))
 }
 
 #[inline(always)]
-pub(super) fn lagrangian_on<S: Simd, const M: usize>(
+pub(super) fn lagrangian_on<S: Simd>(
     simd: S,
-    rows: &Constraints<M>,
+    rows: &Constraints,
     plan: &[f64],
     x: &[f64],
     dual: &mut [Lanes],
 ) -> Vec<Terms> {
     let [plan, x] = [plan, x].map(Columns::new);
+    let layout = rows.layout();
     let mut out = vec![Terms::default(); rows.count()];
     let zero = Register::all(simd, 0.0);
     for (b, (block, out)) in rows.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
@@ -346,27 +346,25 @@ pub(super) fn lagrangian_on<S: Simd, const M: usize>(
         let [plan, u] = [&plan, &x].map(|spline| spline.local(b, h));
         let (mut time, mut value, mut slope) = (zero, zero, [zero; 4]);
         for p in 0..COUNT {
-            let dual = RowLayout::<M>::of_mut(dual, b, p);
+            let dual = layout.of_mut(dual, b, p);
             let cost = h * MASS[p];
             time += cost * pace(motion(p, per_h, &plan)[0]);
             let mut jerk = zero;
-            for k in 0..M {
-                let at = RowLayout::<M>::jerk(k);
-                jerk += dual[at].load(simd) + dual[at + 1];
+            for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
+                jerk += of_axis[2].load(simd) + of_axis[3];
             }
             // The Lagrangian is bounded below in y only if the multipliers of its rows add up to its cost.
             let most = cost * jerk.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
             let fit = Register::all(simd, 1.0).min(most);
-            let mut fixed = -dual[RowLayout::<M>::SPEED].load(simd);
-            for k in 0..M {
-                let (at, to) = (RowLayout::<M>::acceleration(k), RowLayout::<M>::jerk(k));
-                let [up, down] = rows.acceleration.most[k];
-                fixed += -(dual[at].load(simd) * up + dual[at + 1].load(simd) * down);
-                (dual[to], dual[to + 1]) = ((dual[to] * fit).into(), (dual[to + 1] * fit).into());
+            let mut fixed = -dual[layout.speed()].load(simd);
+            for (limit, of_axis) in rows.acceleration.iter().zip(dual.chunks_exact_mut(RowLayout::OF_AXIS)) {
+                let [up, down] = limit.most;
+                fixed += -(of_axis[0].load(simd) * up + of_axis[1].load(simd) * down);
+                (of_axis[2], of_axis[3]) = ((of_axis[2] * fit).into(), (of_axis[3] * fit).into());
             }
             let last = (cost - jerk * fit).max(zero);
             let [w, w1, w2] = motion(p, per_h, &u);
-            let (pull, _) = rows.pull(simd, block, p, dual);
+            let (pull, _) = rows.pull(simd, b, p, dual);
             let pace = pace(w);
             value += fixed + last * pace - pull[0] * w - pull[1] * w1 - pull[2] * w2;
             project(p, per_h, &[-pull[0] - last * fall(pace), -pull[1], -pull[2]], &mut slope);
@@ -380,12 +378,11 @@ pub(super) fn lagrangian_on<S: Simd, const M: usize>(
 }
 
 /// The greatest w, w' and −w' by the limits of speed and acceleration at collocation point p of an interval.
-fn limits_at<const M: usize>(rows: &Constraints<M>, interval: &Interval<M>, p: usize) -> [f64; 3] {
+fn limits_at(rows: &Constraints, interval: &Interval, p: usize) -> [f64; 3] {
     let w = 1.0 / interval.speed[p];
     let (mut rise, mut fall) = (f64::INFINITY, f64::INFINITY);
-    for k in 0..M {
-        let [q1, q2, _] = interval.q[p][k];
-        let most = rows.acceleration.most[k].map(|most| most / rows.acceleration.per_mean[k]);
+    for (limit, [q1, q2, _]) in rows.acceleration.iter().zip(interval.q[p]) {
+        let most = limit.most.map(|most| most / limit.per_mean);
         let against = usize::from(q1 < 0.0);
         rise = rise.min(2.0 * (most[against] + q2.abs() * w) / q1.abs());
         fall = fall.min(2.0 * (most[1 - against] + q2.abs() * w) / q1.abs());
@@ -434,12 +431,12 @@ mod tests {
     }
 
     /// Σ c max(w^(−1/2), |L(w)|/J) over some intervals: jerk beyond its limit takes time instead.
-    fn relaxed_time(rows: &Constraints<2>, x: &[f64], core: &Range<usize>) -> f64 {
+    fn relaxed_time(rows: &Constraints, x: &[f64], core: &Range<usize>) -> f64 {
         relaxed_times(rows, x)[core.clone()].iter().sum()
     }
 
     /// The same of each interval.
-    fn relaxed_times(rows: &Constraints<2>, x: &[f64]) -> Vec<f64> {
+    fn relaxed_times(rows: &Constraints, x: &[f64]) -> Vec<f64> {
         let x = Columns::new(x);
         dispatch!(Level::new(), simd => {
             let mut times = vec![];
@@ -449,8 +446,8 @@ mod tests {
                 for p in 0..COUNT {
                     let motion = motion(p, h.inverse(), &x.local(b, h));
                     let mut y = pace(motion[0]);
-                    for [_, jerk] in rows.axes(block, p, motion) {
-                        y = y.max(jerk.abs());
+                    for k in 0..rows.axes() {
+                        y = y.max(rows.axis(b, p, k, motion)[1].abs());
                     }
                     time += y * h * MASS[p];
                 }
@@ -462,7 +459,7 @@ mod tests {
 
     /// Speed profiles around a plan that keep the limits of speed and acceleration, from 1e-4 to half of it away, rough
     /// and smooth; the ends are multiplied by the same factor as the slopes there.
-    fn around(plan: &[f64], rows: &Constraints<2>, count: usize) -> Vec<Vec<f64>> {
+    fn around(plan: &[f64], rows: &Constraints, count: usize) -> Vec<Vec<f64>> {
         let mut random = random();
         let keeps = |x: &[f64]| {
             let within = rows.utilisation(x).iter().all(|used| used[0] <= 1.0 && used[1] <= 1.0);
@@ -504,7 +501,7 @@ mod tests {
     }
 
     /// Plans a path whole and calls `work` with what the bound takes, and the effort.
-    fn planned(turn: f64, work: impl Fn(&Planned<2>, &Effort)) {
+    fn planned(turn: f64, work: impl Fn(&Planned, &Effort)) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
         let geometry = Winding { knots: [0.0, 20.0], turn };
@@ -534,7 +531,7 @@ mod tests {
                 let (most, one) = (1.0 + random(), 8.0 * random());
                 let of_row = |row: usize| if one < 0.0 || row == one as usize { most } else { 0.0 };
                 let rows_of = |h: Lanes, p: usize| {
-                    (0..RowLayout::<2>::COUNT).map(move |row| h.map(|h| MASS[p] * h * of_row(row)))
+                    (0..own.rows.layout().count()).map(move |row| h.map(|h| MASS[p] * h * of_row(row)))
                 };
                 let dual: Vec<Lanes> =
                     blocks.iter().flat_map(|own| (0..COUNT).flat_map(|p| rows_of(own.h, p))).collect();

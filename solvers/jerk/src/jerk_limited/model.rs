@@ -9,14 +9,14 @@ use super::forms::Local;
 use feedplan_geometry::lanes::eight::{Lanes, Register};
 
 /// A problem over the constraints of a window. It may have own variables at the collocation points.
-pub trait Model<const M: usize>: Default {
+pub trait Model: Default {
     /// Starts the own variables for the spline x.
-    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, x: &Columns);
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints, x: &Columns);
 
     /// The slacks for a spline with this motion, with the present or the trial values of the own variables.
     fn slack<S: Simd>(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         motion: [Register<S>; 3],
@@ -27,7 +27,7 @@ pub trait Model<const M: usize>: Default {
     /// The change of the slacks for a step with this motion; convex slacks change along their tangents.
     fn slack_step<S: Simd>(
         &self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         motion: [Register<S>; 3],
@@ -37,7 +37,7 @@ pub trait Model<const M: usize>: Default {
     /// Matrix and gradient of a block with local coefficients u, for the weights λ/s and the multipliers λ of its rows.
     fn local<S: Simd>(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         u: &[Register<S>; 4],
         weight: &[Lanes],
@@ -49,7 +49,7 @@ pub trait Model<const M: usize>: Default {
     fn pull<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         aim: &[Lanes],
@@ -57,7 +57,7 @@ pub trait Model<const M: usize>: Default {
     ) -> [Register<S>; 3];
 
     /// Computes the step of the own variables from that of the spline; `pulls` are the factors of both aims.
-    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, step: &Columns, pulls: [f64; 2]);
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints, step: &Columns, pulls: [f64; 2]);
 
     /// Sets the trial values of the own variables, a part of their step away.
     fn attempt<S: Simd>(&mut self, simd: S, part: f64);
@@ -65,5 +65,5 @@ pub trait Model<const M: usize>: Default {
     fn accept(&mut self);
 
     /// The time of x without its ramps; infinite where w is not positive.
-    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &Columns, trial: bool) -> f64;
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints, x: &Columns, trial: bool) -> f64;
 }

@@ -3,7 +3,7 @@
 use fearless_simd::{dispatch, Simd};
 
 use super::band::EndCondition;
-use super::constraints::{Constraints, RowLayout};
+use super::constraints::Constraints;
 use super::forms::{motion, project};
 use super::hermite::COUNT;
 use super::model::Model;
@@ -11,27 +11,28 @@ use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use feedplan_geometry::lanes::eight::{Lanes, Register};
 
-impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
+impl<X: Model> InteriorPoint<X> {
     /// Assembles matrix and gradient at x, after `part` of the multipliers' step with λ ≥ `least_dual`/s; returns Σ λ
     /// s.
-    pub(super) fn assemble(&mut self, rows: &Constraints<M>, part: f64, least_dual: f64) -> f64 {
+    pub(super) fn assemble(&mut self, rows: &Constraints, part: f64, least_dual: f64) -> f64 {
         dispatch!(self.level, simd => self.assemble_on(simd, rows, part, least_dual))
     }
 
     #[inline(always)]
-    fn assemble_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, part: f64, least_dual: f64) -> f64 {
+    fn assemble_on<S: Simd>(&mut self, simd: S, rows: &Constraints, part: f64, least_dual: f64) -> f64 {
+        let layout = rows.layout();
         let state = &mut self.state;
         let mut work = Register::all(simd, 0.0);
         let floor = Register::all(simd, least_dual);
-        let weight = &mut self.scratch[..RowLayout::<M>::BLOCK];
+        let weight = &mut self.scratch[..layout.all()];
         for (b, block) in rows.blocks.iter().enumerate() {
-            let all = b * RowLayout::<M>::BLOCK..(b + 1) * RowLayout::<M>::BLOCK;
+            let all = b * layout.all()..(b + 1) * layout.all();
             let slack = &mut state.slack[all.clone()];
             let dual = &mut state.dual[all.clone()];
             let step = &state.step[all];
             let mut own = Register::all(simd, 0.0);
             // Rows are pairs: one division gives the inverses of both.
-            for k in (0..RowLayout::<M>::BLOCK).step_by(2) {
+            for k in (0..layout.all()).step_by(2) {
                 let both = [slack[k].load(simd), slack[k + 1].load(simd)];
                 let per_product = (both[0] * both[1]).inverse();
                 for (k, slack_here, other) in [(k, both[0], both[1]), (k + 1, both[1], both[0])] {
@@ -65,14 +66,15 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     /// Returns Σ λ s, now `work`, after the predictor's longest step. Keeps the predictor's products −ds dλ, each at
     /// most `most` in size, and the pulls of these products and of the centring on each station.
-    pub(super) fn predict(&mut self, rows: &Constraints<M>, work: f64, most: f64) -> f64 {
+    pub(super) fn predict(&mut self, rows: &Constraints, work: f64, most: f64) -> f64 {
         dispatch!(self.level, simd => self.predict_on(simd, rows, work, most))
     }
 
     #[inline(always)]
-    fn predict_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, work: f64, most: f64) -> f64 {
+    fn predict_on<S: Simd>(&mut self, simd: S, rows: &Constraints, work: f64, most: f64) -> f64 {
+        let layout = rows.layout();
         let state = &mut self.state;
-        let change = &mut self.scratch[..RowLayout::<M>::COUNT];
+        let change = &mut self.scratch[..layout.count()];
         let zero = Register::all(simd, 0.0);
         let (high, low) = (Register::all(simd, most), Register::all(simd, -most));
         let (mut least, mut greatest) = (zero, zero);
@@ -84,10 +86,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             let mut pulls = [[zero; 4]; 2];
             for p in 0..COUNT {
                 self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
-                let inverse = RowLayout::<M>::of(&state.slack, b, p);
-                let dual = RowLayout::<M>::of(&state.dual, b, p);
-                let product = RowLayout::<M>::of_mut(&mut state.step, b, p);
-                for k in 0..RowLayout::<M>::COUNT {
+                let inverse = layout.of(&state.slack, b, p);
+                let dual = layout.of(&state.dual, b, p);
+                let product = layout.of_mut(&mut state.step, b, p);
+                for k in 0..layout.count() {
                     let step = change[k].load(simd);
                     let part = step * inverse[k];
                     least = least.min(part);
@@ -161,20 +163,15 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Computes the steps of the multipliers; returns the longest steps that keep slacks and multipliers positive.
-    pub(super) fn direction(&mut self, rows: &Constraints<M>, target: f64, second: f64) -> (f64, f64) {
+    pub(super) fn direction(&mut self, rows: &Constraints, target: f64, second: f64) -> (f64, f64) {
         dispatch!(self.level, simd => self.direction_on(simd, rows, target, second))
     }
 
     #[inline(always)]
-    fn direction_on<S: Simd>(
-        &mut self,
-        simd: S,
-        rows: &Constraints<M>,
-        target: f64,
-        second: f64,
-    ) -> (f64, f64) {
+    fn direction_on<S: Simd>(&mut self, simd: S, rows: &Constraints, target: f64, second: f64) -> (f64, f64) {
+        let layout = rows.layout();
         let goal = Register::all(simd, target);
-        let change = &mut self.scratch[..RowLayout::<M>::COUNT];
+        let change = &mut self.scratch[..layout.count()];
         let state = &mut self.state;
         let mut least = Register::all(simd, -1e-12);
         let mut dual_most = 1e-12;
@@ -185,10 +182,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             let mut beyond = Register::all(simd, 0.0);
             for p in 0..COUNT {
                 self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
-                let inverse = RowLayout::<M>::of(&state.slack, b, p);
-                let dual = RowLayout::<M>::of(&state.dual, b, p);
-                let step = RowLayout::<M>::of_mut(&mut state.step, b, p);
-                for k in 0..RowLayout::<M>::COUNT {
+                let inverse = layout.of(&state.slack, b, p);
+                let dual = layout.of(&state.dual, b, p);
+                let step = layout.of_mut(&mut state.step, b, p);
+                for k in 0..layout.count() {
                     let part = change[k].load(simd) * inverse[k];
                     least = least.min(part);
                     let aim = (goal + step[k].load(simd) * second) * inverse[k];
@@ -199,7 +196,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             }
             // Few intervals need a shorter step than all before; only these divide. No lane is above 0.
             if beyond.sum() < 0.0 {
-                let all = b * RowLayout::<M>::BLOCK..(b + 1) * RowLayout::<M>::BLOCK;
+                let all = b * layout.all()..(b + 1) * layout.all();
                 let mut most = known;
                 for (step, dual) in state.step[all.clone()].iter().zip(&state.dual[all]) {
                     most = (-(step.load(simd) * dual.load(simd).inverse())).max(most);
@@ -220,7 +217,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Moves x and the multipliers by a Newton step that keeps λ s: to first order the gradient of the Lagrangian
     /// vanishes there. The multipliers stay at 0 or above, and w above 0, but x may leave the limits. False where there
     /// is no such step.
-    pub(super) fn balance(&mut self, rows: &Constraints<M>, conditions: [EndCondition; 2]) -> bool {
+    pub(super) fn balance(&mut self, rows: &Constraints, conditions: [EndCondition; 2]) -> bool {
         if self.slacks(rows, false).is_none() {
             return false;
         }
@@ -243,14 +240,15 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     /// The pulls of the multipliers on each station.
     #[inline(always)]
-    fn pull_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>) {
+    fn pull_on<S: Simd>(&mut self, simd: S, rows: &Constraints) {
+        let layout = rows.layout();
         let zero = Register::all(simd, 0.0);
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
             let per_h = h.inverse();
             let mut own = [zero; 4];
             for p in 0..COUNT {
-                let dual = RowLayout::<M>::of(&self.state.dual, b, p);
+                let dual = layout.of(&self.state.dual, b, p);
                 let pull = self.model.pull(simd, rows, b, p, dual, 0);
                 project(p, per_h, &pull, &mut own);
             }
@@ -264,17 +262,18 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     /// Changes the multipliers so that to first order λ s stays as it was before the step, and accepts the step.
     #[inline(always)]
-    fn keep_products<S: Simd>(&mut self, simd: S, rows: &Constraints<M>) {
-        let change = &mut self.scratch[..RowLayout::<M>::COUNT];
+    fn keep_products<S: Simd>(&mut self, simd: S, rows: &Constraints) {
+        let layout = rows.layout();
+        let change = &mut self.scratch[..layout.count()];
         let zero = Register::all(simd, 0.0);
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
             let (d, per_h) = (self.step.local(b, h), h.inverse());
             for p in 0..COUNT {
                 self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
-                let inverse = RowLayout::<M>::of(&self.state.slack, b, p);
-                let dual = RowLayout::<M>::of_mut(&mut self.state.dual, b, p);
-                for k in 0..RowLayout::<M>::COUNT {
+                let inverse = layout.of(&self.state.slack, b, p);
+                let dual = layout.of_mut(&mut self.state.dual, b, p);
+                for k in 0..layout.count() {
                     let part = change[k].load(simd) * inverse[k];
                     dual[k] = (dual[k] * (Lanes::ONE - part)).max(zero).into();
                 }
@@ -294,13 +293,13 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// The step for the right-hand side; `missing` are the steps at given ends, `pulls` the parts of both pulls in it.
-    pub(super) fn step_to(&mut self, rows: &Constraints<M>, missing: [[f64; 2]; 2], pulls: [f64; 2]) {
+    pub(super) fn step_to(&mut self, rows: &Constraints, missing: [[f64; 2]; 2], pulls: [f64; 2]) {
         self.band.solve(&self.rhs, missing, &mut self.step);
         dispatch!(self.level, simd => self.model.solved(simd, rows, &self.step, pulls));
     }
 
     /// Time and Σ ln s after a part of the step; the time is infinite where a limit is broken.
-    pub(super) fn attempt(&mut self, rows: &Constraints<M>, ends: [WindowEnd; 2], part: f64) -> (f64, f64) {
+    pub(super) fn attempt(&mut self, rows: &Constraints, ends: [WindowEnd; 2], part: f64) -> (f64, f64) {
         self.try_step(part);
         dispatch!(self.level, simd => self.model.attempt(simd, part));
         match self.slacks(rows, true) {

@@ -30,7 +30,7 @@ pub struct Prepared<'a, G, const M: usize> {
     /// The ends of every motion that the lower bound is for.
     pub bound_ends: [WindowEnd; 2],
     /// The constraints on all intervals, where one window takes them all.
-    rows: Option<Constraints<M>>,
+    rows: Option<Constraints>,
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
     /// The greatest speed that the envelope allows on each interval, in mm/s.
@@ -113,7 +113,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     }
 
     /// f(constraints of some intervals, x at their stations) for all intervals.
-    fn each(&self, f: impl Fn(&Constraints<M>, &[f64]) -> Vec<f64> + Sync) -> Vec<f64> {
+    fn each(&self, f: impl Fn(&Constraints, &[f64]) -> Vec<f64> + Sync) -> Vec<f64> {
         let mut out = vec![0.0; self.grid.pieces.len()];
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             self.watch.check();
@@ -127,7 +127,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     }
 
     /// Takes the constraints on a range of intervals.
-    fn take(&self, range: Range<usize>, rows: &mut Constraints<M>) {
+    fn take(&self, range: Range<usize>, rows: &mut Constraints) {
         match &self.rows {
             Some(all) => rows.copy(all, range),
             None => self.grid.sample(self.problem, range, rows),
@@ -135,7 +135,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     }
 
     /// Makes the window one of a range of intervals.
-    pub fn fill(&self, range: Range<usize>, window: &mut Window<M>) {
+    pub fn fill(&self, range: Range<usize>, window: &mut Window) {
         self.take(range.clone(), &mut window.rows);
         let stations = &self.grid.stations[range.start..=range.end];
         window.check.sample(self.problem.geometry, stations, &self.grid.pieces[range], &window.rows);

@@ -37,9 +37,9 @@ impl Default for Relaxed {
     }
 }
 
-impl<const M: usize> Model<M> for Relaxed {
+impl Model for Relaxed {
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, x: &Columns) {
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints, x: &Columns) {
         let count = rows.blocks.len();
         for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
             lanes.resize(count, [Lanes::ONE; COUNT]);
@@ -52,8 +52,8 @@ impl<const M: usize> Model<M> for Relaxed {
             for p in 0..COUNT {
                 let motion = motion(p, per_h, &u);
                 let mut least = pace(motion[0]);
-                for [_, jerk] in rows.axes(block, p, motion) {
-                    least = least.max(jerk.abs());
+                for k in 0..rows.axes() {
+                    least = least.max(rows.axis(b, p, k, motion)[1].abs());
                 }
                 self.y[b][p] = (least * (1.0 + self.above)).into();
             }
@@ -63,7 +63,7 @@ impl<const M: usize> Model<M> for Relaxed {
     #[inline(always)]
     fn slack<S: Simd>(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         motion: [Register<S>; 3],
@@ -72,14 +72,14 @@ impl<const M: usize> Model<M> for Relaxed {
     ) {
         let pace = pace(motion[0]);
         let y = if trial { &self.trial } else { &self.y }[block][p].load(pace.simd());
-        rows.slack(&rows.blocks[block], p, motion, y, y - pace, out);
+        rows.slack(block, p, motion, y, y - pace, out);
         self.pace[block][p] = pace.into();
     }
 
     #[inline(always)]
     fn slack_step<S: Simd>(
         &self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         motion: [Register<S>; 3],
@@ -88,37 +88,37 @@ impl<const M: usize> Model<M> for Relaxed {
         let w = motion[0];
         let step = self.step[block][p].load(w.simd());
         let last = step + fall(self.pace[block][p].load(w.simd())) * w;
-        rows.slack_step(&rows.blocks[block], p, motion, step, last, out);
+        rows.slack_step(block, p, motion, step, last, out);
     }
 
     #[inline(always)]
     fn local<S: Simd>(
         &mut self,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         u: &[Register<S>; 4],
         weight: &[Lanes],
         dual: &[Lanes],
     ) -> Local<S> {
         let simd = u[0].simd();
-        let own = &rows.blocks[block];
+        let (own, layout) = (&rows.blocks[block], rows.layout());
         let h = own.h.load(simd);
         let per_h = h.inverse();
         let zero = Register::all(simd, 0.0);
         let mut local = Local::zero(simd);
         for p in 0..COUNT {
-            let [weight, dual] = [weight, dual].map(|rows| RowLayout::<M>::of(rows, 0, p));
-            let mut form = rows.curvature(simd, own, p, weight);
-            let (last, pace) = (weight[RowLayout::<M>::POSITIVE].load(simd), self.pace[block][p].load(simd));
+            let [weight, dual] = [weight, dual].map(|all| layout.of(all, 0, p));
+            let mut form = rows.curvature(simd, block, p, weight);
+            let (last, pace) = (weight[layout.positive()].load(simd), self.pace[block][p].load(simd));
             let fall = fall(pace);
             let mut cross = [last, last * fall, zero, zero];
-            form[0] += last * fall * fall + dual[RowLayout::<M>::POSITIVE] * fall * pace * pace * 1.5;
-            for k in 0..M {
-                let at = RowLayout::<M>::jerk(k);
-                let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
+            form[0] += last * fall * fall + dual[layout.positive()] * fall * pace * pace * 1.5;
+            for ((k, weight), &[q1, q2, q3]) in
+                weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(rows.q(block, p))
+            {
+                let [up, down] = [weight[2].load(simd), weight[3].load(simd)];
                 let (both, turn) = (up + down, down - up);
                 let turn = turn * own.jerk * rows.per_jerk[k];
-                let [q1, q2, q3] = own.points[p].q[k];
                 cross[0] += both;
                 cross[1] += turn * q3;
                 cross[2] += turn * q2 * 1.5;
@@ -144,14 +144,14 @@ impl<const M: usize> Model<M> for Relaxed {
     fn pull<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Constraints<M>,
+        rows: &Constraints,
         block: usize,
         p: usize,
         aim: &[Lanes],
         which: usize,
     ) -> [Register<S>; 3] {
-        let (mut pull, jerk) = rows.pull(simd, &rows.blocks[block], p, aim);
-        let last = aim[RowLayout::<M>::POSITIVE].load(simd);
+        let (mut pull, jerk) = rows.pull(simd, block, p, aim);
+        let last = aim[rows.layout().positive()].load(simd);
         pull[0] += last * fall(self.pace[block][p].load(simd));
         self.pulls[block][p][which] = (jerk + last).into();
         let [per, cross @ ..] = &self.cross[block][p];
@@ -163,7 +163,7 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, step: &Columns, pulls: [f64; 2]) {
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints, step: &Columns, pulls: [f64; 2]) {
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
             let (u, per_h) = (step.local(b, h), h.inverse());
@@ -192,7 +192,7 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &Columns, trial: bool) -> f64 {
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints, x: &Columns, trial: bool) -> f64 {
         let y = if trial { &self.trial } else { &self.y };
         let mut time = Register::all(simd, 0.0);
         let mut least = Register::all(simd, f64::INFINITY);

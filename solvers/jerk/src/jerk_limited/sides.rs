@@ -3,26 +3,25 @@
 
 use feedplan_planner::problem::Both;
 
-/// Limits of each axis, scaled by the mean of its two limits.
-#[derive(Clone, Copy, Debug)]
-pub struct Sides<const M: usize> {
+/// The limits of an axis, scaled by the mean of both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sides {
     /// 1/mean of both limits.
-    pub per_mean: [f64; M],
+    pub per_mean: f64,
     /// The limits of positive and of negative values over the mean: 1 where both are the same.
-    pub most: [[f64; 2]; M],
+    pub most: [f64; 2],
     /// 1/`most`.
-    pub per_most: [[f64; 2]; M],
+    pub per_most: [f64; 2],
 }
 
-impl<const M: usize> Sides<M> {
-    pub fn new(limits: &Both<M>) -> Self {
-        let mean: [f64; M] = std::array::from_fn(|k| 0.5 * (limits[0][k] + limits[1][k]));
-        let most: [[f64; 2]; M] = std::array::from_fn(|k| [0, 1].map(|sign| limits[sign][k] / mean[k]));
-        Self {
-            per_mean: mean.map(|mean| 1.0 / mean),
-            most,
-            per_most: most.map(|both| both.map(|most| 1.0 / most)),
-        }
+impl Sides {
+    /// Those of each axis.
+    pub fn of<const M: usize>(limits: &Both<M>) -> [Self; M] {
+        std::array::from_fn(|k| {
+            let mean = 0.5 * (limits[0][k] + limits[1][k]);
+            let most = [0, 1].map(|sign| limits[sign][k] / mean);
+            Self { per_mean: 1.0 / mean, most, per_most: most.map(|most| 1.0 / most) }
+        })
     }
 }
 
@@ -32,9 +31,8 @@ mod tests {
 
     #[test]
     fn two_limits_by_hand() {
-        let sides = Sides::new(&[[3.0, 7.0], [1.0, 7.0]]);
-        assert_eq!(sides.per_mean, [0.5, 1.0 / 7.0]);
-        assert_eq!(sides.most, [[1.5, 0.5], [1.0, 1.0]]);
-        assert_eq!(sides.per_most, [[1.0 / 1.5, 2.0], [1.0, 1.0]]);
+        let [one, other] = Sides::of(&[[3.0, 7.0], [1.0, 7.0]]);
+        assert_eq!(one, Sides { per_mean: 0.5, most: [1.5, 0.5], per_most: [1.0 / 1.5, 2.0] });
+        assert_eq!((other.per_mean, other.most), (1.0 / 7.0, [1.0; 2]));
     }
 }

@@ -13,6 +13,7 @@
 
 use super::constraints::Constraints;
 use super::hermite::COUNT;
+use crate::path_problem::MOST_AXES;
 
 /// Rounds of all passes.
 const ROUNDS: usize = 4;
@@ -21,9 +22,12 @@ const ROUNDING: f64 = 1e-12;
 /// q'' jumps where it changes by more than this part of itself at a station; κ w^(3/2) jumps there as well.
 const JUMP: f64 = 1e-6;
 
-struct Point<const M: usize> {
-    first: [f64; M],
-    normal: [f64; M],
+/// A number for each axis, 0 beyond the last one.
+type Axes = [f64; MOST_AXES];
+
+struct Point {
+    first: Axes,
+    normal: Axes,
     bend: f64,
     /// Bounds of w, and of v³ plus the integral.
     w: f64,
@@ -34,16 +38,16 @@ struct Point<const M: usize> {
 }
 
 /// The way from a point to the next.
-struct Step<const M: usize> {
+struct Step {
     /// The greatest changes of q_k'² w forward and backward.
-    energy: [[f64; M]; 2],
+    energy: [Axes; 2],
     /// The greatest change of κ w^(3/2), and the least κ.
     bending: f64,
     straight: f64,
 }
 
 /// Lowers the speed caps of a window.
-pub fn lower<const M: usize>(rows: &mut Constraints<M>) {
+pub fn lower(rows: &mut Constraints) {
     let (mut points, steps) = points(rows);
     for _ in 0..ROUNDS {
         for (n, step) in steps.iter().enumerate() {
@@ -61,14 +65,14 @@ pub fn lower<const M: usize>(rows: &mut Constraints<M>) {
     }
 }
 
-impl<const M: usize> Point<M> {
+impl Point {
     /// Lowers w to what can be reached from another point.
-    fn lower(&mut self, from: &Self, energy: &[f64; M], step: &Step<M>) {
+    fn lower(&mut self, from: &Self, energy: &Axes, step: &Step) {
         // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
         if self.s == from.s {
             self.w = self.w.min(from.w);
         }
-        for k in 0..M {
+        for k in 0..MOST_AXES {
             let square = self.first[k] * self.first[k];
             if square > 0.0 && self.s != from.s {
                 self.w = self.w.min((from.first[k] * from.first[k] * from.w + energy[k]) / square);
@@ -83,12 +87,15 @@ impl<const M: usize> Point<M> {
     }
 }
 
-fn points<const M: usize>(rows: &Constraints<M>) -> (Vec<Point<M>>, Vec<Step<M>>) {
-    let jerk = rows.per_jerk.map(|per| 1.0 / per);
-    let most =
-        |k: usize, side: bool| rows.acceleration.most[k][usize::from(side)] / rows.acceleration.per_mean[k];
-    let along = |direction: &[f64; M]| (0..M).map(|k| direction[k].abs() * jerk[k]).sum::<f64>();
-    let mut points: Vec<Point<M>> = Vec::with_capacity(COUNT * rows.count());
+fn points(rows: &Constraints) -> (Vec<Point>, Vec<Step>) {
+    let mut jerk = [0.0; MOST_AXES];
+    let mut acceleration = [[0.0; 2]; MOST_AXES];
+    for (k, (per_jerk, limit)) in rows.per_jerk.iter().zip(&rows.acceleration).enumerate() {
+        (jerk[k], acceleration[k]) = (1.0 / per_jerk, limit.most.map(|most| most / limit.per_mean));
+    }
+    let most = |k: usize, side: bool| acceleration[k][usize::from(side)];
+    let along = |direction: &Axes| (0..MOST_AXES).map(|k| direction[k].abs() * jerk[k]).sum::<f64>();
+    let mut points: Vec<Point> = Vec::with_capacity(COUNT * rows.count());
     let mut steps = Vec::with_capacity(COUNT * rows.count());
     let mut slope = 0.0;
     for interval in rows.intervals() {
@@ -96,7 +103,7 @@ fn points<const M: usize>(rows: &Constraints<M>) -> (Vec<Point<M>>, Vec<Step<M>>
             let [first, second] = [0, 1].map(|order| interval.q[p].map(|q| q[order]));
             let bend = length(&second);
             let normal = second.map(|second: f64| second / bend.max(f64::MIN_POSITIVE));
-            let across: f64 = (0..M).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
+            let across: f64 = (0..MOST_AXES).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
             let w = (1.0 / interval.speed[p]).min(across / bend);
             let mut next = Point { first, normal, bend, w, convex: 0.0, s: 0.0, integral: 0.0 };
             if let Some(last) = points.last() {
@@ -113,14 +120,14 @@ fn points<const M: usize>(rows: &Constraints<M>) -> (Vec<Point<M>>, Vec<Step<M>>
     (points, steps)
 }
 
-fn step<const M: usize>(
-    last: &Point<M>,
-    next: &Point<M>,
+fn step(
+    last: &Point,
+    next: &Point,
     h: f64,
-    along: &impl Fn(&[f64; M]) -> f64,
+    along: &impl Fn(&Axes) -> f64,
     all: f64,
     most: &impl Fn(usize, bool) -> f64,
-) -> Step<M> {
+) -> Step {
     let energy = [false, true].map(|back| {
         std::array::from_fn(|k| {
             let (a, b) = (last.first[k], next.first[k]);
@@ -139,14 +146,14 @@ fn step<const M: usize>(
     let turn = length(&difference(&last.normal, &next.normal));
     let steep = along(&last.normal).max(along(&next.normal)) * (1.0 + turn * turn / 6.0);
     // The least |q''| where q'' changes evenly.
-    let back: f64 = (0..M).map(|k| -bends[0][k] * apart[k]).sum();
+    let back: f64 = (0..MOST_AXES).map(|k| -bends[0][k] * apart[k]).sum();
     let part = (back / length(&apart).powi(2).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    let straight = length::<M>(&std::array::from_fn(|k| bends[0][k] + part * apart[k]));
+    let straight = length(&std::array::from_fn(|k| bends[0][k] + part * apart[k]));
     Step { energy, bending: h * if turn < 1.0 { steep.min(all) } else { all }, straight }
 }
 
 /// Lowers w to the lower convex hull of v³ plus the integral over the arc length.
-fn convex<const M: usize>(points: &mut [Point<M>]) {
+fn convex(points: &mut [Point]) {
     let mut hull: Vec<usize> = vec![];
     for n in 0..points.len() {
         points[n].convex = points[n].w * points[n].w.sqrt() + points[n].integral;
@@ -171,11 +178,11 @@ fn convex<const M: usize>(points: &mut [Point<M>]) {
     }
 }
 
-fn length<const M: usize>(vector: &[f64; M]) -> f64 {
+fn length(vector: &Axes) -> f64 {
     vector.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
-fn difference<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+fn difference(a: &Axes, b: &Axes) -> Axes {
     std::array::from_fn(|k| b[k] - a[k])
 }
 

@@ -40,9 +40,9 @@ const CHEAP: f64 = 10.0;
 
 /// The constraints on a range of intervals, and the check between their collocation points.
 #[derive(Clone, Debug)]
-pub struct Window<const M: usize> {
-    pub rows: Constraints<M>,
-    pub check: IntersampleCheck<M>,
+pub struct Window {
+    pub rows: Constraints,
+    pub check: IntersampleCheck,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,9 +54,9 @@ pub struct WindowReport {
     pub iterations: usize,
 }
 
-impl<const M: usize> Window<M> {
+impl Window {
     /// Without intervals.
-    pub fn new(limits: &Limits<M>) -> Self {
+    pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
         Self { rows: Constraints::new(limits), check: IntersampleCheck::new(limits) }
     }
 
@@ -66,7 +66,7 @@ impl<const M: usize> Window<M> {
         ends: [WindowEnd; 2],
         x: &mut [f64],
         effort: &Effort,
-        space: &mut InteriorPoint<Exact, M>,
+        space: &mut InteriorPoint<Exact>,
     ) -> WindowReport {
         let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
@@ -112,7 +112,7 @@ impl<const M: usize> Window<M> {
         &self,
         ends: [WindowEnd; 2],
         starts: Vec<(Vec<f64>, Effort<'_>)>,
-        space: &mut InteriorPoint<Exact, M>,
+        space: &mut InteriorPoint<Exact>,
         spent: &mut usize,
     ) -> Option<(Vec<f64>, Report)> {
         for (mut y, mut effort) in starts {

@@ -122,16 +122,16 @@ impl Counts {
 }
 
 /// Working space for one window.
-struct Space<const M: usize> {
-    window: Window<M>,
+struct Space {
+    window: Window,
     /// Its limits as they are, for the lower bound.
-    loose: Constraints<M>,
-    exact: InteriorPoint<Exact, M>,
-    relaxed: InteriorPoint<Relaxed, M>,
+    loose: Constraints,
+    exact: InteriorPoint<Exact>,
+    relaxed: InteriorPoint<Relaxed>,
 }
 
-impl<const M: usize> Space<M> {
-    fn new(limits: &Limits<M>) -> Self {
+impl Space {
+    fn new<const M: usize>(limits: &Limits<M>) -> Self {
         Self {
             window: Window::new(limits),
             loose: Constraints::new(limits),
@@ -146,7 +146,7 @@ struct Run<'a, G, const M: usize> {
     effort: &'a Effort<'a>,
     stations: &'a [f64],
     /// Working spaces of windows that are done: the system takes long to give some MB.
-    idle: Mutex<Vec<Space<M>>>,
+    idle: Mutex<Vec<Space>>,
 }
 
 /// Some intervals: the time of the first plan in s, and the greatest speed that the envelope allows in mm/s.
@@ -219,7 +219,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     }
 
     /// Does work in a working space that no other thread uses.
-    fn in_space<T>(&self, work: impl FnOnce(&mut Space<M>) -> T) -> T {
+    fn in_space<T>(&self, work: impl FnOnce(&mut Space) -> T) -> T {
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let mut space = idle().pop().unwrap_or_else(|| Space::new(&self.prepared.problem.limits));
         let done = work(&mut space);
@@ -234,7 +234,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
 
     fn solve_in(
         &self,
-        space: &mut Space<M>,
+        space: &mut Space,
         range: &Range<usize>,
         core: Range<usize>,
     ) -> (Vec<f64>, WindowReport, Option<Part>) {

@@ -7,7 +7,7 @@ use feedplan_geometry::lanes::LogProduct;
 
 use super::band::Band;
 use super::columns::{Columns, Terms};
-use super::constraints::{Constraints, RowLayout};
+use super::constraints::Constraints;
 use super::forms::motion;
 use super::hermite::COUNT;
 use super::model::Model;
@@ -25,7 +25,7 @@ pub struct State {
 }
 
 /// Working space, reused from window to window.
-pub struct InteriorPoint<X, const M: usize> {
+pub struct InteriorPoint<X> {
     /// What instructions the processor has.
     pub(super) level: Level,
     pub(super) model: X,
@@ -55,7 +55,7 @@ pub(super) struct EndRow {
     pub step: f64,
 }
 
-impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
+impl<X: Model> Default for InteriorPoint<X> {
     fn default() -> Self {
         Self {
             level: Level::new(),
@@ -68,21 +68,22 @@ impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
             step: Columns::default(),
             trial: Columns::default(),
             pulls: Default::default(),
-            scratch: vec![Lanes::ONE; RowLayout::<M>::BLOCK],
+            scratch: vec![],
             ends: [None; 2],
         }
     }
 }
 
-impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
+impl<X: Model> InteriorPoint<X> {
     /// Takes the spline x, with room for all numbers on its stations.
-    pub(super) fn take(&mut self, rows: &Constraints<M>, x: &[f64]) {
-        let (count, blocks) = (rows.count(), rows.blocks.len());
+    pub(super) fn take(&mut self, rows: &Constraints, x: &[f64]) {
+        let (count, blocks, layout) = (rows.count(), rows.blocks.len(), rows.layout());
         let state = &mut self.state;
         for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
-            vector.resize(blocks * RowLayout::<M>::BLOCK, Lanes::ONE);
+            vector.resize(blocks * layout.all(), Lanes::ONE);
         }
         state.step.fill(Lanes::ZERO);
+        self.scratch.resize(layout.all(), Lanes::ONE);
         self.band.resize(count);
         self.gradient.resize(count);
         for pulls in &mut self.pulls {
@@ -98,20 +99,21 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Slacks of x, or of the trial. Returns Σ ln s, or None if a limit is broken.
-    pub(super) fn slacks(&mut self, rows: &Constraints<M>, trial: bool) -> Option<f64> {
+    pub(super) fn slacks(&mut self, rows: &Constraints, trial: bool) -> Option<f64> {
         dispatch!(self.level, simd => self.slacks_on(simd, rows, trial))
     }
 
     #[inline(always)]
-    fn slacks_on<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, trial: bool) -> Option<f64> {
+    fn slacks_on<S: Simd>(&mut self, simd: S, rows: &Constraints, trial: bool) -> Option<f64> {
         let x = if trial { &self.trial } else { &self.x };
+        let layout = rows.layout();
         let mut product = LogProduct::default();
         let (mut least, mut sum) = (Register::all(simd, f64::INFINITY), Register::all(simd, 0.0));
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
             let (u, per_h) = (x.local(b, h), h.inverse());
             for p in 0..COUNT {
-                let slack = RowLayout::<M>::of_mut(&mut self.state.slack, b, p);
+                let slack = layout.of_mut(&mut self.state.slack, b, p);
                 self.model.slack(rows, b, p, motion(p, per_h, &u), trial, slack);
                 let mut all = slack[0].load(simd);
                 least = all.min(least);
@@ -139,7 +141,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// The time of x, or of the trial, with its ramps, in s; infinite where w is not positive.
-    pub(super) fn time(&self, rows: &Constraints<M>, ends: [WindowEnd; 2], trial: bool) -> f64 {
+    pub(super) fn time(&self, rows: &Constraints, ends: [WindowEnd; 2], trial: bool) -> f64 {
         let x = if trial { &self.trial } else { &self.x };
         let mut time = dispatch!(self.level, simd => self.model.time(simd, rows, x, trial));
         for (kind, station) in ends.iter().zip([0, rows.count()]) {
