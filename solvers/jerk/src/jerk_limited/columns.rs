@@ -5,16 +5,17 @@ use fearless_simd::Simd;
 
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
-/// (w, w') at each station: of a spline, a step or a gradient. Beyond the last station up to a whole block there are the same
-/// numbers everywhere.
+/// (w, w') at each station: of a spline, a step or a gradient.
 #[derive(Clone, Debug, Default)]
 pub struct Columns {
     pub w: Vec<f64>,
     pub slope: Vec<f64>,
+    /// w in lanes without an interval; w' is 0 there.
+    beyond: f64,
 }
 
 impl Columns {
-    /// A spline x = (w_0, w'_0, w_1, …), and (1, 0) beyond its end.
+    /// A spline x = (w_0, w'_0, w_1, …), and w = 1 beyond it.
     pub fn new(x: &[f64]) -> Self {
         let mut columns = Self::default();
         columns.resize(x.len() / 2 - 1, 1.0);
@@ -22,12 +23,13 @@ impl Columns {
         columns
     }
 
-    /// Room for the stations of so many intervals, and (`w`, 0) beyond the last of them.
-    pub fn resize(&mut self, intervals: usize, w: f64) {
+    /// Room for the stations of so many intervals.
+    pub fn resize(&mut self, intervals: usize, beyond: f64) {
         let length = (intervals.div_ceil(LANES) + 1) * LANES;
-        self.w.resize(length, w);
+        self.beyond = beyond;
+        self.w.resize(length, beyond);
         self.slope.resize(length, 0.0);
-        self.w[intervals + 1..].fill(w);
+        self.w[intervals + 1..].fill(beyond);
         self.slope[intervals + 1..].fill(0.0);
     }
 
@@ -47,12 +49,19 @@ impl Columns {
         [self.w[station], self.slope[station]]
     }
 
-    /// The local coefficients of the intervals of a block, of length h.
+    /// The local coefficients of the intervals of a block, of length h; `live` is 1 for an interval, 0 without one.
     #[inline(always)]
-    pub fn local<S: Simd>(&self, block: usize, h: Register<S>) -> [Register<S>; 4] {
+    pub fn local<S: Simd>(&self, block: usize, h: Register<S>, live: Lanes) -> [Register<S>; 4] {
         let at = block * LANES;
         let load = |column: &[f64], at: usize| eight(column, at).load(h.simd());
-        [load(&self.w, at), load(&self.slope, at) * h, load(&self.w, at + 1), load(&self.slope, at + 1) * h]
+        // The last station is the start of no interval.
+        let beyond = (Lanes::ONE - live.load(h.simd())) * self.beyond;
+        [
+            load(&self.w, at) * live + beyond,
+            load(&self.slope, at) * h * live,
+            load(&self.w, at + 1),
+            load(&self.slope, at + 1) * h,
+        ]
     }
 }
 

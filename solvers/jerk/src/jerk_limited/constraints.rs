@@ -130,9 +130,9 @@ impl Interval {
 }
 
 impl Block {
-    /// No limits, on intervals that are so short that w and its slope at their start cannot make it negative in them.
+    /// No limits on intervals of 1 mm.
     const NONE: Self = Self {
-        h: Lanes::all(1e-12),
+        h: Lanes::ONE,
         jerk: Lanes::ONE,
         points: [Point { speed: Lanes::ZERO, acceleration: Lanes::ZERO }; COUNT],
         live: Lanes::ZERO,
@@ -300,7 +300,7 @@ impl Constraints {
     /// Takes a range of the intervals of others.
     pub fn copy(&mut self, others: &Self, range: Range<usize>) {
         // Blocks that are the same in both are copied whole.
-        let whole = if range.start % LANES == 0 { range.len() / LANES } else { 0 };
+        let whole = if range.start.is_multiple_of(LANES) { range.len() / LANES } else { 0 };
         let (first, q) = (range.start / LANES, COUNT * self.axes());
         self.clear();
         self.blocks.extend_from_slice(&others.blocks[first..][..whole]);
@@ -447,7 +447,7 @@ impl Constraints {
         let zero = Register::all(simd, 0.0);
         for (b, (block, out)) in self.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
             let h = block.h.load(simd);
-            let (u, per_h) = (x.local(b, h), h.inverse());
+            let (u, per_h) = (x.local(b, h, block.live), h.inverse());
             let mut worst = [zero; 3];
             for p in 0..COUNT {
                 let motion = forms::motion(p, per_h, &u);

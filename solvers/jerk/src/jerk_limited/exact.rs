@@ -136,7 +136,7 @@ impl Model for Exact {
         let mut least = Register::all(simd, f64::INFINITY);
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let u = x.local(b, h);
+            let u = x.local(b, h, block.live);
             let mut pace = Register::all(simd, 0.0);
             for (basis, weight) in AT_NODES.iter().zip(WEIGHTS) {
                 let w = combine(basis, &u);

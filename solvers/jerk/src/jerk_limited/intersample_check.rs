@@ -115,7 +115,7 @@ impl IntersampleCheck {
         let zero = Register::all(simd, 0.0);
         for (b, (block, out)) in self.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
             let h = rows.blocks[b].h.load(simd);
-            let (u, per_h) = (x.local(b, h), h.inverse());
+            let (u, per_h) = (x.local(b, h, rows.blocks[b].live), h.inverse());
             let mut motion = [[zero; 4]; SAMPLES];
             let mut uses = [zero; SAMPLES];
             for (i, basis) in BASES.iter().enumerate() {

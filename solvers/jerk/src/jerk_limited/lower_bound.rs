@@ -343,7 +343,7 @@ pub(super) fn lagrangian_on<S: Simd>(
     for (b, (block, out)) in rows.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
         let h = block.h.load(simd);
         let per_h = h.inverse();
-        let [plan, u] = [&plan, &x].map(|spline| spline.local(b, h));
+        let [plan, u] = [&plan, &x].map(|spline| spline.local(b, h, block.live));
         let (mut time, mut value, mut slope) = (zero, zero, [zero; 4]);
         for p in 0..COUNT {
             let dual = layout.of_mut(dual, b, p);
@@ -444,7 +444,7 @@ mod tests {
                 let h = block.h.load(simd);
                 let mut time = Register::all(simd, 0.0);
                 for p in 0..COUNT {
-                    let motion = motion(p, h.inverse(), &x.local(b, h));
+                    let motion = motion(p, h.inverse(), &x.local(b, h, block.live));
                     let mut y = pace(motion[0]);
                     for k in 0..rows.axes() {
                         y = y.max(rows.axis(b, p, k, motion)[1].abs());

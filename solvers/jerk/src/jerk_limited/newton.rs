@@ -45,7 +45,7 @@ impl<X: Model> InteriorPoint<X> {
             }
             work += own * block.live;
             let h = block.h.load(simd);
-            let local = self.model.local(rows, b, &self.x.local(b, h), weight, dual);
+            let local = self.model.local(rows, b, &self.x.local(b, h, block.live), weight, dual);
             self.band.set(b, h, &local);
             self.gradient.set(b, h, local.gradient);
         }
@@ -82,7 +82,7 @@ impl<X: Model> InteriorPoint<X> {
         let mut sums = [zero; 2];
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (d, per_h) = (self.step.local(b, h), h.inverse());
+            let (d, per_h) = (self.step.local(b, h, block.live), h.inverse());
             let mut pulls = [[zero; 4]; 2];
             for p in 0..COUNT {
                 self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
@@ -177,7 +177,7 @@ impl<X: Model> InteriorPoint<X> {
         let mut dual_most = 1e-12;
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (d, per_h) = (self.step.local(b, h), h.inverse());
+            let (d, per_h) = (self.step.local(b, h, block.live), h.inverse());
             let known = Register::all(simd, dual_most);
             let mut beyond = Register::all(simd, 0.0);
             for p in 0..COUNT {
@@ -268,7 +268,7 @@ impl<X: Model> InteriorPoint<X> {
         let zero = Register::all(simd, 0.0);
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (d, per_h) = (self.step.local(b, h), h.inverse());
+            let (d, per_h) = (self.step.local(b, h, block.live), h.inverse());
             for p in 0..COUNT {
                 self.model.slack_step(rows, b, p, motion(p, per_h, &d), change);
                 let inverse = layout.of(&self.state.slack, b, p);

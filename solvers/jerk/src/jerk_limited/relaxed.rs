@@ -48,7 +48,7 @@ impl Model for Relaxed {
         self.cross.resize(count, [[Lanes::ONE; 4]; COUNT]);
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (u, per_h) = (x.local(b, h), h.inverse());
+            let (u, per_h) = (x.local(b, h, block.live), h.inverse());
             for p in 0..COUNT {
                 let motion = motion(p, per_h, &u);
                 let mut least = pace(motion[0]);
@@ -166,7 +166,7 @@ impl Model for Relaxed {
     fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints, step: &Columns, pulls: [f64; 2]) {
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (u, per_h) = (step.local(b, h), h.inverse());
+            let (u, per_h) = (step.local(b, h, block.live), h.inverse());
             for p in 0..COUNT {
                 let [w, w1, w2] = motion(p, per_h, &u);
                 let [per, c0, c1, c2] = self.cross[b][p];
@@ -198,7 +198,7 @@ impl Model for Relaxed {
         let mut least = Register::all(simd, f64::INFINITY);
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (u, per_h) = (x.local(b, h), h.inverse());
+            let (u, per_h) = (x.local(b, h, block.live), h.inverse());
             let mut cost = Register::all(simd, 0.0);
             for p in 0..COUNT {
                 least = motion(p, per_h, &u)[0].min(least);

@@ -111,7 +111,7 @@ impl<X: Model> InteriorPoint<X> {
         let (mut least, mut sum) = (Register::all(simd, f64::INFINITY), Register::all(simd, 0.0));
         for (b, block) in rows.blocks.iter().enumerate() {
             let h = block.h.load(simd);
-            let (u, per_h) = (x.local(b, h), h.inverse());
+            let (u, per_h) = (x.local(b, h, block.live), h.inverse());
             for p in 0..COUNT {
                 let slack = layout.of_mut(&mut self.state.slack, b, p);
                 self.model.slack(rows, b, p, motion(p, per_h, &u), trial, slack);
