@@ -4,8 +4,11 @@
 //! Control points are first taken relative to the nearer end of the piece. So a small piece far from the origin loses no
 //! digits of its derivatives, and both ends are exact.
 
+use fearless_simd::{dispatch, Level, Simd};
+
 use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
+use crate::lanes::{Lanes, Register};
 
 /// Calls a function with the number of control points as a constant, so that its loops are unrolled.
 macro_rules! with_count {
@@ -102,6 +105,16 @@ fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f
     out
 }
 
+/// The numbers of axis k of so many.
+#[inline(always)]
+fn axis<const N: usize>(control: &[f64], axes: usize, k: usize) -> [f64; N] {
+    let mut numbers = [0.0; N];
+    for (number, point) in numbers.iter_mut().zip(control.chunks_exact(axes)) {
+        *number = point[k];
+    }
+    numbers
+}
+
 /// |C'|² by u, at four places.
 #[inline]
 pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
@@ -109,58 +122,70 @@ pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
 }
 
 fn speeds_sq_of<const M: usize, const N: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
-    let (scale, control) = (1.0 / piece.width, &piece.control[..N]);
+    let scale = 1.0 / piece.width;
     let t = u.map(|u| u * scale);
-    let mut sum = [0.0; 4];
-    if piece.is_rational() {
-        let weights: &[f64; N] = piece.weights[..N].try_into().expect("a weight for each point");
-        let [w0, w1] = value_and_slope(weights, t);
-        let inverse = w0.map(|w| 1.0 / w);
-        for k in 0..M {
-            let mut points = [0.0; N];
-            for i in 0..N {
-                points[i] = (control[i][k] - control[0][k]) * weights[i];
-            }
-            let [m0, m1] = value_and_slope(&points, t);
-            for lane in 0..4 {
-                let tangent = (m1[lane] - w1[lane] * inverse[lane] * m0[lane]) * inverse[lane];
-                sum[lane] += tangent * tangent;
-            }
-        }
+    let sum = if piece.is_rational() {
+        rational_speeds_sq::<M, N>(piece, t)
     } else {
-        for k in 0..M {
-            let mut points = [0.0; N];
+        axes_speeds_sq::<N>(piece.control.as_flattened(), M, t)
+    };
+    sum.map(|sum| sum * (scale * scale))
+}
+
+/// |C'|² by t of a polynomial piece, compiled once for any number of axes.
+fn axes_speeds_sq<const N: usize>(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
+    dispatch!(Level::new(), simd => {
+        let t = Lanes::new(t).load(simd);
+        let mut sum = Register::all(simd, 0.0);
+        for k in 0..axes {
+            let numbers = axis::<N>(control, axes, k);
+            let mut b = [t; N];
             for i in 0..N {
-                points[i] = control[i][k] - control[0][k];
+                b[i] = Register::all(simd, numbers[i] - numbers[0]);
             }
-            let [_, tangent] = value_and_slope(&points, t);
-            for lane in 0..4 {
-                sum[lane] += tangent[lane] * tangent[lane];
-            }
+            let [_, tangent] = value_and_slope(b, t);
+            sum += tangent * tangent;
+        }
+        sum.values()
+    })
+}
+
+fn rational_speeds_sq<const M: usize, const N: usize>(piece: &Piece<M>, t: [f64; 4]) -> [f64; 4] {
+    let control = &piece.control[..N];
+    let weights: &[f64; N] = piece.weights[..N].try_into().expect("a weight for each point");
+    let of = |numbers: &[f64; N]| {
+        dispatch!(Level::new(), simd => {
+            let numbers = numbers.map(|number| Register::all(simd, number));
+            value_and_slope(numbers, Lanes::new(t).load(simd)).map(Register::values)
+        })
+    };
+    let [w0, w1] = of(weights);
+    let inverse = w0.map(|w| 1.0 / w);
+    let mut sum = [0.0; 4];
+    for k in 0..M {
+        let mut points = [0.0; N];
+        for i in 0..N {
+            points[i] = (control[i][k] - control[0][k]) * weights[i];
+        }
+        let [m0, m1] = of(&points);
+        for lane in 0..4 {
+            let tangent = (m1[lane] - w1[lane] * inverse[lane] * m0[lane]) * inverse[lane];
+            sum[lane] += tangent * tangent;
         }
     }
-    sum.map(|sum| sum * (scale * scale))
+    sum
 }
 
 /// Value and derivative by t of a polynomial in Bernstein form, at four places.
 #[inline(always)]
-fn value_and_slope<const N: usize>(coefficients: &[f64; N], t: [f64; 4]) -> [[f64; 4]; 2] {
-    let s = t.map(|t| 1.0 - t);
-    let mut b = coefficients.map(|coefficient| [coefficient; 4]);
+fn value_and_slope<S: Simd, const N: usize>(mut b: [Register<S>; N], t: Register<S>) -> [Register<S>; 2] {
+    let s = Register::all(t.simd(), 1.0) - t;
     for left in (2..N).rev() {
         for i in 0..left {
-            for lane in 0..4 {
-                b[i][lane] = s[lane] * b[i][lane] + t[lane] * b[i + 1][lane];
-            }
+            b[i] = s * b[i] + t * b[i + 1];
         }
     }
-    let mut out = [[0.0; 4]; 2];
-    for lane in 0..4 {
-        let (from, to) = (b[0][lane], b[1][lane]);
-        out[0][lane] = s[lane] * from + t[lane] * to;
-        out[1][lane] = (to - from) * (N - 1) as f64;
-    }
-    out
+    [s * b[0] + t * b[1], (b[1] - b[0]) * (N - 1) as f64]
 }
 
 /// C(u).
