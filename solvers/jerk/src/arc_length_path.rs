@@ -189,8 +189,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         if i == j {
             return panel(self.problem, at, a, b);
         }
-        let inside: f64 =
-            rows[i + 1..=j].windows(2).map(|pair| panel(self.problem, at, pair[0].u, pair[1].u)).sum();
+        let inside: f64 = rows[i + 1..j].iter().map(|row| row.length).sum();
         panel(self.problem, at, a, rows[i + 1].u) + inside + panel(self.problem, at, rows[j].u, b)
     }
 

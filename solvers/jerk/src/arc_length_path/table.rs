@@ -38,6 +38,8 @@ pub struct Row {
     pub u: f64,
     rate: f64,
     bend: f64,
+    /// The length to the next row, by its own digits.
+    pub length: f64,
 }
 
 /// The length between two parameters of piece `i`, by one Gauss rule of eight points.
@@ -58,7 +60,7 @@ pub fn around(rows: &[Row], s: f64) -> [&Row; 2] {
 impl Row {
     fn new<const M: usize>(problem: &Problem<M>, i: usize, u: f64, s: f64) -> Self {
         let [d, d1, _] = rate(problem, i, u, &derivatives(&piece(problem, i), u));
-        Self { s, u, rate: 1.0 / d.sqrt(), bend: -0.5 * d1 / (d * d) }
+        Self { s, u, rate: 1.0 / d.sqrt(), bend: -0.5 * d1 / (d * d), length: 0.0 }
     }
 
     /// du/ds of the quintic at s.
@@ -143,19 +145,20 @@ impl<'a, const M: usize> Halving<'a, M> {
 
     /// The rows of the part, whose last one has the length.
     pub fn table(&self) -> Vec<Row> {
-        let mut rows = vec![Row::new(self.problem, self.part.piece, self.part.u[0], 0.0)];
-        self.halve(&mut rows, self.part.u[1], self.whole, 0);
+        let [first, last] = self.part.u.map(|u| Row::new(self.problem, self.part.piece, u, 0.0));
+        let mut rows = vec![first];
+        self.halve(&mut rows, last, self.whole, 0);
         rows
     }
 
-    /// Appends rows for the panel from the last row to b.
-    fn halve(&self, rows: &mut Vec<Row>, b: f64, whole: f64, depth: u32) {
-        let from = rows[rows.len() - 1];
+    /// Appends rows for the panel from the last row to another one, whose length is not known yet.
+    fn halve(&self, rows: &mut Vec<Row>, to: Row, whole: f64, depth: u32) {
+        let (from, b) = (rows[rows.len() - 1], to.u);
         let middle = 0.5 * (from.u + b);
         let [left, right] =
             [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.part.piece, a, b));
         let half = Row::new(self.problem, self.part.piece, middle, from.s + left);
-        let end = Row::new(self.problem, self.part.piece, b, from.s + left + right);
+        let end = Row { s: from.s + left + right, ..to };
         // On a symmetric part the quintic is right half-way and wrong on both sides; only its rate shows this.
         let odd = ODD * (end.s - from.s) * (from.rate_between(&end, half.s) - half.rate);
         let mut miss = (from.parameter_at(&end, half.s) - middle).abs().max(odd.abs()) / half.rate;
@@ -167,10 +170,12 @@ impl<'a, const M: usize> Halving<'a, M> {
         let met = self.is_met(length, whole, noise)
             && (miss <= QUINTIC * length + noise || length <= SHORTEST * self.whole);
         if met || rows.len() > MOST_ROWS || depth == DEPTH {
-            rows.extend([half, end]);
+            let last = rows.len() - 1;
+            rows[last].length = left;
+            rows.extend([Row { length: right, ..half }, end]);
         } else {
-            self.halve(rows, middle, left, depth + 1);
-            self.halve(rows, b, right, depth + 1);
+            self.halve(rows, half, left, depth + 1);
+            self.halve(rows, end, right, depth + 1);
         }
     }
 }
