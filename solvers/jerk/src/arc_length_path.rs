@@ -15,9 +15,10 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
+use self::derivatives::{chord_limit, rate, OFF_LINE};
+pub use self::derivatives::{path_point, per_feed, piece, speed_sq, straight, tool_curvature, MAX_RATE};
 use crate::path_problem::{Geometry, PathPoint, SpeedCap};
-use derivatives::{chord_limit, OFF_LINE};
-pub use derivatives::{path_point, per_feed, piece, speed_sq, straight, tool_curvature, MAX_RATE};
+use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::tolerance::CUSP;
 use feedplan_planner::problem::Problem;
 pub use junctions::Junction;
@@ -28,6 +29,8 @@ use table::{around, panel, Halving, Row};
 /// Most steps to locate a length: one or two of Newton's, or next to a cusp, where they stray, as many bisections as u
 /// has bits.
 const STEPS: usize = 64;
+/// Parameters are located to this part of the greatest on their piece, some roundings.
+const LOCATED: f64 = 1e-15;
 /// Derivatives are evaluated at least this far from a point where D vanishes, as a part of the length.
 const INSET: f64 = 1e-9;
 
@@ -120,6 +123,14 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         self.knots[1..self.knots.len() - 1].partition_point(|&knot| knot <= s)
     }
 
+    /// The parameter at an arc length on a part by its table, not on a point where D vanishes.
+    fn parameter(&self, part: usize, s: f64) -> f64 {
+        let [first, last] = self.measures[part].inside;
+        let x = (s - self.knots[part]).clamp(first, last);
+        let [from, to] = around(self.table(part), x);
+        from.parameter_at(to, x)
+    }
+
     /// The parameter at the arc length s on a part, to rounding.
     pub fn locate(&self, part: usize, s: f64) -> f64 {
         let at = &self.parts[part];
@@ -148,11 +159,11 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         let at = &self.parts[part];
         let [low, high] = if distance > 0.0 { [from, at.u[1]] } else { [at.u[0], from] };
         let miss = |u: f64| self.length_between(part, from.min(u), from.max(u)).copysign(u - from) - distance;
-        self.newton(part, [low, high], self.locate(part, s).clamp(low, high), miss)
+        self.newton(part, [low, high], self.parameter(part, s).clamp(low, high), miss)
     }
 
-    /// The parameter of a part between `low` and `high` where `miss`, a length in mm that rises with u, is 0. One step of
-    /// Newton's method from u is not enough next to a cusp, where |C'| changes within the digits of a length.
+    /// The parameter of a part between `low` and `high` where `miss`, a length in mm that rises with u, is 0. A step of Newton's
+    /// method leaves less than step² (|D_u| + |D_uu step|)/D, mostly no more than rounding; not so next to a cusp.
     fn newton(
         &self,
         part: usize,
@@ -168,10 +179,15 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
             } else {
                 low = u;
             }
-            let step = miss / speed_sq(self.problem, at.piece, u).sqrt();
+            let c = derivatives(&piece(self.problem, at.piece), u);
+            let [d, d1, d2] = rate(self.problem, at.piece, u, &c);
+            let step = miss / d.sqrt();
             let next = u - step;
-            u = if next >= low && next <= high { next } else { 0.5 * (low + high) };
-            if step.abs() <= 1e-15 * at.u[1] {
+            let is_inside = next >= low && next <= high;
+            u = if is_inside { next } else { 0.5 * (low + high) };
+            let left =
+                if is_inside { step * step * (d1.abs() + (d2 * step).abs()) / d } else { f64::INFINITY };
+            if left.min(step.abs()) <= LOCATED * at.u[1] {
                 break;
             }
         }
@@ -251,13 +267,12 @@ impl<const M: usize> Geometry<M> for ArcLengthPath<'_, M> {
     }
 
     fn at(&self, part: usize, s: f64) -> PathPoint<M> {
-        let own = &self.measures[part];
-        if let Some((direction, speed_cap)) = own.straight {
-            return PathPoint { first: direction, second: [0.0; M], third: [0.0; M], speed_cap };
+        match self.measures[part].straight {
+            Some((direction, speed_cap)) => {
+                PathPoint { first: direction, second: [0.0; M], third: [0.0; M], speed_cap }
+            }
+            None => path_point(self.problem, self.parts[part].piece, self.parameter(part, s)),
         }
-        let x = (s - self.knots[part]).clamp(own.inside[0], own.inside[1]);
-        let [from, to] = around(self.table(part), x);
-        path_point(self.problem, self.parts[part].piece, from.parameter_at(to, x))
     }
 }
 
@@ -265,26 +280,22 @@ impl<const M: usize> Geometry<M> for ArcLengthPath<'_, M> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn parameters_on_a_part_that_is_symmetric_about_its_middle() {
-        // A slight bend of degree 7, as smooth paths have: the quintic of the whole part is right half-way.
-        let control = [
-            [2.618383093684835, -3.103134081782292],
-            [2.617980931741674, -3.1032933506629217],
-            [2.617578769798513, -3.103452619543552],
-            [2.617176607855352, -3.1036118884241817],
-            [2.6158726545425224, -3.1041143539233813],
-            [2.615467607292026, -3.104266135113684],
-            [2.6150625600415305, -3.1044179163039876],
-            [2.6146575127910343, -3.1045696974942905],
-        ];
-        let width = 0.003027860538125467;
-        let parts = [Part { piece: 0, u: [0.21 * width, 0.79 * width] }];
-        let problem = Problem {
-            control: &control,
+    /// A slight bend of degree 7, as smooth paths have.
+    fn slight_bend() -> Problem<'static, 2> {
+        Problem {
+            control: &[
+                [2.618383093684835, -3.103134081782292],
+                [2.617980931741674, -3.1032933506629217],
+                [2.617578769798513, -3.103452619543552],
+                [2.617176607855352, -3.1036118884241817],
+                [2.6158726545425224, -3.1041143539233813],
+                [2.615467607292026, -3.104266135113684],
+                [2.6150625600415305, -3.1044179163039876],
+                [2.6146575127910343, -3.1045696974942905],
+            ],
             weight: &[],
             offset: &[0, 8],
-            width: &[width],
+            width: &[0.003027860538125467],
             tip: None,
             way: None,
             feed_share: &[],
@@ -298,7 +309,14 @@ mod tests {
             start_speed: 0.0,
             end_speed: 0.0,
             watch: Default::default(),
-        };
+        }
+    }
+
+    #[test]
+    fn parameters_on_a_part_that_is_symmetric_about_its_middle() {
+        // The quintic of the whole part is right half-way.
+        let problem = slight_bend();
+        let parts = [Part { piece: 0, u: [0.21, 0.79].map(|share| share * problem.width[0]) }];
         let path = ArcLengthPath::new(&problem, &parts);
         for i in 1..100 {
             let s = path.total() * i as f64 / 100.0;
@@ -307,6 +325,20 @@ mod tests {
                 let off = (found.third[k] - truth.third[k]).abs();
                 assert!(off < 1e-3, "{i}: {found:?} for {truth:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_located_parameter_has_its_length() {
+        // From a slow start, where |C'| is 1e-3 of its greatest, and round a bend.
+        let control = [[0.0, 0.0], [1e-3, 0.0], [1.0, 0.1], [2.0, 2.0], [1.5, 3.0], [3.0, 5.0]];
+        let parts = [Part { piece: 0, u: [0.0, 1.0] }];
+        let problem = Problem { offset: &[0, 6], width: &[1.0], control: &control, ..slight_bend() };
+        let path = ArcLengthPath::new(&problem, &parts);
+        let length = |i: usize| path.total() * i as f64 / 400.0;
+        for i in 1..400 {
+            let off = path.length_between(0, 0.0, path.locate(0, length(i))) - length(i);
+            assert!(off.abs() < 2e-15 * path.total(), "{i}: {off:e}");
         }
     }
 }
