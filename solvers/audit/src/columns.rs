@@ -6,9 +6,9 @@ use std::rc::Rc;
 use super::curve::{Curve, Curves, Followed};
 use super::joints::columns::JointColumns;
 use super::joints::path::JointPath;
-use super::station::{Place, Rounded, Station};
+use super::station::{Place, Rounded, Roundings, Station};
 use super::vectors::{from_to, length, vector_of};
-use super::{Limits, EPS, FEEDS, ROUNDINGS};
+use super::{Check, Limits, Sided, EPS, FEEDS, ROUNDINGS};
 
 /// The speed that chord errors are about, beside those that feeds are about.
 pub const CHORD: usize = FEEDS;
@@ -21,10 +21,15 @@ const SMOOTH: [f64; 2] = [1e-9, 1e-6];
 /// joints.
 const INTERVALS: [[f64; 3]; 2] = [[5.0, 10.0, 4.0], [3.0, 0.0, 2.0]];
 
+/// The rates of an axis: velocity, acceleration and jerk.
+pub const RATES: [Check; 3] = [Check::Velocity, Check::Acceleration, Check::Jerk];
+
 /// The columns of a path, evaluated at one place after the other.
 pub struct Columns<'a, const M: usize> {
     pub path: Followed<'a>,
     pub limits: &'a Limits<M>,
+    /// The limits of the rates, and 1 over them.
+    pub rates: [[Sided<M>; 2]; 3],
     curves: Curves<'a, M>,
     joints: Option<Box<JointColumns<'a, M>>>,
 }
@@ -33,7 +38,9 @@ impl<'a, const M: usize> Columns<'a, M> {
     /// The axes of a path, or the joints on it.
     pub fn new(path: &Followed<'a>, limits: &'a Limits<M>, joints: Option<&'a JointPath<'a>>) -> Self {
         let joints = joints.map(|of| Box::new(JointColumns::new(of)));
-        Self { path: *path, limits, curves: Curves::new(path.pieces), joints }
+        let jerk = Sided { positive: limits.jerk, negative: limits.jerk };
+        let rates = [limits.velocity, limits.acceleration, jerk].map(|limit| [limit, limit.inverse()]);
+        Self { path: *path, limits, rates, curves: Curves::new(path.pieces), joints }
     }
 
     /// Number of columns.
@@ -76,6 +83,35 @@ impl<'a, const M: usize> Columns<'a, M> {
             Some(joints) => Some(joints.station(curve, piece, u)),
             None => Station::new(curve, u),
         }
+    }
+
+    /// A station at an end of a phase, where the rounding of joints is asked for and takes little longer with the rest.
+    pub fn station_at_end(&mut self, piece: usize, u: f64) -> Option<Station<M>> {
+        match self.are_axes() {
+            true => self.station(piece, u),
+            false => self.rounded_station(piece, u).map(|(station, _)| station),
+        }
+    }
+
+    /// What of a station of a piece may be rounding.
+    pub fn roundings(&mut self, piece: usize, station: &Station<M>) -> Roundings<M> {
+        let curve = self.curves.get(piece);
+        match &mut self.joints {
+            Some(joints) => joints.rounded_station(curve, piece, station.u).1,
+            None => Roundings::new(curve, station, &curve.derivatives(station.u)),
+        }
+    }
+
+    /// A station and what of it may be rounding. It is inlined, so that what is not used of both is not computed.
+    #[inline(always)]
+    pub fn rounded_station(&mut self, piece: usize, u: f64) -> Option<(Station<M>, Roundings<M>)> {
+        let curve = self.curves.get(piece);
+        if let Some(joints) = &mut self.joints {
+            return Some(joints.rounded_station(curve, piece, u));
+        }
+        let derivatives = curve.derivatives(u);
+        let station = Station::by(curve, u, &derivatives)?;
+        Some((station, Roundings::new(curve, &station, &derivatives)))
     }
 
     /// The way of each column from one place of a piece to another.

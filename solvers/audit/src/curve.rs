@@ -188,11 +188,17 @@ pub struct Curve<const M: usize> {
     hodographs: Hodographs<M>,
     width: f64,
     per_width: f64,
+    /// What the rounding of the first three derivatives is relative to, and its length.
+    sizes: [[f64; M]; 3],
+    size_lengths: [f64; 3],
 }
 
 impl<const M: usize> Curve<M> {
     pub fn new(polygon: Polygon<M>, width: f64) -> Self {
-        Self { hodographs: Hodographs::new(&polygon), polygon, width, per_width: 1.0 / width }
+        let (hodographs, per_width) = (Hodographs::new(&polygon), 1.0 / width);
+        let sizes = by_width(*hodographs.sizes(), per_width);
+        let size_lengths = sizes.each_ref().map(length);
+        Self { hodographs, polygon, width, per_width, sizes, size_lengths }
     }
 
     /// Length of the parameter interval, in mm.
@@ -259,8 +265,14 @@ impl<const M: usize> Curve<M> {
 
     /// What the rounding of the first three derivatives is relative to.
     #[inline]
-    pub fn derivative_sizes(&self) -> [[f64; M]; 3] {
-        by_width(*self.hodographs.sizes(), self.per_width)
+    pub fn derivative_sizes(&self) -> &[[f64; M]; 3] {
+        &self.sizes
+    }
+
+    /// The lengths of these.
+    #[inline]
+    pub fn size_lengths(&self) -> [f64; 3] {
+        self.size_lengths
     }
 
     /// The greatest lengths of the second to the fifth derivative; infinite on pieces with weights.
@@ -275,8 +287,7 @@ impl<const M: usize> Curve<M> {
     /// For each axis what the rounding of C' is relative to.
     #[inline]
     pub fn derivative_size(&self) -> [f64; M] {
-        let [size, ..] = self.hodographs.sizes();
-        vector_of(|k| size[k] * self.per_width)
+        self.sizes[0]
     }
 
     /// How much the rounding of the control points turns C' against that of a neighbour, per 1 mm/mm.

@@ -243,7 +243,7 @@ impl<const M: usize> Tally<M> {
     #[inline(always)]
     pub fn is_passed(&self, check: Check, axis: usize, most: f64, limit: f64) -> bool {
         let known = self.worst[check as usize][axis].ratio;
-        known >= 0.0 && most < known * limit
+        known >= 0.0 && most <= known * limit
     }
 
     /// The same of value, limit and their ratio.
@@ -319,6 +319,12 @@ impl<const M: usize> Sided<M> {
     #[inline(always)]
     pub fn of_each(&self, values: &[f64; M]) -> [f64; M] {
         vectors::vector_of(|k| self.of(k, values[k]))
+    }
+
+    /// What a value is to be multiplied by for the share of its limit; a limit of 0 stays out of reach of 0 alone.
+    fn inverse(&self) -> Self {
+        let inverse = |limits: [f64; M]| limits.map(|limit| (1.0 / limit).min(f64::MAX));
+        Self { positive: inverse(self.positive), negative: inverse(self.negative) }
     }
 
     /// The smaller limit.
@@ -426,6 +432,19 @@ mod tests {
         assert_eq!(tally.get(Check::Order, 0).ratio, 0.0);
         tally.offer(Check::Order, 0, 1e-300, 0.0, 0.0, 2);
         assert_eq!(tally.get(Check::Order, 0).ratio, f64::INFINITY);
+    }
+
+    #[test]
+    fn what_uses_no_more_than_the_worst_changes_nothing() {
+        let mut tally = Tally::<1>::default();
+        assert!(!tally.is_passed(Check::Velocity, 0, 0.0, 0.0));
+        // An axis that rests, with a limit and without one.
+        tally.offer(Check::Velocity, 0, 0.0, 0.0, 0.0, 1);
+        assert!(
+            tally.is_passed(Check::Velocity, 0, 0.0, 0.0) && tally.is_passed(Check::Velocity, 0, 0.0, 2.0)
+        );
+        assert!(!tally.is_passed(Check::Velocity, 0, 1e-300, 2.0));
+        assert!(!tally.is_passed(Check::Velocity, 0, f64::NAN, 2.0));
     }
 
     #[test]

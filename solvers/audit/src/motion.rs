@@ -52,11 +52,15 @@ impl<const M: usize> Motion<M> {
             Law::ByLength(motion) => {
                 let here = motion.place(u);
                 let (since, Pace { v, .. }) = (motion.since(&here), here.pace);
-                let (velocity, acceleration) = match columns.station(self.piece, u) {
-                    Some(station) => {
-                        let Rounded { value, rounding } = station.velocity(v);
+                let (velocity, acceleration) = match columns.rounded_station(self.piece, u) {
+                    Some((station, roundings)) => {
+                        let (value, rounding) = (station.velocity(v), roundings.velocity(v));
                         let rounding = vector_of(|k| rounding[k] + ROUNDING * value[k].abs());
-                        (Rounded { value, rounding }, station.acceleration(here.pace))
+                        let acceleration = Rounded {
+                            value: station.acceleration(here.pace),
+                            rounding: roundings.acceleration(here.pace),
+                        };
+                        (Rounded { value, rounding }, acceleration)
                     }
                     None => {
                         let place = columns.place(self.piece, u);

@@ -181,8 +181,8 @@ impl<const M: usize> PhaseByLength<M> {
         let eighth = 0.125 * h * h;
         let most = |a: &[f64; M], b: &[f64; M]| inner(a, a).max(inner(b, b)).sqrt();
         let curvature = eighth * bend.0[2];
-        bend.0[0] = bend.0[0].min(most(&near.second.value, &far.second.value) + curvature);
-        change.0[0] = change.0[0].min(most(&near.third.value, &far.third.value) + eighth * change.0[2]);
+        bend.0[0] = bend.0[0].min(most(&near.second, &far.second) + curvature);
+        change.0[0] = change.0[0].min(most(&near.third, &far.third) + eighth * change.0[2]);
         let steepest = near.slope.max(far.slope) + 0.5 * m2 * h;
         let way = (to.way - from.way).abs();
         let [v, a, j] =
@@ -255,11 +255,11 @@ mod tests {
                     let (place, station) = at(from + share * (to - from));
                     assert!(place.pace.v <= bulge.most_speed * (1.0 + 1e-12));
                     for (row, there) in rates(&place, &station).iter().enumerate() {
-                        let [a, b] = [before[row].value, after[row].value];
+                        let [a, b] = [before[row], after[row]];
                         let straight = vector_of(|k| a[k] + share * (b[k] - a[k]));
                         let most = *bulge.rates.get(row).unwrap_or(&bulge.curvature);
-                        let off = distance(&straight, &there.value);
-                        assert!(off <= most + 1e-12 * (1.0 + length(&there.value)), "{row}: {off} > {most}");
+                        let off = distance(&straight, there);
+                        assert!(off <= most + 1e-12 * (1.0 + length(there)), "{row}: {off} > {most}");
                         met = met.max(off / (most + 1e-6));
                     }
                 }

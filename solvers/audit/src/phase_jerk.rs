@@ -61,8 +61,9 @@ impl<const M: usize> Jerks<'_, M> {
         if if rests { before == 0.0 && after == 0.0 } else { pieces[0] == pieces[1] } {
             return;
         }
-        let ends = [columns.station(pieces[0], phases.u1[i]), columns.station(pieces[1], phases.u0[j])];
-        let [Some(from), Some(to)] = ends else {
+        let ends = [(pieces[0], phases.u1[i]), (pieces[1], phases.u0[j])]
+            .map(|(piece, u)| columns.rounded_station(piece, u));
+        let [Some((from, from_roundings)), Some((to, to_roundings))] = ends else {
             // Without a direction an acceleration goes anywhere.
             for k in (0..limits.axes).filter(|_| rests) {
                 tally.offer(Check::AccelerationContinuity, k, f64::INFINITY, limits.jerk[k], time, line);
@@ -70,7 +71,7 @@ impl<const M: usize> Jerks<'_, M> {
             return;
         };
         let is_corner = || {
-            let directions = [&from, &to].map(|at| at.first.value.map(|x| x / length(&at.first.value)));
+            let directions = [&from, &to].map(|at| at.first.map(|x| x / length(&at.first)));
             let turn = distance(&directions[0], &directions[1]);
             turn.is_nan() || turn > self.smooth
         };
@@ -78,12 +79,12 @@ impl<const M: usize> Jerks<'_, M> {
         if !rests && is_corner() {
             return;
         }
-        let acceleration =
-            |at: &Station<M>, p: f64, a: f64| at.acceleration(Pace { v: at.slope * p.sqrt(), a, j: 0.0 });
-        let (before, after) =
-            (acceleration(&from, phases.p1[i], before), acceleration(&to, phases.p0[j], after));
+        let pace = |at: &Station<M>, p: f64, a: f64| Pace { v: at.slope * p.sqrt(), a, j: 0.0 };
+        let (before, after) = (pace(&from, phases.p1[i], before), pace(&to, phases.p0[j], after));
+        let [a, b] = [from.acceleration(before), to.acceleration(after)];
+        let roundings = [from_roundings.acceleration(before), to_roundings.acceleration(after)];
         for k in 0..limits.axes {
-            let step = (after.value[k] - before.value[k]).abs() - after.rounding[k] - before.rounding[k];
+            let step = (b[k] - a[k]).abs() - roundings[1][k] - roundings[0][k];
             let (check, limit) = if rests {
                 (Check::AccelerationContinuity, PASS_EXCESS * limits.jerk[k] * limits.period)
             } else {

@@ -123,9 +123,9 @@ impl<const M: usize> Audited<'_, M> {
             };
             let from = match last.filter(|(number, station)| *number == piece && station.u == u[0]) {
                 Some((_, station)) => Some(looker.look_at(&station, tally)),
-                None => looker.look(u[0], tally),
+                None => looker.look_at_end(u[0], tally),
             };
-            let to = looker.look(u[1], tally);
+            let to = looker.look_at_end(u[1], tally);
             *last = to.as_ref().map(|look| (piece, look.station));
             let ends = [from.as_ref(), to.as_ref()];
             looker.phase(u, ends, tally);
@@ -191,10 +191,23 @@ impl<const M: usize> Audited<'_, M> {
     ) {
         let known = [self.phases.p0[i], self.phases.p1[i]];
         for (side, (look, p)) in ends.into_iter().zip(known).enumerate() {
-            let Some(Look { place, station, velocity, .. }) = look else { continue };
-            let speeds = [place.pace.v, station.slope * p.sqrt()];
-            let (rates, rounding) = (&station.first.value, &velocity.rounding);
-            self.recorded_end([i, side], (speeds, rates, rounding), station.slope, columns, line, tally);
+            let Some(look) = look else { continue };
+            let (v, slope) = (look.place.pace.v, look.station.slope);
+            let speeds = [v, slope * p.sqrt()];
+            // The rounding of the velocities is at least twice this part of them: it hides a smaller step.
+            let is_hidden = (speeds[1] - v).abs() <= 0.5 * ROUNDINGS * EPS * v;
+            let rounding = match is_hidden {
+                true => [f64::INFINITY; M],
+                false => look.velocity_rounding(self.phases.piece[i] as usize, columns),
+            };
+            self.recorded_end(
+                [i, side],
+                (speeds, &look.station.first, &rounding),
+                slope,
+                columns,
+                line,
+                tally,
+            );
         }
     }
 

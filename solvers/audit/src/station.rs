@@ -35,49 +35,110 @@ pub struct Place<const M: usize> {
     pub tip_slope: f64,
 }
 
-/// Numbers and their errors by column, both times `scale`; an error that is not finite is as great as any number.
-#[inline(always)]
-fn scaled<const M: usize>(
-    scale: f64,
-    value: impl Fn(usize) -> f64,
-    error: impl Fn(usize) -> f64,
-) -> Rounded<M> {
-    let finite = |error: f64| if error.is_finite() { error } else { f64::MAX };
-    Rounded { value: vector_of(|k| scale * value(k)), rounding: vector_of(|k| finite(scale * error(k))) }
-}
-
 /// A place, and what is known there whatever the speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Station<const M: usize> {
     pub u: f64,
     /// ds/du.
     pub slope: f64,
-    pub first: Rounded<M>,
-    pub second: Rounded<M>,
-    pub third: Rounded<M>,
+    pub first: [f64; M],
+    pub second: [f64; M],
+    pub third: [f64; M],
     /// What the speed of the tool that feeds limit is of that along the path, and the curvature of its path in 1/mm.
     pub tip: f64,
     pub curvature: f64,
 }
 
+/// What of the derivatives at a station may be rounding. It takes as long to know as the derivatives, and is asked for where these
+/// come near a limit.
+#[derive(Clone, Copy, Debug)]
+pub struct Roundings<const M: usize> {
+    first: [f64; M],
+    second: [f64; M],
+    third: [f64; M],
+}
+
 impl<const M: usize> Station<M> {
     /// The place u of a piece; none where that has no direction.
     pub fn new(curve: &Curve<M>, u: f64) -> Option<Self> {
-        let [c1, c2, c3] = curve.derivatives(u);
-        let [size1, size2, size3] = curve.derivative_sizes();
-        let (g, most1) = (length(&c1), length(&size1));
-        if g.is_nan() || g <= STILL * most1 {
+        Self::by(curve, u, &curve.derivatives(u))
+    }
+
+    /// The same where the derivatives are at hand.
+    #[inline(always)]
+    pub fn by(curve: &Curve<M>, u: f64, [c1, c2, c3]: &[[f64; M]; 3]) -> Option<Self> {
+        let g = length(c1);
+        if g.is_nan() || g <= STILL * curve.size_lengths()[0] {
             return None;
         }
         let per = 1.0 / g;
         let (per2, per3) = (per * per, per * per * per);
         let direction = vector_of::<M>(|k| c1[k] * per);
-        let (along2, along3) = (inner(&direction, &c2), inner(&direction, &c3));
+        let (along2, along3) = (inner(&direction, c2), inner(&direction, c3));
         let across: [f64; M] = vector_of(|k| c2[k] - along2 * direction[k]);
         let turned = inner(&across, &across) * per;
         let bent = 3.0 * along2 * per;
-        // What is rounded in C', C'' and C''' is felt in g and its derivatives as well.
-        let (most2, most3) = (length(&size2), length(&size3));
+        Some(Self {
+            u,
+            slope: g,
+            tip: 1.0,
+            curvature: length(&across) * per2,
+            first: direction,
+            second: vector_of(|k| across[k] * per2),
+            third: vector_of(|k| (c3[k] - bent * across[k] - (along3 + turned) * direction[k]) * per3),
+        })
+    }
+
+    /// Of joints by their first three derivatives by u and g with its first two:
+    /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³.
+    pub fn of_joints(
+        u: f64,
+        [q1, q2, q3]: [&[f64; M]; 3],
+        [g, dg, ddg]: [f64; 3],
+        [tip, curvature]: [f64; 2],
+    ) -> Self {
+        let per = 1.0 / g;
+        let turn = dg * per;
+        let bend = 3.0 * turn * turn - ddg * per;
+        let (per2, per3) = (per * per, per * per * per);
+        Self {
+            u,
+            slope: g,
+            tip,
+            curvature,
+            first: vector_of(|k| per * q1[k]),
+            second: vector_of(|k| per2 * (q2[k] - q1[k] * turn)),
+            third: vector_of(|k| per3 * (q3[k] - 3.0 * q2[k] * turn + q1[k] * bend)),
+        }
+    }
+
+    pub fn velocity(&self, v: f64) -> [f64; M] {
+        vector_of(|k| self.first[k] * v)
+    }
+
+    pub fn acceleration(&self, Pace { v, a, .. }: Pace) -> [f64; M] {
+        let square = v * v;
+        vector_of(|k| self.first[k] * a + self.second[k] * square)
+    }
+
+    pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
+        let (mixed, cube) = (3.0 * v * a, v * v * v);
+        vector_of(|k| self.first[k] * j + self.second[k] * mixed + self.third[k] * cube)
+    }
+}
+
+impl<const M: usize> Roundings<M> {
+    /// At a station of a curve with these derivatives: what is rounded in C', C'' and C''' is felt in g and its derivatives as well.
+    #[inline(always)]
+    pub fn new(curve: &Curve<M>, station: &Station<M>, [c1, c2, c3]: &[[f64; M]; 3]) -> Self {
+        let [size1, size2, size3] = curve.derivative_sizes();
+        let [most1, most2, most3] = curve.size_lengths();
+        let (per, direction) = (1.0 / station.slope, &station.first);
+        let (per2, per3) = (per * per, per * per * per);
+        let (along2, along3) = (inner(direction, c2), inner(direction, c3));
+        let across: [f64; M] = vector_of(|k| c2[k] - along2 * direction[k]);
+        let turned = inner(&across, &across) * per;
+        let bent = 3.0 * along2 * per;
         let felt = most1 * per;
         let felt2 = felt * felt;
         let along = along2.abs() * per;
@@ -85,101 +146,58 @@ impl<const M: usize> Station<M> {
         let most_change = felt * (4.0 * felt * most2 * most2 * per + most3);
         let unit = ROUNDINGS * EPS;
         let (unit1, unit2, unit3) = (unit * per, unit * per2, unit * per3);
-        Some(Self {
-            u,
-            slope: g,
-            tip: 1.0,
-            curvature: length(&across) * per2,
-            first: Rounded {
-                value: direction,
-                rounding: vector_of(|k| unit1 * (size1[k] + c1[k].abs() * felt)),
-            },
-            second: Rounded {
-                value: vector_of(|k| across[k] * per2),
-                rounding: vector_of(|k| {
-                    let taken = size1[k] * along + felt2 * direction[k].abs() * most2;
-                    unit2 * (taken + felt * (size2[k] + c2[k].abs()))
-                }),
-            },
-            third: Rounded {
-                value: vector_of(|k| (c3[k] - bent * across[k] - (along3 + turned) * direction[k]) * per3),
-                rounding: vector_of(|k| {
-                    let taken = size1[k] * of_change + direction[k].abs() * most_change;
-                    let inside = size2[k] * along + c2[k].abs() * felt * most2 * per;
-                    unit3 * (taken + 3.0 * inside + size3[k] * felt)
-                }),
-            },
-        })
+        Self {
+            first: vector_of(|k| unit1 * (size1[k] + c1[k].abs() * felt)),
+            second: vector_of(|k| {
+                let taken = size1[k] * along + felt2 * direction[k].abs() * most2;
+                unit2 * (taken + felt * (size2[k] + c2[k].abs()))
+            }),
+            third: vector_of(|k| {
+                let taken = size1[k] * of_change + direction[k].abs() * most_change;
+                let inside = size2[k] * along + c2[k].abs() * felt * most2 * per;
+                unit3 * (taken + 3.0 * inside + size3[k] * felt)
+            }),
+        }
     }
 
-    /// Of joints by their first three derivatives by u and g with its first two, each with how wrong it may be:
-    /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³. Where nothing is
-    /// known of a derivative its rounding is as great as any number.
-    pub fn of_joints(
-        u: f64,
-        joints: &[Rounded<M>; 3],
-        way: [(f64, f64); 3],
-        [tip, curvature]: [f64; 2],
-    ) -> Self {
-        let [(q1, e1), (q2, e2), (q3, e3)] = joints.each_ref().map(|q| (&q.value, &q.rounding));
+    /// Of joints by the same as a station, each with how wrong it may be. Where nothing is known of a derivative its rounding is as
+    /// great as any number.
+    pub fn of_joints(joints: [&Rounded<M>; 3], way: [(f64, f64); 3]) -> Self {
+        let [(q1, e1), (q2, e2), (q3, e3)] = joints.map(|q| (&q.value, &q.rounding));
         let [(g, _), (dg, dg_error), (ddg, ddg_error)] = way;
         let per = 1.0 / g;
         let (turn, turn_error) = (dg * per, dg_error * per);
-        let (bend, size) = (3.0 * turn * turn - ddg * per, 3.0 * turn * turn + ddg.abs() * per);
+        let size = 3.0 * turn * turn + ddg.abs() * per;
         let bend_error = 6.0 * turn.abs() * turn_error + ddg_error * per;
         let unit = 2.0 * ROUNDINGS * EPS;
         let turn_size = turn.abs();
+        let finite = |error: f64| if error.is_finite() { error } else { f64::MAX };
         Self {
-            u,
-            slope: g,
-            tip,
-            curvature,
-            first: scaled(per, |k| q1[k], |k| e1[k] + unit * q1[k].abs()),
-            second: scaled(
-                per * per,
-                |k| q2[k] - q1[k] * turn,
-                |k| {
-                    let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
-                    wrong + unit * (q2[k].abs() + q1[k].abs() * turn_size)
-                },
-            ),
-            third: scaled(
-                per * per * per,
-                |k| q3[k] - 3.0 * q2[k] * turn + q1[k] * bend,
-                |k| {
-                    let wrong = e3[k] + 3.0 * (e2[k] * turn_size + q2[k].abs() * turn_error);
-                    let terms = q3[k].abs() + 3.0 * q2[k].abs() * turn_size + q1[k].abs() * size;
-                    wrong + e1[k] * size + q1[k].abs() * bend_error + unit * terms
-                },
-            ),
-        }
-    }
-
-    pub fn velocity(&self, v: f64) -> Rounded<M> {
-        Rounded {
-            value: vector_of(|k| self.first.value[k] * v),
-            rounding: vector_of(|k| self.first.rounding[k] * v),
-        }
-    }
-
-    pub fn acceleration(&self, Pace { v, a, .. }: Pace) -> Rounded<M> {
-        let (size, square) = (a.abs(), v * v);
-        let Self { first, second, .. } = self;
-        Rounded {
-            value: vector_of(|k| first.value[k] * a + second.value[k] * square),
-            rounding: vector_of(|k| first.rounding[k] * size + second.rounding[k] * square),
-        }
-    }
-
-    pub fn jerk(&self, Pace { v, a, j }: Pace) -> Rounded<M> {
-        let (mixed, cube) = (3.0 * v * a, v * v * v);
-        let Self { first, second, third, .. } = self;
-        Rounded {
-            value: vector_of(|k| first.value[k] * j + second.value[k] * mixed + third.value[k] * cube),
-            rounding: vector_of(|k| {
-                first.rounding[k] * j.abs() + second.rounding[k] * mixed.abs() + third.rounding[k] * cube
+            first: vector_of(|k| finite(per * (e1[k] + unit * q1[k].abs()))),
+            second: vector_of(|k| {
+                let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
+                finite(per * per * (wrong + unit * (q2[k].abs() + q1[k].abs() * turn_size)))
+            }),
+            third: vector_of(|k| {
+                let wrong = e3[k] + 3.0 * (e2[k] * turn_size + q2[k].abs() * turn_error);
+                let terms = q3[k].abs() + 3.0 * q2[k].abs() * turn_size + q1[k].abs() * size;
+                finite(per * per * per * (wrong + e1[k] * size + q1[k].abs() * bend_error + unit * terms))
             }),
         }
+    }
+
+    pub fn velocity(&self, v: f64) -> [f64; M] {
+        vector_of(|k| self.first[k] * v)
+    }
+
+    pub fn acceleration(&self, Pace { v, a, .. }: Pace) -> [f64; M] {
+        let (size, square) = (a.abs(), v * v);
+        vector_of(|k| self.first[k] * size + self.second[k] * square)
+    }
+
+    pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
+        let (size, mixed, cube) = (j.abs(), (3.0 * v * a).abs(), v * v * v);
+        vector_of(|k| self.first[k] * size + self.second[k] * mixed + self.third[k] * cube)
     }
 }
 
@@ -202,9 +220,11 @@ mod tests {
         let a = inner(&velocity, &acceleration) / v;
         let j = (inner(&acceleration, &acceleration) + inner(&velocity, &jerk) - a * a) / v;
         let (pace, station) = (Pace { v, a, j }, Station::new(&curve, 1.0).unwrap());
-        assert!(distance(&station.velocity(v).value, &velocity) < 1e-14);
-        assert!(distance(&station.acceleration(pace).value, &acceleration) < 1e-13);
-        assert!(distance(&station.jerk(pace).value, &jerk) < 1e-13, "{:?}", station.jerk(pace));
-        assert!(length(&station.jerk(pace).rounding) < 1e-11, "{:?}", station.jerk(pace));
+        assert!(distance(&station.velocity(v), &velocity) < 1e-14);
+        assert!(distance(&station.acceleration(pace), &acceleration) < 1e-13);
+        assert!(distance(&station.jerk(pace), &jerk) < 1e-13, "{:?}", station.jerk(pace));
+        let roundings = Roundings::new(&curve, &station, &curve.derivatives(1.0));
+        let least = distance(&station.jerk(pace), &jerk).max(EPS * length(&jerk));
+        assert!((least..1e-11).contains(&length(&roundings.jerk(pace))), "{roundings:?}");
     }
 }

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use super::path::{JointPath, Piece, Work};
 use crate::curve::{Curve, Curves};
-use crate::station::{Place, Rounded, Station};
+use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{length, vector_of};
 
 /// How many times greater a second derivative by u may be than that by the length at another place of the piece: so close that
@@ -16,14 +16,15 @@ pub struct JointColumns<'a, const M: usize> {
     work: Work,
     /// The last two pieces, the last one first.
     pieces: [Option<Rc<Piece<'a, M>>>; 2],
-    /// The last place, and the last station with its piece.
+    /// The last place, the last station with its piece, and the last two whose rounding is known, the last one first.
     last: Option<Place<M>>,
     known: Option<(usize, Station<M>)>,
+    rounded: [Option<(usize, Station<M>, Roundings<M>)>; 2],
 }
 
 impl<'a, const M: usize> JointColumns<'a, M> {
     pub fn new(of: &'a JointPath<'a>) -> Self {
-        Self { of, work: of.work(), pieces: [None, None], last: None, known: None }
+        Self { of, work: of.work(), pieces: [None, None], last: None, known: None, rounded: [None, None] }
     }
 
     /// A piece of the path, on its curve.
@@ -46,9 +47,25 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     }
 
     pub fn station(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Station<M> {
-        let (place, station) = self.piece(piece, curve).station(u, &mut self.work);
-        (self.last, self.known) = (Some(place), Some((piece, station)));
+        let station = self.piece(piece, curve).station(u, &mut self.work);
+        self.known = Some((piece, station));
         station
+    }
+
+    pub fn rounded_station(
+        &mut self,
+        curve: &Rc<Curve<M>>,
+        piece: usize,
+        u: f64,
+    ) -> (Station<M>, Roundings<M>) {
+        let is_here = |(number, station, _): &&(usize, Station<M>, _)| *number == piece && station.u == u;
+        if let Some(&(_, station, roundings)) = self.rounded.iter().flatten().find(is_here) {
+            return (station, roundings);
+        }
+        let (place, station, roundings) = self.piece(piece, curve).rounded_station(u, &mut self.work);
+        (self.last, self.known) = (Some(place), Some((piece, station)));
+        self.rounded = [Some((piece, station, roundings)), self.rounded[0]];
+        (station, roundings)
     }
 
     pub fn way(&mut self, curve: &Rc<Curve<M>>, from: &Place<M>, to: &Place<M>) -> Rounded<M> {
@@ -68,13 +85,17 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     }
 
     pub fn toward(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
-        let place = self.place(curve, piece, u);
-        [self.piece(piece, curve).between(&place.position.value, q, None), place.slope.value]
+        let on = self.piece(piece, curve);
+        let [position, slope] = match self.last.filter(|place| place.piece == piece && place.u == u) {
+            Some(place) => [place.position.value, place.slope.value],
+            None => on.position_and_slope(u, &mut self.work),
+        };
+        [on.between(&position, q, None), slope]
     }
 
     /// The second derivative by u where it was last looked at on a piece, which may be some times that elsewhere.
     pub fn bend(&self, piece: usize) -> f64 {
         let last = self.known.as_ref().filter(|(number, _)| *number == piece);
-        last.map_or(f64::INFINITY, |(_, at)| BEND_GROWS * length(&at.second.value) * at.slope * at.slope)
+        last.map_or(f64::INFINITY, |(_, at)| BEND_GROWS * length(&at.second) * at.slope * at.slope)
     }
 }

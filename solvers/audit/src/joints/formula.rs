@@ -3,7 +3,8 @@
 //! A recorded formula is a list of operations on the results of earlier ones. A jet holds f, f', f'', f''' by the path's
 //! parameter, as many as are asked for; products go by Leibniz's rule, functions by Faà di Bruno's. Each derivative
 //! has a bound of its error in units of the rounding of 1: the errors of the operands carried over, and the rounding of each term
-//! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.3).
+//! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.3). Bounds take longer than the values, so a
+//! jet has them only if they are asked for.
 
 use std::f64::consts::PI;
 
@@ -12,9 +13,9 @@ use crate::vectors::vector_of;
 /// Error of an elementary function, in roundings of its value.
 const ELEMENTARY: f64 = 4.0;
 
-/// The first N of f, f', f'', f''' and their errors in units of `EPS`.
+/// The first N of f, f', f'', f''' and, if `ROUNDED`, their errors in units of `EPS`; else these are 0.
 #[derive(Clone, Copy, Debug)]
-pub struct Jet<const N: usize> {
+pub struct Jet<const N: usize, const ROUNDED: bool> {
     pub value: [f64; N],
     pub error: [f64; N],
 }
@@ -66,7 +67,7 @@ impl Formula {
     }
 
     /// Fills the table of results, in which the inputs are given.
-    pub fn evaluate<const N: usize>(&self, table: &mut [Jet<N>]) {
+    pub fn evaluate<const N: usize, const ROUNDED: bool>(&self, table: &mut [Jet<N, ROUNDED>]) {
         // The cosine of an angle comes right after its sine.
         let mut wave = (0.0, 1.0);
         for (i, step) in self.steps.iter().enumerate() {
@@ -105,32 +106,39 @@ impl Formula {
 const BINOMIAL: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
 
-impl<const N: usize> Jet<N> {
+impl<const N: usize, const ROUNDED: bool> Jet<N, ROUNDED> {
     pub fn constant(value: f64) -> Self {
         let mut jet = Self { value: [0.0; N], error: [0.0; N] };
         jet.value[0] = value;
         jet
     }
 
+    /// From the values, and the errors if there are any.
+    #[inline(always)]
+    fn by(value: [f64; N], error: impl Fn(usize) -> f64) -> Self {
+        Self { value, error: if ROUNDED { vector_of(error) } else { [0.0; N] } }
+    }
+
     #[inline]
     fn plus(&self, other: &Self, sign: f64) -> Self {
         let value: [f64; N] = std::array::from_fn(|k| self.value[k] + sign * other.value[k]);
-        let error = std::array::from_fn(|k| self.error[k] + other.error[k] + value[k].abs());
-        Self { value, error }
+        Self::by(value, |k| self.error[k] + other.error[k] + value[k].abs())
     }
 
     #[inline]
     fn shifted(&self, constant: f64) -> Self {
         let mut jet = *self;
         jet.value[0] += constant;
-        jet.error[0] += jet.value[0].abs();
+        if ROUNDED {
+            jet.error[0] += jet.value[0].abs();
+        }
         jet
     }
 
     #[inline]
     fn scaled(&self, constant: f64) -> Self {
         let value = self.value.map(|x| constant * x);
-        Self { value, error: std::array::from_fn(|k| constant.abs() * self.error[k] + value[k].abs()) }
+        Self::by(value, |k| constant.abs() * self.error[k] + value[k].abs())
     }
 
     #[inline]
@@ -149,7 +157,9 @@ impl<const N: usize> Jet<N> {
             for j in 0..=k {
                 let many = BINOMIAL[k][j];
                 jet.value[k] += many * (self.value[j] * other.value[k - j]);
-                jet.error[k] += many * (size[j] * other_error[k - j] + self.error[j] * other_size[k - j]);
+                if ROUNDED {
+                    jet.error[k] += many * (size[j] * other_error[k - j] + self.error[j] * other_size[k - j]);
+                }
             }
         }
         jet
@@ -161,14 +171,20 @@ impl<const N: usize> Jet<N> {
         let (x, e) = (&self.value, &self.error);
         let wrong = |k: usize| f[k + 1].abs() * e[0] + roundings * f[k].abs();
         let mut jet = Self::constant(f[0]);
-        jet.error[0] = wrong(0);
+        if ROUNDED {
+            jet.error[0] = wrong(0);
+        }
         if N > 1 {
             jet.value[1] = f[1] * x[1];
+        }
+        if N > 1 && ROUNDED {
             jet.error[1] = wrong(1) * x[1].abs() + f[1].abs() * e[1] + jet.value[1].abs();
         }
+        let (bent, straight) = if N > 2 { (f[2] * x[1] * x[1], f[1] * x[2]) } else { (0.0, 0.0) };
         if N > 2 {
-            let (bent, straight) = (f[2] * x[1] * x[1], f[1] * x[2]);
             jet.value[2] = bent + straight;
+        }
+        if N > 2 && ROUNDED {
             jet.error[2] = wrong(2) * x[1] * x[1]
                 + 2.0 * (f[2] * x[1]).abs() * e[1]
                 + wrong(1) * x[2].abs()
@@ -177,8 +193,11 @@ impl<const N: usize> Jet<N> {
         }
         if N > 3 {
             let terms = [f[3] * x[1].powi(3), 3.0 * f[2] * x[1] * x[2], f[1] * x[3]];
-            let mixed = wrong(2) * (x[1] * x[2]).abs() + f[2].abs() * (e[1] * x[2].abs() + x[1].abs() * e[2]);
             jet.value[3] = terms.iter().sum();
+            if !ROUNDED {
+                return jet;
+            }
+            let mixed = wrong(2) * (x[1] * x[2]).abs() + f[2].abs() * (e[1] * x[2].abs() + x[1].abs() * e[2]);
             jet.error[3] = wrong(3) * x[1].abs().powi(3)
                 + 3.0 * f[3].abs() * x[1] * x[1] * e[1]
                 + 3.0 * mixed
@@ -208,8 +227,10 @@ impl<const N: usize> Jet<N> {
         let y = self;
         let square = x.value[0] * x.value[0] + y.value[0] * y.value[0];
         let mut jet = Self::constant(y.value[0].atan2(x.value[0]));
-        let across = x.value[0].abs() * y.error[0] + y.value[0].abs() * x.error[0];
-        jet.error[0] = across / square + ELEMENTARY * jet.value[0].abs();
+        if ROUNDED {
+            let across = x.value[0].abs() * y.error[0] + y.value[0].abs() * x.error[0];
+            jet.error[0] = across / square + ELEMENTARY * jet.value[0].abs();
+        }
         if N > 1 {
             let turn = x.times_to(&y.slope(), N - 1).plus(&y.times_to(&x.slope(), N - 1), -1.0);
             let square = x.times_to(x, N - 1).plus(&y.times_to(y, N - 1), 1.0);
@@ -233,10 +254,16 @@ mod tests {
     use super::*;
 
     /// f, f', f'', f''' of a formula of x = u and y = 1 at u, with their errors.
-    fn jet(u: f64, rows: &[[i32; 3]], constant: f64) -> Jet<4> {
+    fn jet(u: f64, rows: &[[i32; 3]], constant: f64) -> Jet<4, true> {
         let last = 2 + rows.len() as i32 - 1;
         let constants = vec![constant; rows.len()];
         let formula = Formula::new(2, rows, &constants, &[last]).expect("a list in order");
+        let found = jet_of::<true>(u, &formula);
+        assert_eq!(jet_of::<false>(u, &formula).value, found.value);
+        found
+    }
+
+    fn jet_of<const ROUNDED: bool>(u: f64, formula: &Formula) -> Jet<4, ROUNDED> {
         let mut table = vec![Jet::constant(0.0); formula.places()];
         table[0] = Jet { value: [u, 1.0, 0.0, 0.0], error: [u.abs(), 0.0, 0.0, 0.0] };
         table[1] = Jet::constant(1.0);
@@ -244,7 +271,7 @@ mod tests {
         table[formula.outputs[0]]
     }
 
-    fn assert_near(found: Jet<4>, exact: [f64; 4]) {
+    fn assert_near(found: Jet<4, true>, exact: [f64; 4]) {
         for k in 0..4 {
             let away = (found.value[k] - exact[k]).abs();
             assert!(

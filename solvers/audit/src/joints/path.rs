@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use super::formula::{Formula, Jet};
 use crate::curve::{Curve, Followed};
-use crate::station::{Place, Rounded, Station};
+use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{curvature, length, times};
 use crate::{EPS, ROUNDINGS};
 
@@ -65,10 +65,15 @@ pub struct Piece<'a, const M: usize> {
 
 /// Room for the results of a formula, used again at every place.
 pub struct Work {
-    positions: Vec<Jet<1>>,
-    slopes: Vec<Jet<2>>,
-    bends: Vec<Jet<4>>,
+    positions: Vec<Jet<1, false>>,
+    slopes: Vec<Jet<2, false>>,
+    bends: Vec<Jet<4, false>>,
+    rounded_slopes: Vec<Jet<2, true>>,
+    rounded_bends: Vec<Jet<4, true>>,
 }
+
+/// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
+type Bends<const M: usize, const ROUNDED: bool> = ([Rounded<M>; 4], Jet<3, ROUNDED>);
 
 impl JointPath<'_> {
     fn run_of(&self, piece: usize) -> usize {
@@ -87,6 +92,8 @@ impl JointPath<'_> {
             positions: vec![Jet::constant(0.0); most],
             slopes: vec![Jet::constant(0.0); most],
             bends: vec![Jet::constant(0.0); most],
+            rounded_slopes: vec![Jet::constant(0.0); most],
+            rounded_bends: vec![Jet::constant(0.0); most],
         }
     }
 
@@ -190,14 +197,22 @@ impl<const M: usize> Piece<'_, M> {
         across.atan2((0..3).map(|k| first[k] * last[k]).sum()).to_degrees()
     }
 
-    fn fill<const N: usize>(&self, table: &mut [Jet<N>], jet: impl Fn(usize) -> Jet<N>) {
+    fn fill<const N: usize, const ROUNDED: bool>(
+        &self,
+        table: &mut [Jet<N, ROUNDED>],
+        jet: impl Fn(usize) -> Jet<N, ROUNDED>,
+    ) {
         for (i, (column, &held)) in self.words.column.iter().zip(&self.words.held).enumerate() {
             table[i] = column.map_or(Jet::constant(held), &jet);
         }
         self.words.formula.evaluate(table);
     }
 
-    fn joint_rows<const N: usize>(&self, table: &[Jet<N>], order: usize) -> Rounded<M> {
+    fn joint_rows<const N: usize, const ROUNDED: bool>(
+        &self,
+        table: &[Jet<N, ROUNDED>],
+        order: usize,
+    ) -> Rounded<M> {
         let (mut value, mut error) = ([0.0; M], [0.0; M]);
         for (joint, &place) in self.words.formula.outputs.iter().enumerate() {
             let jet = &table[place];
@@ -213,18 +228,25 @@ impl<const M: usize> Piece<'_, M> {
     /// Positions of the joints, angles as the kinematics gives them.
     pub fn at(&self, u: f64, work: &mut Work) -> [f64; M] {
         let tip = self.curve.at(u);
-        self.fill(&mut work.positions, |k| Jet { value: [tip[k]], error: [TIP_ROUNDINGS * self.size] });
+        self.fill(&mut work.positions, |k| Jet { value: [tip[k]], error: [0.0] });
         self.joint_rows(&work.positions, 0).value
+    }
+
+    /// Positions and slopes of the joints at u.
+    pub fn position_and_slope(&self, u: f64, work: &mut Work) -> [[f64; M]; 2] {
+        let [tip, slope] = self.curve.place(u);
+        self.fill(&mut work.slopes, |k| Jet { value: [tip[k], slope[k]], error: [0.0; 2] });
+        [0, 1].map(|order| self.joint_rows(&work.slopes, order).value)
     }
 
     /// The place at u.
     pub fn place(&self, u: f64, work: &mut Work) -> Place<M> {
         let (tip, slope) = (self.curve.at(u), self.curve.derivative(u));
-        self.fill(&mut work.slopes, |k| Jet {
+        self.fill(&mut work.rounded_slopes, |k| Jet {
             value: [tip[k], slope[k]],
             error: [TIP_ROUNDINGS * self.size, TIP_ROUNDINGS * self.slope_size[k]],
         });
-        let joints = [0, 1].map(|order| self.joint_rows(&work.slopes, order));
+        let joints = [0, 1].map(|order| self.joint_rows(&work.rounded_slopes, order));
         self.place_of(u, tip, slope, joints)
     }
 
@@ -235,13 +257,51 @@ impl<const M: usize> Piece<'_, M> {
         Place { piece: self.number, u, tip, position, slope, way_slope, tip_slope: feed_slope }
     }
 
-    /// The place at u, and the first three derivatives of the joints by the length of the way.
-    pub fn station(&self, u: f64, work: &mut Work) -> (Place<M>, Station<M>) {
-        let tip = self.curve.at(u);
-        let (slopes, sizes) = (self.curve.derivatives(u), self.curve.derivative_sizes());
-        self.fill(&mut work.bends, |k| {
+    /// The first three derivatives of the joints by the length of the way at u.
+    pub fn station(&self, u: f64, work: &mut Work) -> Station<M> {
+        let (tip, slopes) = (self.curve.at(u), self.curve.derivatives(u));
+        let bends = self.bends(&mut work.bends, &tip, &slopes);
+        self.station_of(u, &tip, &slopes, &bends)
+    }
+
+    /// The same with the place, and what of it may be rounding.
+    pub fn rounded_station(&self, u: f64, work: &mut Work) -> (Place<M>, Station<M>, Roundings<M>) {
+        let (tip, slopes) = (self.curve.at(u), self.curve.derivatives(u));
+        let bends = self.bends(&mut work.rounded_bends, &tip, &slopes);
+        let ([position, q1, q2, q3], way) = &bends;
+        let way = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
+        (
+            self.place_of(u, tip, slopes[0], [*position, *q1]),
+            self.station_of(u, &tip, &slopes, &bends),
+            Roundings::of_joints([q1, q2, q3], way),
+        )
+    }
+
+    fn station_of<const ROUNDED: bool>(
+        &self,
+        u: f64,
+        tip: &[f64; M],
+        slopes: &[[f64; M]; 3],
+        ([_, q1, q2, q3], way): &Bends<M, ROUNDED>,
+    ) -> Station<M> {
+        let tool = [self.feed_slope_of(tip, &slopes[0]) / way.value[0], self.curvature_by(slopes)];
+        Station::of_joints(u, [&q1.value, &q2.value, &q3.value], way.value, tool)
+    }
+
+    /// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
+    fn bends<const ROUNDED: bool>(
+        &self,
+        table: &mut [Jet<4, ROUNDED>],
+        tip: &[f64; M],
+        slopes: &[[f64; M]; 3],
+    ) -> Bends<M, ROUNDED> {
+        let (size, sizes) = match ROUNDED {
+            true => (self.size, *self.curve.derivative_sizes()),
+            false => (0.0, [[0.0; M]; 3]),
+        };
+        self.fill(table, |k| {
             let term = |order: usize| match order {
-                0 => (tip[k], self.size),
+                0 => (tip[k], size),
                 order => (slopes[order - 1][k], sizes[order - 1][k]),
             };
             Jet {
@@ -250,25 +310,22 @@ impl<const M: usize> Piece<'_, M> {
             }
         });
         // |C'|² by its axes.
-        let mut square = Jet::<3>::constant(0.0);
+        let mut square = Jet::<3, ROUNDED>::constant(0.0);
         for k in (0..M).filter(|&k| self.way_scale[k] != 0.0) {
             let scale = self.way_scale[k];
-            let axis = Jet::<3> {
+            let axis = Jet::<3, ROUNDED> {
                 value: std::array::from_fn(|order| scale * slopes[order][k]),
                 error: std::array::from_fn(|order| TIP_ROUNDINGS * scale * sizes[order][k]),
             };
             let own = axis.times(&axis);
             for order in 0..3 {
                 square.value[order] += own.value[order];
-                square.error[order] += own.error[order] + own.value[order].abs();
+                if ROUNDED {
+                    square.error[order] += own.error[order] + own.value[order].abs();
+                }
             }
         }
-        let way = square.root();
-        let way: [_; 3] = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
-        let [position, joints @ ..] = [0, 1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
-        let place = self.place_of(u, tip, slopes[0], [position, joints[0]]);
-        let tool = [place.tip_slope / way[0].0, self.curvature_by(&slopes)];
-        (place, Station::of_joints(u, &joints, way, tool))
+        ([0, 1, 2, 3].map(|order| self.joint_rows(table, order)), square.root())
     }
 
     /// From one position to another, both of this piece, or the first of an `other` one: joints known up to whole turns on one

@@ -7,13 +7,13 @@
 //! * elsewhere a parabola through three places tells where a rate is greatest, and it is measured there.
 
 use crate::chord::chord_error;
-use crate::columns::Columns;
+use crate::columns::{Columns, RATES};
 use crate::curve::Curve;
 use crate::peak::{peak, Peak};
 use crate::phase_by_length::{PhaseByLength, Place};
 use crate::phase_motion::ROUNDING;
-use crate::station::{Rounded, Station};
-use crate::vectors::vector_of;
+use crate::station::{Rounded, Roundings, Station};
+use crate::vectors::{times, vector_of};
 use crate::{Check, Limits, Tally, FEEDS, PASS_EXCESS};
 
 /// The next places are this part of the distance beside a vertex, and are taken so often at most.
@@ -26,7 +26,7 @@ const WIDE: f64 = 0.03;
 const MOST_HALVINGS: u32 = 6;
 
 /// Shares of the limits that a place uses: velocity, acceleration and jerk of each axis with their signs, then feeds and chord
-/// error.
+/// error. What may be rounding is taken off only where more is used than was found elsewhere.
 #[derive(Clone, Copy)]
 struct Use<const M: usize> {
     rates: [[f64; M]; 3],
@@ -38,8 +38,17 @@ struct Use<const M: usize> {
 pub struct Look<const M: usize> {
     pub place: Place,
     pub station: Station<M>,
-    pub velocity: Rounded<M>,
+    /// What of the speed along the path may be rounding.
+    speed_rounding: f64,
     used: Use<M>,
+}
+
+impl<const M: usize> Look<M> {
+    /// What of the velocities may be rounding, on this piece.
+    pub fn velocity_rounding(&self, piece: usize, columns: &mut Columns<M>) -> [f64; M] {
+        let of_station = columns.roundings(piece, &self.station).velocity(self.place.pace.v);
+        vector_of(|k| of_station[k] + self.speed_rounding * self.station.first[k].abs())
+    }
 }
 
 /// What is known of all places between two.
@@ -157,41 +166,49 @@ impl<const M: usize> Looker<'_, '_, M> {
     }
 
     /// Looks at a place; none where the path has no direction.
-    pub fn look(&mut self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
+    fn look(&mut self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
         let station = self.columns.station(self.piece, u)?;
         Some(self.look_at(&station, tally))
     }
 
+    /// The same at an end of the phase.
+    pub fn look_at_end(&mut self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
+        let station = self.columns.station_at_end(self.piece, u)?;
+        Some(self.look_at(&station, tally))
+    }
+
     /// Offers what a place shows.
-    pub fn look_at(&self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
+    pub fn look_at(&mut self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
         let (limits, line) = (self.limits, self.line);
         let place = self.motion.place(station.u);
         let pace = place.pace;
-        let mut velocity = station.velocity(pace.v);
         let speed_rounding = self.motion.speed_rounding(pace, station.slope);
-        for k in 0..M {
-            velocity.rounding[k] += speed_rounding * station.first.value[k].abs();
-        }
         // Asked for where a limit is used more than before, which is seldom.
         let time = || self.start + self.motion.since(&place);
+        let mut roundings: Option<Roundings<M>> = None;
         tally.samples += 1;
         let mut used = Use { rates: [[0.0; M]; 3], tip: [0.0; FEEDS + 1] };
-        let mut offer = |check: Check, rate: &Rounded<M>, limit: [f64; M]| {
-            let row = &mut used.rates[check as usize - Check::Velocity as usize];
-            let value: [f64; M] = vector_of(|k| rate.value[k].abs() - rate.rounding[k]);
-            // Without a branch; axes beyond the machine's own have the limit 0.
-            let ratio: [f64; M] = vector_of(|k| value[k] / limit[k]);
-            let share = |k: usize| if value[k] <= 0.0 { 0.0 } else { ratio[k] };
-            *row = vector_of(|k| share(k).copysign(rate.value[k]));
+        let velocity = station.velocity(pace.v);
+        let rates = [velocity, station.acceleration(pace), station.jerk(pace)];
+        for row in 0..if limits.judges_jerk { 3 } else { 2 } {
+            let (check, value, [most, per]) = (RATES[row], &rates[row], &self.columns.rates[row]);
+            let (limit, per) = (most.of_each(value), per.of_each(value));
+            used.rates[row] = times(value, &per);
             for k in 0..M {
-                tally.offer_share(check, k, (value[k], limit[k], row[k].abs()), line, time);
+                if tally.is_passed(check, k, value[k].abs(), limit[k]) {
+                    continue;
+                }
+                let of = roundings.get_or_insert_with(|| self.columns.roundings(self.piece, station));
+                let rounding = match check {
+                    Check::Velocity => of.velocity(pace.v)[k] + speed_rounding * station.first[k].abs(),
+                    Check::Acceleration => of.acceleration(pace)[k],
+                    _ => of.jerk(pace)[k],
+                };
+                let certain = value[k].abs() - rounding;
+                let ratio = if certain <= 0.0 { 0.0 } else { certain / limit[k] };
+                used.rates[row][k] = ratio.copysign(value[k]);
+                tally.offer_share(check, k, (certain, limit[k], ratio), line, time);
             }
-        };
-        offer(Check::Velocity, &velocity, limits.velocity.of_each(&velocity.value));
-        let acceleration = station.acceleration(pace);
-        offer(Check::Acceleration, &acceleration, limits.acceleration.of_each(&acceleration.value));
-        if limits.judges_jerk {
-            offer(Check::Jerk, &station.jerk(pace), limits.jerk);
         }
         // A profile of rubbish may go back.
         let speed = pace.v.abs();
@@ -199,7 +216,12 @@ impl<const M: usize> Looker<'_, '_, M> {
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
             let [speed, rounding] = match self.feeds_along[feed] {
                 true => tip,
-                false => self.columns.speed(feed, &velocity, tip),
+                false => {
+                    let of = roundings.get_or_insert_with(|| self.columns.roundings(self.piece, station));
+                    let rounding = of.velocity(pace.v);
+                    let rounding = vector_of(|k| rounding[k] + speed_rounding * station.first[k].abs());
+                    self.columns.speed(feed, &Rounded { value: velocity, rounding }, tip)
+                }
             };
             let speed = speed - rounding;
             used.tip[feed] = speed / limit;
@@ -210,7 +232,7 @@ impl<const M: usize> Looker<'_, '_, M> {
             used.tip[FEEDS] = error / limits.chord_tolerance;
             tally.offer_at(Check::Chord, 0, error, limits.chord_tolerance, line, time);
         }
-        Look { place, station: *station, velocity, used }
+        Look { place, station: *station, speed_rounding, used }
     }
 
     /// What a bound says of the places between two beside what has been found so far.
@@ -257,9 +279,6 @@ impl<const M: usize> Looker<'_, '_, M> {
     }
 }
 
-/// The rates of an axis in the order of `Use`.
-const RATES: [Check; 3] = [Check::Velocity, Check::Acceleration, Check::Jerk];
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -304,7 +323,7 @@ mod tests {
                 let rates = [station.velocity(pace.v), station.acceleration(pace), station.jerk(pace)];
                 for (row, rate) in rates.iter().enumerate() {
                     for k in 0..2 {
-                        most[row][k] = most[row][k].max(rate.value[k].abs());
+                        most[row][k] = most[row][k].max(rate[k].abs());
                     }
                 }
             }
@@ -313,7 +332,7 @@ mod tests {
             let of = |limit: [f64; 2]| Sided { positive: limit, negative: limit };
             (limits.velocity, limits.acceleration) = (of(velocity), of(acceleration));
             (limits.jerk, limits.judges_jerk) = (jerk, true);
-            let mut tally = Tally::default();
+            let (mut tally, mut columns) = (Tally::default(), Columns::new(&path, &limits, None));
             let (feeds, covered) = ([f64::INFINITY; FEEDS], curve.turns() as f64 * (u[1] - u[0]) / width);
             let (columns, motion, curve, limits) = (&mut columns, &motion, &*curve, &limits);
             let feeds_along = [true; FEEDS];

@@ -43,7 +43,7 @@ proptest! {
         let ours = Formula::new(INPUTS, &rows, &constants, &last).expect("a list in order");
         let mut table = theirs.table::<f64>(3);
         let mut bounds = theirs.table::<Interval>(3);
-        let mut jets = vec![Jet::<4>::constant(0.0); ours.places()];
+        let mut jets = vec![Jet::<4, true>::constant(0.0); ours.places()];
         let factorial = [1.0, 1.0, 2.0, 6.0];
         for (i, terms) in [x, y].into_iter().enumerate() {
             table.input(i).copy_from_slice(&terms);
