@@ -8,7 +8,7 @@ use fearless_simd::{dispatch, Level, Simd};
 
 use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
-use crate::lanes::{Lanes, Register};
+use crate::lanes::four::{Lanes, Register};
 
 /// Calls a function with the number of control points as a constant, so that its loops are unrolled.
 macro_rules! with_count {
