@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,12 +52,15 @@ class Events:
     def said(self) -> tuple[list[str], list[bool]]:
         """The text of each event, and whether the event is a message or a comment."""
         is_text = np.isin(self.letter, [ord(MESSAGE), ord(COMMENT)])
-        rows = np.stack([self.letter, self.number, self.p, self.q], axis=1)
-        different, place = np.unique(rows[~is_text], axis=0, return_inverse=True)
-        words = [_word(*row) for row in different.tolist()]
         texts = [""] * len(self)
-        for row, own in zip(np.flatnonzero(~is_text).tolist(), place.ravel().tolist(), strict=True):
-            texts[row] = words[own]
+        words = np.flatnonzero(~is_text)
+        if len(words):
+            first, place = _different(self.letter[words], self.number[words], self.p[words], self.q[words])
+            rows = words[first]
+            columns = (self.letter[rows], self.number[rows], self.p[rows], self.q[rows])
+            spelt = [_word(*row) for row in np.stack(columns, axis=1).tolist()]
+            for row, own in zip(words.tolist(), place.tolist(), strict=True):
+                texts[row] = spelt[own]
         for row in np.flatnonzero(is_text).tolist():
             texts[row] = self.texts[int(self.number[row])]
         return texts, is_text.tolist()
@@ -67,3 +71,13 @@ def _word(letter: float, number: float, p: float, q: float) -> str:
     first = "E" if letter == ord("M") and number in _ANALOG else "P"
     others = "".join(f" {name}{value:g}" for name, value in ((first, p), ("Q", q)) if not math.isnan(value))
     return f"{chr(int(letter))}{number:g}{others}"
+
+
+def _different(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The first of each kind of row, and the kind of each row (m,), by the bits of columns (m,): no NaN is equal
+    to another."""
+    kind = np.zeros(len(columns[0]), np.int64)
+    for column in columns:
+        _, own = np.unique(column.astype(np.float64).view(np.int64), return_inverse=True)
+        _, first, kind = np.unique(kind * len(kind) + own, return_index=True, return_inverse=True)
+    return first, kind
