@@ -74,8 +74,8 @@ def _word(letter: float, number: float, p: float, q: float) -> str:
 
 
 def _different(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The first of each kind of row, and the kind of each row (m,), by the bits of columns (m,): no NaN is equal
-    to another."""
+    """The first of each kind of row, and the kind of each row (m,), by the bits of columns (m,): no NaN is
+    equal to another."""
     kind = np.zeros(len(columns[0]), np.int64)
     for column in columns:
         _, own = np.unique(column.astype(np.float64).view(np.int64), return_inverse=True)
