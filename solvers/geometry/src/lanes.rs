@@ -54,7 +54,7 @@ macro_rules! lanes {
     ($vector:ident, $count:literal, $align:literal) => {
         use fearless_simd::{$vector, ExtractToken, Simd, SimdBase, SimdFloat, SimdInto};
 
-        use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+        use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
         use super::fold;
 
@@ -172,6 +172,7 @@ macro_rules! lanes {
         lanewise!(Add, add, +);
         lanewise!(Sub, sub, -);
         lanewise!(Mul, mul, *);
+        lanewise!(Div, div, /);
 
         impl<S: Simd> Mul<f64> for Register<S> {
             type Output = Self;

@@ -15,16 +15,16 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use self::derivatives::{chord_limit, rate, OFF_LINE};
+use self::derivatives::{chord_limit, path_points, rate, OFF_LINE};
 pub use self::derivatives::{path_point, per_feed, piece, speed_sq, straight, tool_curvature, MAX_RATE};
-use crate::path_problem::{Geometry, PathPoint, SpeedCap};
+use crate::path_problem::{Geometry, PathPoint, PathPoints, SpeedCap};
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::tolerance::CUSP;
 use feedplan_planner::problem::Problem;
 pub use junctions::Junction;
 use junctions::Meeting;
 pub use table::Part;
-use table::{around, panel, Halving, Row};
+use table::{around, panel, panel_of, Halving, Row};
 
 /// Most steps to locate a length: one or two of Newton's, or next to a cusp, where they stray, as many bisections as u
 /// has bits.
@@ -125,10 +125,31 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
 
     /// The parameter at an arc length on a part by its table, not on a point where D vanishes.
     fn parameter(&self, part: usize, s: f64) -> f64 {
-        let [first, last] = self.measures[part].inside;
-        let x = (s - self.knots[part]).clamp(first, last);
+        let x = self.inside(part, s);
         let [from, to] = around(self.table(part), x);
         from.parameter_at(to, x)
+    }
+
+    /// The same at four arc lengths, which are mostly on one panel of the table or on neighbours.
+    fn parameters(&self, part: usize, s: [f64; 4]) -> [f64; 4] {
+        let rows = self.table(part);
+        let x = s.map(|s| self.inside(part, s));
+        let mut panel = panel_of(rows, x[0]);
+        x.map(|x| {
+            while panel > 0 && rows[panel].s > x {
+                panel -= 1;
+            }
+            while panel + 2 < rows.len() && rows[panel + 1].s <= x {
+                panel += 1;
+            }
+            rows[panel].parameter_at(&rows[panel + 1], x)
+        })
+    }
+
+    /// An arc length on a part from its start, not at a point where D vanishes.
+    fn inside(&self, part: usize, s: f64) -> f64 {
+        let [first, last] = self.measures[part].inside;
+        (s - self.knots[part]).max(first).min(last)
     }
 
     /// The parameter at the arc length s on a part, to rounding.
@@ -274,6 +295,13 @@ impl<const M: usize> Geometry<M> for ArcLengthPath<'_, M> {
             None => path_point(self.problem, self.parts[part].piece, self.parameter(part, s)),
         }
     }
+
+    fn at_four(&self, part: usize, s: [f64; 4]) -> PathPoints<M> {
+        match self.measures[part].straight {
+            Some(_) => PathPoints::new([self.at(part, s[0]); 4]),
+            None => path_points(self.problem, self.parts[part].piece, self.parameters(part, s)),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -329,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn a_located_parameter_has_its_length() {
+    fn a_located_parameter_has_its_length_and_four_points_are_those_of_each() {
         // From a slow start, where |C'| is 1e-3 of its greatest, and round a bend.
         let control = [[0.0, 0.0], [1e-3, 0.0], [1.0, 0.1], [2.0, 2.0], [1.5, 3.0], [3.0, 5.0]];
         let parts = [Part { piece: 0, u: [0.0, 1.0] }];
@@ -339,6 +367,9 @@ mod tests {
         for i in 1..400 {
             let off = path.length_between(0, 0.0, path.locate(0, length(i))) - length(i);
             assert!(off.abs() < 2e-15 * path.total(), "{i}: {off:e}");
+        }
+        for s in [[0, 1, 2, 3], [5, 90, 200, 400], [300, 7, 299, 8]].map(|four| four.map(length)) {
+            assert_eq!(path.at_four(0, s), PathPoints::new(s.map(|s| path.at(0, s))));
         }
     }
 }

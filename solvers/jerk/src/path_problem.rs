@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use feedplan_geometry::lanes::four::Lanes;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::Both;
 
@@ -19,6 +20,27 @@ pub struct PathPoint<const M: usize> {
     pub speed_cap: f64,
 }
 
+/// The same at four points of a piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathPoints<const M: usize> {
+    /// q', q'' and q''' of each axis.
+    pub q: [[Lanes; 3]; M],
+    pub speed_cap: Lanes,
+}
+
+impl<const M: usize> PathPoints<M> {
+    pub fn new(points: [PathPoint<M>; 4]) -> Self {
+        let q = std::array::from_fn(|k| {
+            [
+                Lanes::new(points.map(|point| point.first[k])),
+                Lanes::new(points.map(|point| point.second[k])),
+                Lanes::new(points.map(|point| point.third[k])),
+            ]
+        });
+        Self { q, speed_cap: Lanes::new(points.map(|point| point.speed_cap)) }
+    }
+}
+
 /// A path of smooth pieces between knots.
 pub trait Geometry<const M: usize>: Sync {
     /// Arc lengths of the ends of the pieces, in mm, strictly rising, from 0 where the path begins at rest. q' is
@@ -27,6 +49,11 @@ pub trait Geometry<const M: usize>: Sync {
 
     /// Derivatives at the arc length s on a piece, which may be one of its ends.
     fn at(&self, piece: usize, s: f64) -> PathPoint<M>;
+
+    /// The same at four arc lengths on a piece.
+    fn at_four(&self, piece: usize, s: [f64; 4]) -> PathPoints<M> {
+        PathPoints::new(s.map(|s| self.at(piece, s)))
+    }
 }
 
 /// The most axes of a path.

@@ -105,6 +105,34 @@ fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f
     out
 }
 
+/// C', C'' and C''' by u at four places: the same numbers as by `derivatives`.
+#[inline]
+pub fn derivatives_at_four<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[Lanes; 3]; M] {
+    if piece.is_rational() {
+        let c = u.map(|u| derivatives(piece, u));
+        std::array::from_fn(|k| [1, 2, 3].map(|order| Lanes::new(c.map(|c| c[order][k]))))
+    } else {
+        with_count!(piece, derivatives_at_four_of(piece, u))
+    }
+}
+
+fn derivatives_at_four_of<const M: usize, const N: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[Lanes; 3]; M] {
+    let mut c = [[Lanes::ZERO; 3]; M];
+    let control = piece.control.as_flattened();
+    axes_at_four::<N>(control, u.map(|u| u / piece.width), 1.0 / piece.width, &mut c);
+    c
+}
+
+/// Derivatives of each axis at four places, compiled once for any number of axes.
+fn axes_at_four<const N: usize>(control: &[f64], t: [f64; 4], scale: f64, c: &mut [[Lanes; 3]]) {
+    let axes = c.len();
+    dispatch!(Level::new(), simd => {
+        for (k, c) in c.iter_mut().enumerate() {
+            *c = triangle_at_four(simd, &axis::<N>(control, axes, k), t, scale);
+        }
+    });
+}
+
 /// The numbers of axis k of so many.
 #[inline(always)]
 fn axis<const N: usize>(control: &[f64], axes: usize, k: usize) -> [f64; N] {
@@ -113,6 +141,45 @@ fn axis<const N: usize>(control: &[f64], axes: usize, k: usize) -> [f64; N] {
         *number = point[k];
     }
     numbers
+}
+
+/// `triangle` for one axis at four places, and by u.
+#[inline(always)]
+fn triangle_at_four<S: Simd, const N: usize>(
+    simd: S,
+    numbers: &[f64; N],
+    t: [f64; 4],
+    scale: f64,
+) -> [Lanes; 3] {
+    let anchor = t.map(|t| if t <= 0.5 { numbers[0] } else { numbers[N - 1] });
+    let (anchor, t) = (Lanes::new(anchor).load(simd), Lanes::new(t).load(simd));
+    let (d, s) = ((N - 1) as f64, Register::all(simd, 1.0) - t);
+    let mut b = [anchor; N];
+    for i in 0..N {
+        b[i] = Register::all(simd, numbers[i]) - anchor;
+    }
+    let cut = |b: &mut [Register<S>; N], left: usize| {
+        for i in 0..left {
+            b[i] = s * b[i] + t * b[i + 1];
+        }
+    };
+    let mut out = [Lanes::ZERO; 3];
+    for left in (4..N).rev() {
+        cut(&mut b, left);
+    }
+    if N > 3 {
+        let steps = [b[1] - b[0], b[2] - b[1], b[3] - b[2]];
+        let third = (steps[2] - steps[1]) - (steps[1] - steps[0]);
+        out[2] = (third * (d * (d - 1.0) * (d - 2.0)) * (scale * scale * scale)).into();
+        cut(&mut b, 3);
+    }
+    if N > 2 {
+        let second = (b[2] - b[1]) - (b[1] - b[0]);
+        out[1] = (second * (d * (d - 1.0)) * (scale * scale)).into();
+        cut(&mut b, 2);
+    }
+    out[0] = ((b[1] - b[0]) * d * scale).into();
+    out
 }
 
 /// |C'|² by u, at four places.
@@ -372,6 +439,23 @@ mod tests {
             for (u, found) in u.into_iter().zip(speeds_sq(&piece, u)) {
                 let tangent = derivatives(&piece, u)[1];
                 prop_assert!((found - dot(&tangent, &tangent)).abs() <= 1e-10 * size * size);
+            }
+        }
+
+        #[test]
+        fn derivatives_at_four_places_are_those_at_each(
+            (control, weights) in pieces(),
+            u in prop::array::uniform4(0.0..2.0f64),
+        ) {
+            let piece = Piece { control: &control, weights: &weights, width: 2.0 };
+            let found = derivatives_at_four(&piece, u);
+            for (lane, u) in u.into_iter().enumerate() {
+                let truth = derivatives(&piece, u);
+                for (k, of_axis) in found.iter().enumerate() {
+                    for (order, number) in of_axis.iter().enumerate() {
+                        prop_assert_eq!(number.values()[lane], truth[order + 1][k]);
+                    }
+                }
             }
         }
 

@@ -5,10 +5,13 @@
 //!
 //!   u' = D^(−1/2),   u'' = −D_u / (2 D²),   u''' = D^(−1/2) (D_u² / D³ − D_uu / (2 D²))
 
+use fearless_simd::{dispatch, Level, Simd};
+
 use crate::path_limits::chord_speed;
-use crate::path_problem::PathPoint;
+use crate::path_problem::{PathPoint, PathPoints};
+use feedplan_geometry::lanes::four::{Lanes, Register};
 use feedplan_geometry::quadratic::{dot, norm};
-use feedplan_geometry::spline::bezier::{self, derivatives};
+use feedplan_geometry::spline::bezier::{self, derivatives, derivatives_at_four};
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;
@@ -20,6 +23,7 @@ const ROUNDINGS: f64 = 16.0;
 pub const MAX_RATE: usize = 40;
 
 /// Piece `i` of the path; with equal weights it is polynomial.
+#[inline]
 pub fn piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Piece<'a, M> {
     plain(problem.control, problem.weight, problem.offset, problem.width, i)
 }
@@ -29,6 +33,7 @@ pub fn tip_piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Opti
     problem.tip.map(|tip| plain(tip.control, tip.weight, tip.offset, problem.width, i))
 }
 
+#[inline]
 fn plain<'a, const M: usize>(
     control: &'a [[f64; M]],
     weight: &'a [f64],
@@ -37,9 +42,8 @@ fn plain<'a, const M: usize>(
     i: usize,
 ) -> Piece<'a, M> {
     let range = offset[i]..offset[i + 1];
-    let weights = weight.get(range.clone()).unwrap_or(&[]);
-    let weights = if weights.windows(2).all(|pair| pair[0] == pair[1]) { &[] } else { weights };
-    Piece { control: &control[range], weights, width: width[i] }
+    let weights = if weight.is_empty() { &[] } else { &weight[range.clone()] };
+    Piece::new(&control[range], weights, width[i])
 }
 
 /// The direction of a straight piece at u; None for other pieces. A tangent much shorter than the longest may leave the
@@ -105,6 +109,39 @@ fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
     out
 }
 
+/// The same at four u.
+fn polynomial_at_four(coefficients: &[f64], width: f64, u: [f64; 4]) -> [Lanes; 3] {
+    dispatch!(Level::new(), simd => polynomial_on(simd, coefficients, width, u))
+}
+
+#[inline(always)]
+fn polynomial_on<S: Simd>(simd: S, coefficients: &[f64], width: f64, u: [f64; 4]) -> [Lanes; 3] {
+    let n = coefficients.len() - 1;
+    let t = Lanes::new(u.map(|u| u / width)).load(simd);
+    let rest = Register::all(simd, 1.0) - t;
+    let mut b = [Register::all(simd, 0.0); MAX_RATE];
+    for j in 0..=n {
+        b[j] = Register::all(simd, coefficients[j]);
+    }
+    let degree = n as f64;
+    let mut out = [Lanes::ZERO; 3];
+    for left in (0..=n).rev() {
+        match left {
+            2 => {
+                let bend = (b[2] - b[1]) - (b[1] - b[0]);
+                out[2] = (bend * (degree * (degree - 1.0)) / Register::all(simd, width * width)).into();
+            }
+            1 => out[1] = ((b[1] - b[0]) * degree / Register::all(simd, width)).into(),
+            0 => out[0] = b[0].max(Register::all(simd, 0.0)).into(),
+            _ => {}
+        }
+        for j in 0..left {
+            b[j] = rest * b[j] + t * b[j + 1];
+        }
+    }
+    out
+}
+
 /// The speed along s over that which the feed limits, at u of piece `i` with this D; infinite without a limit.
 pub fn per_feed<const M: usize>(problem: &Problem<M>, i: usize, u: f64, d: f64) -> f64 {
     let square = match (problem.tip, problem.share(i)) {
@@ -160,18 +197,88 @@ pub fn path_point<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Pat
         second[k] = c2[k] * u1 * u1 + c1[k] * u2;
         third[k] = c3[k] * u1 * u1 * u1 + 3.0 * c2[k] * u1 * u2 + c1[k] * u3;
     }
-    let mut speed_cap = problem.feed[i] * per_feed(problem, i, u, d);
-    if problem.chord_tolerance.is_finite() {
-        let chord = match tip_piece(problem, i) {
-            None => chord_limit(problem, norm(&second)),
-            Some(tip) => {
-                let (curvature, square) = curvature(&tip, u);
-                chord_limit(problem, curvature) * (d / square).sqrt()
-            }
-        };
-        speed_cap = speed_cap.min(chord);
-    }
+    let fed = problem.feed[i] * per_feed(problem, i, u, d);
+    let speed_cap = fed.min(chord_cap(problem, i, u, d, || norm(&second)));
     PathPoint { first, second, third, speed_cap }
+}
+
+/// The same at four u.
+pub fn path_points<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) -> PathPoints<M> {
+    let c = derivatives_at_four(&piece(problem, i), u);
+    let rate = problem.way.map(|way| polynomial_at_four(way.of(i), problem.width[i], u));
+    let (q, d) = dispatch!(Level::new(), simd => by_length(simd, &c, rate));
+    let square = match (problem.tip, problem.share(i)) {
+        (Some(tip), _) => Some(polynomial_at_four(tip.speed.of(i), problem.width[i], u)[0]),
+        (None, None) => None,
+        (None, Some(share)) => Some(Lanes::new(std::array::from_fn(|lane| {
+            (0..M).map(|k| (share[k] * c[k][0].values()[lane]).powi(2)).sum()
+        }))),
+    };
+    let d = d.values();
+    let speed_cap = std::array::from_fn(|lane| {
+        let per_feed = square.map_or(1.0, |square| (d[lane] / square.values()[lane]).sqrt());
+        let bend = || norm::<M>(&std::array::from_fn(|k| q[k][1].values()[lane]));
+        (problem.feed[i] * per_feed).min(chord_cap(problem, i, u[lane], d[lane], bend))
+    });
+    PathPoints { q, speed_cap: Lanes::new(speed_cap) }
+}
+
+/// The derivatives by the arc length at four places, and D: that of the axes, if not given with its derivatives.
+#[inline(always)]
+fn by_length<S: Simd, const M: usize>(
+    simd: S,
+    c: &[[Lanes; 3]; M],
+    rate: Option<[Lanes; 3]>,
+) -> ([[Lanes; 3]; M], Lanes) {
+    let one = Register::all(simd, 1.0);
+    let [d, d1, d2] = match rate {
+        Some(rate) => rate.map(|rate| rate.load(simd)),
+        None => {
+            let mut sums = [Register::all(simd, 0.0); 4];
+            for [c1, c2, c3] in c {
+                let [c1, c2, c3] = [c1, c2, c3].map(|c| c.load(simd));
+                sums[0] += c1 * c1;
+                sums[1] += c1 * c2;
+                sums[2] += c2 * c2;
+                sums[3] += c1 * c3;
+            }
+            [sums[0], sums[1] * 2.0, (sums[2] + sums[3]) * 2.0]
+        }
+    };
+    let (u1, per_d_sq) = (one / d.sqrt(), one / (d * d));
+    let u2 = d1 * -0.5 * per_d_sq;
+    let u3 = u1 * per_d_sq * (d1 * d1 / d - d2 * 0.5);
+    let mut q = [[Lanes::ZERO; 3]; M];
+    for k in 0..M {
+        let [c1, c2, c3] = c[k].map(|c| c.load(simd));
+        q[k] = [
+            (c1 * u1).into(),
+            (c2 * u1 * u1 + c1 * u2).into(),
+            (c3 * u1 * u1 * u1 + c2 * 3.0 * u1 * u2 + c1 * u3).into(),
+        ];
+    }
+    (q, d.into())
+}
+
+/// The greatest speed along s by the chord error at u of piece `i`, with this D and curvature of the axes' path.
+#[inline]
+fn chord_cap<const M: usize>(
+    problem: &Problem<M>,
+    i: usize,
+    u: f64,
+    d: f64,
+    bend: impl FnOnce() -> f64,
+) -> f64 {
+    if problem.chord_tolerance.is_infinite() {
+        return f64::INFINITY;
+    }
+    match tip_piece(problem, i) {
+        None => chord_limit(problem, bend()),
+        Some(tip) => {
+            let (curvature, square) = curvature(&tip, u);
+            chord_limit(problem, curvature) * (d / square).sqrt()
+        }
+    }
 }
 
 /// The greatest speed by the chord error at a curvature, in mm/s.
@@ -195,6 +302,46 @@ fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use feedplan_planner::problem::{SpeedSquare, Tip};
+
+    #[test]
+    fn four_places_have_the_numbers_of_each() {
+        let control = [[0.0, 0.0, 1.0], [1.0, 0.5, 0.0], [2.0, 3.0, -1.0], [2.5, 1.0, 0.0], [4.0, 0.0, 2.0]];
+        let square = [9.0, 7.0, 2.0, 5.0, 6.0, 8.0];
+        let (offset, width) = ([0, 5], [2.0]);
+        let speed = SpeedSquare { coefficients: &square, offset: &[0, 6] };
+        let plain = Problem {
+            control: &control,
+            weight: &[],
+            offset: &offset,
+            width: &width,
+            tip: None,
+            way: None,
+            feed_share: &[],
+            runs: &[0, 1],
+            feed: &[100.0],
+            junction_speed: &[0.0, 0.0],
+            max_velocity: [[100.0; 3]; 2],
+            max_acceleration: [[1e4; 3]; 2],
+            chord_tolerance: 1e-4,
+            period: 0.001,
+            start_speed: 0.0,
+            end_speed: 0.0,
+            watch: Default::default(),
+        };
+        let tip = Some(Tip { speed, control: &control, weight: &[], offset: &offset });
+        let u = [0.0, 0.3, 1.2, 2.0];
+        for problem in [
+            plain,
+            Problem { chord_tolerance: f64::INFINITY, ..plain },
+            Problem { weight: &[1.0, 2.0, 1.0, 3.0, 1.0], ..plain },
+            Problem { feed_share: &[[1.0, 0.0, 0.5]], ..plain },
+            Problem { way: Some(speed), tip, ..plain },
+        ] {
+            let each = u.map(|u| path_point(&problem, 0, u));
+            assert_eq!(path_points(&problem, 0, u), PathPoints::new(each));
+        }
+    }
 
     #[test]
     fn a_short_tangent_beside_a_long_one_turns_by_its_own_angle() {

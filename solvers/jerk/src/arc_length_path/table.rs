@@ -53,8 +53,13 @@ pub fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> 
 
 /// The rows of a table around a length.
 pub fn around(rows: &[Row], s: f64) -> [&Row; 2] {
-    let i = rows[1..rows.len() - 1].partition_point(|row| row.s <= s);
+    let i = panel_of(rows, s);
     [&rows[i], &rows[i + 1]]
+}
+
+/// The row before a length, not the last one.
+pub fn panel_of(rows: &[Row], s: f64) -> usize {
+    rows[1..rows.len() - 1].partition_point(|row| row.s <= s)
 }
 
 impl Row {
