@@ -39,6 +39,13 @@ impl<const M: usize> PathPoints<M> {
         });
         Self { q, speed_cap: Lanes::new(points.map(|point| point.speed_cap)) }
     }
+
+    /// One of them.
+    pub fn point(&self, lane: usize) -> PathPoint<M> {
+        let [first, second, third] =
+            [0, 1, 2].map(|order| std::array::from_fn(|k| self.q[k][order].values()[lane]));
+        PathPoint { first, second, third, speed_cap: self.speed_cap.values()[lane] }
+    }
 }
 
 /// A path of smooth pieces between knots.

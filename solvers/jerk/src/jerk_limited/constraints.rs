@@ -273,18 +273,12 @@ impl Constraints {
         jerk_factor: &[f64],
         station_cap: impl Fn(usize) -> f64,
     ) {
-        let mut last: Option<PathPoint<M>> = None;
         self.replace((0..pieces.len()).map(|n| {
-            let (start, h) = (stations[n], stations[n + 1] - stations[n]);
-            let piece = pieces[n] as usize;
-            let at = |part: f64| geometry.at(piece, start + part * h);
-            let first = match last {
-                Some(point) if n > 0 && pieces[n - 1] == pieces[n] => point,
-                _ => geometry.at(piece, start),
-            };
-            let end = geometry.at(piece, stations[n + 1]);
-            last = Some(end);
-            let points = [first, at(POINTS[1]), at(POINTS[2]), end];
+            let (start, end) = (stations[n], stations[n + 1]);
+            let h = end - start;
+            let lengths = [start, start + POINTS[1] * h, start + POINTS[2] * h, end];
+            let points = geometry.at_four(pieces[n] as usize, lengths);
+            let points: [PathPoint<M>; COUNT] = std::array::from_fn(|p| points.point(p));
             let mut speed = points.map(|point| limits.per_speed_sq(&point));
             for (p, station) in [(0, n), (3, n + 1)] {
                 let cap = station_cap(station);

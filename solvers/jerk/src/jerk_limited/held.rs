@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::speed_envelope::{Change, Slopes, ROUNDING};
 use crate::arc_length_path::{path_point, piece, ArcLengthPath, Junction};
 use crate::path_limits::{bounded, Curve, Shape};
-use crate::path_problem::{End, Geometry, Limits, PathPoint, SpeedCap};
+use crate::path_problem::{End, Geometry, Limits, PathPoint, PathPoints, SpeedCap};
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;
@@ -81,6 +81,10 @@ impl<const M: usize> Geometry<M> for Between<'_, '_, M> {
 
     fn at(&self, piece: usize, s: f64) -> PathPoint<M> {
         self.path.at(piece, s)
+    }
+
+    fn at_four(&self, piece: usize, s: [f64; 4]) -> PathPoints<M> {
+        self.path.at_four(piece, s)
     }
 }
 

@@ -84,16 +84,19 @@ impl IntersampleCheck {
             let mut caps = [Lanes::ZERO; SAMPLES];
             for (lane, &piece) in pieces[first..].iter().take(LANES).enumerate() {
                 let (start, h) = (stations[first + lane], own.h.values()[lane]);
-                for (i, cap) in caps.iter_mut().enumerate() {
-                    let s = start + h * (i as f64 / (SAMPLES - 1) as f64);
-                    let point = geometry.at(piece as usize, s);
-                    for (k, q) in self.q[b * M..(b + 1) * M].iter_mut().enumerate() {
-                        let orders = [point.first[k], point.second[k], point.third[k]];
-                        for (to, q) in q[i].iter_mut().zip(orders) {
-                            to.values_mut()[lane] = q;
+                let s = |i: usize| start + h * (i as f64 / (SAMPLES - 1) as f64);
+                for first in (0..SAMPLES).step_by(4) {
+                    let points = geometry.at_four(piece as usize, std::array::from_fn(|i| s(first + i)));
+                    for (q, of_axis) in self.q[b * M..(b + 1) * M].iter_mut().zip(&points.q) {
+                        for (order, values) in of_axis.iter().enumerate() {
+                            for (i, value) in values.values().iter().enumerate() {
+                                q[first + i][order].values_mut()[lane] = *value;
+                            }
                         }
                     }
-                    cap.values_mut()[lane] = 1.0 / (point.speed_cap * point.speed_cap);
+                    for (i, speed) in points.speed_cap.values().iter().enumerate() {
+                        caps[first + i].values_mut()[lane] = 1.0 / (speed * speed);
+                    }
                 }
             }
             let at_stations = [0, COUNT - 1].map(|p| own.points[p].speed);

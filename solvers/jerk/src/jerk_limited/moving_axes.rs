@@ -3,12 +3,13 @@
 
 use super::profile::Plan;
 use super::windows;
-use crate::path_problem::{Effort, Fault, Geometry, Limits, PathPoint, Problem};
+use crate::path_problem::{Effort, Fault, Geometry, Limits, PathPoint, PathPoints, Problem};
 
 /// A path by K of its axes.
 struct MovingAxes<'a, const K: usize> {
     knots: &'a [f64],
     at: &'a (dyn Fn(usize, f64) -> PathPoint<K> + Sync),
+    at_four: &'a (dyn Fn(usize, [f64; 4]) -> PathPoints<K> + Sync),
 }
 
 impl<const K: usize> Geometry<K> for MovingAxes<'_, K> {
@@ -18,6 +19,10 @@ impl<const K: usize> Geometry<K> for MovingAxes<'_, K> {
 
     fn at(&self, piece: usize, s: f64) -> PathPoint<K> {
         (self.at)(piece, s)
+    }
+
+    fn at_four(&self, piece: usize, s: [f64; 4]) -> PathPoints<K> {
+        (self.at_four)(piece, s)
     }
 }
 
@@ -55,9 +60,13 @@ fn plan_by<G: Geometry<M>, const M: usize, const K: usize>(
             speed_cap: point.speed_cap,
         }
     };
+    let at_four = |piece: usize, s: [f64; 4]| {
+        let points = problem.geometry.at_four(piece, s);
+        PathPoints { q: std::array::from_fn(|i| points.q[order[i]]), speed_cap: points.speed_cap }
+    };
     let Limits { velocity, acceleration, jerk } = &problem.limits;
     let own = Problem {
-        geometry: &MovingAxes { knots: problem.geometry.knots(), at: &at },
+        geometry: &MovingAxes { knots: problem.geometry.knots(), at: &at, at_four: &at_four },
         limits: Limits {
             velocity: [0, 1].map(|sign| by(&velocity[sign])),
             acceleration: [0, 1].map(|sign| by(&acceleration[sign])),
