@@ -69,17 +69,18 @@ impl<const M: usize> Limits<M> {
     /// The greatest r at a point, if the slope of r is at most k.
     pub(super) fn envelope_cap(&self, point: &PathPoint<M>, k: f64) -> f64 {
         let tiny = f64::MIN_POSITIVE;
-        let mut cap = (1.0 / self.per_speed_sq(point).max(tiny)).power(0.75);
+        // The least r^(4/3), r² and r.
+        let (mut speed_sq, mut square, mut cap) =
+            (1.0 / self.per_speed_sq(point).max(tiny), f64::INFINITY, f64::INFINITY);
         for axis in 0..M {
             let (second, third) = (point.second[axis].abs().max(tiny), point.third[axis].abs().max(tiny));
             let jerk = JERK * self.jerk[axis];
             let acceleration = self.acceleration[usize::from(point.second[axis] < 0.0)][axis];
-            cap = cap
-                .min((ACCELERATION * acceleration / second).power(0.75))
-                .min((jerk / third).sqrt())
-                .min(jerk / (2.0 * second * k));
+            speed_sq = speed_sq.min(ACCELERATION * acceleration / second);
+            square = square.min(jerk / third);
+            cap = cap.min(jerk / (2.0 * second * k));
         }
-        cap
+        cap.min(square.sqrt()).min(speed_sq.power(0.75))
     }
 }
 
@@ -117,7 +118,10 @@ impl Slopes {
     /// The greatest r at a distance h, starting from r.
     #[inline]
     pub fn reach(&self, r: f64, h: f64, change: Change) -> f64 {
-        r + h * self.k.min(self.acceleration[change as usize] / r.cbrt()).min(r / self.shortest)
+        let (k, a) = (self.k, self.acceleration[change as usize]);
+        // Below (a/k)³ no cube root is needed.
+        let steepest = if k * k * k * r <= a * a * a { k } else { a / r.cbrt() };
+        r + h * steepest.min(r / self.shortest)
     }
 
     /// The distance from one r to a greater one at the greatest slopes.
@@ -211,11 +215,14 @@ pub fn sample_envelope<const M: usize>(
     let mut greatest = [[0.0f64; M]; 2];
     for &(piece, start, end) in &pieces {
         watch.check_at(piece as usize);
-        for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
-            let point = geometry.at(piece as usize, start + part * (end - start));
-            for k in 0..M {
-                greatest[0][k] = greatest[0][k].max(point.first[k]);
-                greatest[1][k] = greatest[1][k].max(-point.first[k]);
+        let inside = [0.0, 0.25, 0.5, 0.75].map(|part| start + part * (end - start));
+        let points = geometry.at_four(piece as usize, inside);
+        let last = geometry.at(piece as usize, end);
+        for k in 0..M {
+            let all = points.q[k][0].values().iter().chain([&last.first[k]]);
+            for first in all {
+                greatest[0][k] = greatest[0][k].max(*first);
+                greatest[1][k] = greatest[1][k].max(-first);
             }
         }
     }
@@ -223,7 +230,7 @@ pub fn sample_envelope<const M: usize>(
     let sample = |piece: u32, s: f64| {
         let point = geometry.at(piece as usize, s);
         let cap = limits.envelope_cap(&point, slopes.k);
-        let fed = cap >= (1.0 - ROUNDING) * point.speed_cap.power(1.5);
+        let fed = cap >= (1.0 - ROUNDING) * point.speed_cap * point.speed_cap.sqrt();
         EnvelopeSample { s, piece, cap, turning: turning(limits, &point), fed }
     };
     let mut samples = vec![];
