@@ -5,8 +5,8 @@
 //! long interval takes the path and its limits from the nearest collocation point of the short intervals. The coarse
 //! solution may exceed limits of the fine grid; a part of the way back to a valid plan leads inside them.
 
-use super::constraints::{Constraints, Interval};
-use super::hermite;
+use super::constraints::Constraints;
+use super::hermite::{self, COUNT};
 use super::interior_point::{Effort, Outcome};
 use super::model::Model;
 use super::window_end::WindowEnd;
@@ -55,22 +55,20 @@ pub fn starts<'e, X: Model>(
 /// The constraints on the coarse grid, tightened where limits change between its collocation points: by what `far` uses more
 /// of them on the fine grid, and to the least of the speed limits if x, which is `far` on the coarse grid, leaves room.
 fn on_coarse_grid(rows: &Constraints, far: &[f64], x: &[f64]) -> Constraints {
-    let intervals: Vec<Interval> = rows.intervals().collect();
-    let mut coarse = rows.clone();
-    coarse.replace(intervals.chunks(GROUP).map(joined));
+    let mut coarse = joined(rows);
     let (all_used, all_most) = (coarse.utilisation(x), rows.utilisation(far));
-    for (n, (short, all_most)) in intervals.chunks(GROUP).zip(all_most.chunks(GROUP)).enumerate() {
-        let used = all_used[n];
+    for (n, (used, all_most)) in all_used.into_iter().zip(all_most.chunks(GROUP)).enumerate() {
         let mut factors = [1.0f64; 3];
         for most in all_most {
             for (factor, (most, used)) in factors.iter_mut().zip(most.iter().zip(used)) {
                 *factor = factor.max(most / used.max(LITTLE));
             }
         }
-        let least = |interval: &Interval| interval.speed.iter().copied().fold(0.0, f64::max);
-        let own = least(&coarse.interval(n));
+        let least = |rows: &Constraints, n: usize| (0..COUNT).map(|p| rows.speed(n, p)).fold(0.0, f64::max);
+        let own = least(&coarse, n);
         if own > 0.0 {
-            let slower = (short.iter().map(least).fold(own, f64::max) / own).sqrt();
+            let short = n * GROUP..n * GROUP + all_most.len();
+            let slower = (short.map(|n| least(rows, n)).fold(own, f64::max) / own).sqrt();
             factors[0] = factors[0].max(slower.min(FULL / used[0].max(LITTLE)));
         }
         coarse.tighten(n, factors);
@@ -78,26 +76,26 @@ fn on_coarse_grid(rows: &Constraints, far: &[f64], x: &[f64]) -> Constraints {
     coarse
 }
 
-/// A long interval in place of short ones.
-fn joined(short: &[Interval]) -> Interval {
-    let h: f64 = short.iter().map(|interval| interval.h).sum();
-    // The short interval and the index of the nearest collocation point.
-    let nearest = hermite::POINTS.map(|part| {
-        let (mut at, mut s) = (0, part * h);
-        while at + 1 < short.len() && s > short[at].h {
-            s -= short[at].h;
-            at += 1;
-        }
-        let near = |p: &usize| (hermite::POINTS[*p] * short[at].h - s).abs();
-        (at, (0..hermite::COUNT).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or(0))
-    });
-    Interval {
-        h,
-        q: nearest.map(|(at, p)| short[at].q[p]),
-        speed: nearest.map(|(at, p)| short[at].speed[p]),
-        acceleration: nearest.map(|(at, p)| short[at].acceleration[p]),
-        jerk: short.iter().map(|interval| interval.jerk).fold(1.0, f64::max),
+/// Long intervals, each in place of short ones.
+fn joined(rows: &Constraints) -> Constraints {
+    let mut coarse = rows.clone();
+    coarse.clear();
+    for first in (0..rows.count()).step_by(GROUP) {
+        let short = first..rows.count().min(first + GROUP);
+        let h: f64 = short.clone().map(|n| rows.h(n)).sum();
+        // The short interval and the index of the nearest collocation point.
+        let nearest = hermite::POINTS.map(|part| {
+            let (mut n, mut s) = (first, part * h);
+            while n + 1 < short.end && s > rows.h(n) {
+                s -= rows.h(n);
+                n += 1;
+            }
+            let near = |p: &usize| (hermite::POINTS[*p] * rows.h(n) - s).abs();
+            (n, (0..COUNT).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or(0))
+        });
+        coarse.push_from(rows, h, short.map(|n| rows.jerk(n)).fold(1.0, f64::max), nearest);
     }
+    coarse
 }
 
 /// A spline's values at the stations of the coarse grid.
@@ -127,37 +125,30 @@ fn prolong(x: &[f64], rows: &Constraints) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path_problem::{Limits, MOST_AXES};
+    use crate::path_problem::Limits;
 
     /// Intervals of these lengths; q' counts the collocation points, 4 for each interval.
     fn rows(lengths: &[f64]) -> Constraints {
         let limits = Limits { velocity: [[1.0]; 2], acceleration: [[1.0]; 2], jerk: [1.0] };
-        let interval = |(n, &h): (usize, &f64)| Interval {
-            h,
-            q: std::array::from_fn(|p| {
-                let mut q = [[0.0; 3]; MOST_AXES];
-                q[0] = std::array::from_fn(|order| (100 * order + 4 * n + p) as f64);
-                q
-            }),
-            speed: std::array::from_fn(|p| (4 * n + p) as f64),
-            acceleration: [1.0; 4],
-            jerk: 1.0 + n as f64,
-        };
         let mut rows = Constraints::new(&limits);
-        rows.replace(lengths.iter().enumerate().map(interval));
+        for (n, &h) in lengths.iter().enumerate() {
+            rows.push(h, 1.0 + n as f64);
+            for p in 0..COUNT {
+                let count = (4 * n + p) as f64;
+                rows.set(p, count, 1.0, |_| [count, 100.0 + count, 200.0 + count]);
+            }
+        }
         rows
     }
 
     #[test]
     fn a_long_interval_takes_the_nearest_collocation_points_by_hand() {
         // Points at 0, 0.47, 0.93, 1.4; those of the first interval are 1/3 apart.
-        let short: Vec<_> = rows(&[1.0, 0.4]).intervals().collect();
-        let long = joined(&short);
-        assert_eq!((long.h, long.jerk), (1.4, 2.0));
-        let points = [0.0, 1.0, 3.0, 7.0];
-        assert_eq!(long.speed, points);
-        for order in 0..3 {
-            assert_eq!(long.q.map(|q| q[0][order]), points.map(|point| (100 * order) as f64 + point));
+        let long = joined(&rows(&[1.0, 0.4]));
+        assert_eq!((long.count(), long.h(0), long.jerk(0)), (1, 1.4, 2.0));
+        for (p, point) in [0.0, 1.0, 3.0, 7.0].into_iter().enumerate() {
+            assert_eq!(long.speed(0, p), point);
+            assert_eq!(long.derivatives(0, p, 0), [point, 100.0 + point, 200.0 + point]);
         }
     }
 
@@ -167,8 +158,8 @@ mod tests {
         let cubic = |s: f64| [2.0 + s * (0.5 - s * (0.3 - 0.2 * s)), 0.5 - s * (0.6 - 0.6 * s)];
         let mut s = 0.0;
         let mut fine = cubic(s).to_vec();
-        for interval in rows.intervals() {
-            s += interval.h;
+        for n in 0..rows.count() {
+            s += rows.h(n);
             fine.extend(cubic(s));
         }
         let coarse = restrict(&fine);

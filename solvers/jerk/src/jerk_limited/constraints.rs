@@ -20,34 +20,21 @@ use fearless_simd::{dispatch, Level, Simd};
 
 use super::columns::Columns;
 use super::forms::{self, Form};
-use super::hermite::{COUNT, POINTS};
+use super::hermite::{COUNT, LAST, POINTS};
 use super::sides::Sides;
 use super::window_end::WindowEnd;
-use crate::path_problem::{Geometry, Limits, PathPoint, MOST_AXES};
+use crate::path_problem::{Geometry, Limits, PathPoint};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
 /// Steps from a collocation point along the tangent of w to an inner Bernstein coefficient, as parts of the interval.
 const INWARDS: [f64; COUNT] = [1.0 / 3.0, 0.0, 0.0, -1.0 / 3.0];
 
-/// The limits on the interval between two stations, at each collocation point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
-    /// Its length, in mm.
-    pub h: f64,
-    /// q', q'', q''' of each axis; 0 beyond the last axis.
-    pub q: [[[f64; 3]; MOST_AXES]; COUNT],
-    /// 1/w_max.
-    pub speed: [f64; COUNT],
-    /// Factor by which the acceleration limit is tighter than the machine's: 1 or more, 0 where it does not apply.
-    pub acceleration: [f64; COUNT],
-    /// Factor by which the jerk limit is tighter: 1 or more.
-    pub jerk: f64,
-}
-
-/// The same of neighbouring intervals, but for the derivatives of the axes.
+/// The limits on neighbouring intervals between two stations, but for the derivatives of the axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
+    /// Their lengths, in mm.
     pub h: Lanes,
+    /// Factor by which the jerk limit is tighter than the machine's: 1 or more.
     pub jerk: Lanes,
     pub points: [Point; COUNT],
     /// 1 for each interval, 0 for each lane beyond the last one.
@@ -57,7 +44,9 @@ pub struct Block {
 /// The same at one collocation point of each.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
+    /// 1/w_max.
     pub speed: Lanes,
+    /// Factor by which the acceleration limit is tighter: 1 or more, 0 where it does not apply.
     pub acceleration: Lanes,
 }
 
@@ -117,18 +106,6 @@ impl RowLayout {
     }
 }
 
-impl Interval {
-    /// The greatest r = w^(3/4) if the slope of r is at most k.
-    pub fn envelope_cap<const M: usize>(&self, limits: &Limits<M>, k: f64) -> f64 {
-        let cap = |p: usize| {
-            let of = |order: usize| std::array::from_fn(|axis| self.q[p][axis][order]);
-            let speed_cap = 1.0 / self.speed[p].sqrt();
-            limits.envelope_cap(&PathPoint { first: of(0), second: of(1), third: of(2), speed_cap }, k)
-        };
-        cap(0).min(cap(1)).min(cap(2)).min(cap(3))
-    }
-}
-
 impl Block {
     /// No limits on intervals of 1 mm.
     const NONE: Self = Self {
@@ -185,26 +162,29 @@ impl Constraints {
         self.blocks[n / LANES].h.values()[n % LANES]
     }
 
-    pub fn interval(&self, n: usize) -> Interval {
-        let (block, lane) = (&self.blocks[n / LANES], n % LANES);
-        let at = |lanes: &Lanes| lanes.values()[lane];
-        let mut q = [[[0.0; 3]; MOST_AXES]; COUNT];
-        for (p, q) in q.iter_mut().enumerate() {
-            for (to, from) in q.iter_mut().zip(self.q(n / LANES, p)) {
-                *to = from.map(|lanes| at(&lanes));
-            }
-        }
-        Interval {
-            h: at(&block.h),
-            q,
-            speed: std::array::from_fn(|p| at(&block.points[p].speed)),
-            acceleration: std::array::from_fn(|p| at(&block.points[p].acceleration)),
-            jerk: at(&block.jerk),
-        }
+    /// The factor by which the jerk limit of an interval is tighter.
+    pub fn jerk(&self, n: usize) -> f64 {
+        self.blocks[n / LANES].jerk.values()[n % LANES]
     }
 
-    pub fn intervals(&self) -> impl Iterator<Item = Interval> + '_ {
-        (0..self.count).map(|n| self.interval(n))
+    /// 1/w_max at a collocation point of an interval.
+    pub fn speed(&self, n: usize, p: usize) -> f64 {
+        self.blocks[n / LANES].points[p].speed.values()[n % LANES]
+    }
+
+    /// q', q'', q''' of an axis at a collocation point of an interval.
+    pub fn derivatives(&self, n: usize, p: usize, axis: usize) -> [f64; 3] {
+        self.q(n / LANES, p)[axis].map(|lanes| lanes.values()[n % LANES])
+    }
+
+    /// The greatest r = w^(3/4) on an interval if the slope of r is at most k.
+    pub fn envelope_cap<const M: usize>(&self, n: usize, limits: &Limits<M>, k: f64) -> f64 {
+        let cap = |p: usize| {
+            let of = |order: usize| std::array::from_fn(|axis| self.derivatives(n, p, axis)[order]);
+            let speed_cap = 1.0 / self.speed(n, p).sqrt();
+            limits.envelope_cap(&PathPoint { first: of(0), second: of(1), third: of(2), speed_cap }, k)
+        };
+        cap(0).min(cap(1)).min(cap(2)).min(cap(3))
     }
 
     /// Tightens the limits of speed, acceleration and jerk of an interval by these factors.
@@ -225,41 +205,47 @@ impl Constraints {
         }
     }
 
-    /// Takes these intervals instead.
-    pub fn replace(&mut self, intervals: impl Iterator<Item = Interval>) {
-        self.clear();
-        for interval in intervals {
-            self.push(&interval);
-        }
-    }
-
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.count = 0;
         self.blocks.clear();
         self.q.clear();
     }
 
-    fn push(&mut self, interval: &Interval) {
-        let (b, lane, axes) = (self.count / LANES, self.count % LANES, self.axes());
+    /// Appends an interval of a length in mm, with a factor of its jerk limit and without other limits.
+    pub fn push(&mut self, h: f64, jerk: f64) {
+        let (b, lane) = (self.count / LANES, self.count % LANES);
         if lane == 0 {
             self.blocks.push(Block::NONE);
-            self.q.resize((b + 1) * COUNT * axes, [Lanes::ZERO; 3]);
+            self.q.resize((b + 1) * COUNT * self.axes(), [Lanes::ZERO; 3]);
         }
         let block = &mut self.blocks[b];
-        let put = |to: &mut Lanes, value: f64| to.values_mut()[lane] = value;
-        put(&mut block.h, interval.h);
-        put(&mut block.jerk, interval.jerk);
-        put(&mut block.live, 1.0);
-        for (p, point) in block.points.iter_mut().enumerate() {
-            put(&mut point.speed, interval.speed[p]);
-            put(&mut point.acceleration, interval.acceleration[p]);
-            for (to, q) in self.q[(b * COUNT + p) * axes..][..axes].iter_mut().zip(&interval.q[p]) {
-                for (to, q) in to.iter_mut().zip(q) {
-                    put(to, *q);
-                }
-            }
+        for (lanes, value) in [(&mut block.h, h), (&mut block.jerk, jerk), (&mut block.live, 1.0)] {
+            lanes.values_mut()[lane] = value;
         }
         self.count += 1;
+    }
+
+    /// Sets 1/w_max, the factor of the acceleration limit, and q', q'', q''' by the axis at collocation point p of the last
+    /// interval.
+    pub fn set(&mut self, p: usize, speed: f64, acceleration: f64, q: impl Fn(usize) -> [f64; 3]) {
+        let (b, lane, axes) = ((self.count - 1) / LANES, (self.count - 1) % LANES, self.axes());
+        let point = &mut self.blocks[b].points[p];
+        point.speed.values_mut()[lane] = speed;
+        point.acceleration.values_mut()[lane] = acceleration;
+        for (axis, of_axis) in self.q[(b * COUNT + p) * axes..][..axes].iter_mut().enumerate() {
+            for (lanes, value) in of_axis.iter_mut().zip(q(axis)) {
+                lanes.values_mut()[lane] = value;
+            }
+        }
+    }
+
+    /// Appends an interval. At each collocation point it has the limits of others, at the point `from` of an interval.
+    pub fn push_from(&mut self, others: &Self, h: f64, jerk: f64, from: [(usize, usize); COUNT]) {
+        self.push(h, jerk);
+        for (p, (n, at)) in from.into_iter().enumerate() {
+            let acceleration = others.blocks[n / LANES].points[at].acceleration.values()[n % LANES];
+            self.set(p, others.speed(n, at), acceleration, |axis| others.derivatives(n, at, axis));
+        }
     }
 
     /// Takes the intervals between `stations`. Interval n lies on `pieces[n]`, with limits of jerk tightened by
@@ -273,22 +259,24 @@ impl Constraints {
         jerk_factor: &[f64],
         station_cap: impl Fn(usize) -> f64,
     ) {
-        self.replace((0..pieces.len()).map(|n| {
+        self.clear();
+        for (n, &piece) in pieces.iter().enumerate() {
             let (start, end) = (stations[n], stations[n + 1]);
             let h = end - start;
             let lengths = [start, start + POINTS[1] * h, start + POINTS[2] * h, end];
-            let points = geometry.at_four(pieces[n] as usize, lengths);
-            let points: [PathPoint<M>; COUNT] = std::array::from_fn(|p| points.point(p));
-            let mut speed = points.map(|point| limits.per_speed_sq(&point));
-            for (p, station) in [(0, n), (3, n + 1)] {
-                let cap = station_cap(station);
-                speed[p] = speed[p].max(1.0 / (cap * cap));
+            let points = geometry.at_four(piece as usize, lengths);
+            self.push(h, jerk_factor[n]);
+            for p in 0..COUNT {
+                let point = points.point(p);
+                let cap = match p {
+                    0 => station_cap(n),
+                    LAST => station_cap(n + 1),
+                    _ => f64::INFINITY,
+                };
+                let speed = limits.per_speed_sq(&point).max(1.0 / (cap * cap));
+                self.set(p, speed, 1.0, |k| [point.first[k], point.second[k], point.third[k]]);
             }
-            let q = points.map(|PathPoint { first, second, third, .. }| {
-                std::array::from_fn(|k| if k < M { [first[k], second[k], third[k]] } else { [0.0; 3] })
-            });
-            Interval { h, q, speed, acceleration: [1.0; COUNT], jerk: jerk_factor[n] }
-        }));
+        }
     }
 
     /// Takes a range of the intervals of others.
@@ -301,7 +289,7 @@ impl Constraints {
         self.q.extend_from_slice(&others.q[first * q..][..whole * q]);
         self.count = whole * LANES;
         for n in range.start + self.count..range.end {
-            self.push(&others.interval(n));
+            self.push_from(others, others.h(n), others.jerk(n), [0, 1, 2, 3].map(|p| (n, p)));
         }
     }
 
@@ -465,7 +453,7 @@ impl Constraints {
     /// Drops the limits of speed and acceleration at ends that are given.
     pub fn drop_at_ends(&mut self, ends: &[WindowEnd; 2]) {
         let last = self.count - 1;
-        for (kind, (n, p)) in ends.iter().zip([(0, 0), (last, COUNT - 1)]) {
+        for (kind, (n, p)) in ends.iter().zip([(0, 0), (last, LAST)]) {
             if let WindowEnd::Fixed { .. } = kind {
                 let point = &mut self.blocks[n / LANES].points[p];
                 point.speed.values_mut()[n % LANES] = 0.0;

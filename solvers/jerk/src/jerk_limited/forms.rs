@@ -3,10 +3,7 @@
 use fearless_simd::Simd;
 use feedplan_geometry::lanes::eight::Register;
 
-use super::hermite::{combine, Basis, BEND, COUNT, SLOPE, VALUE};
-
-/// At the first and at the last collocation point w and w' are those of a station.
-const LAST: usize = COUNT - 1;
+use super::hermite::{combine, Basis, BEND, LAST, SLOPE, VALUE};
 
 /// The symmetric form of (w, w', w''): 00 01 02 11 12 22.
 pub type Form<S> = [Register<S>; 6];

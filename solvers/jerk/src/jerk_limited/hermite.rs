@@ -6,6 +6,7 @@ use std::ops::{Add, Mul};
 
 /// Collocation points of an interval, where the limits are enforced, …
 pub const COUNT: usize = 4;
+pub const LAST: usize = COUNT - 1;
 /// … as parts of its length.
 pub const POINTS: [f64; COUNT] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// Gauss–Legendre nodes and weights on [0, 1].

@@ -5,7 +5,7 @@ use fearless_simd::{dispatch, Level, Simd};
 
 use super::columns::Columns;
 use super::constraints::Constraints;
-use super::hermite::{self, combine, Basis, COUNT};
+use super::hermite::{self, combine, Basis, LAST};
 use super::sides::Sides;
 use crate::path_problem::{Geometry, Limits};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
@@ -99,7 +99,7 @@ impl IntersampleCheck {
                     }
                 }
             }
-            let at_stations = [0, COUNT - 1].map(|p| own.points[p].speed);
+            let at_stations = [0, LAST].map(|p| own.points[p].speed);
             self.blocks.push(Block { caps, at_stations, jerk_factor: own.jerk });
         }
     }

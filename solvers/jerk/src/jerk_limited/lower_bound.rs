@@ -26,10 +26,10 @@ use fearless_simd::{dispatch, Level, Simd};
 
 use super::coarse;
 use super::columns::Columns;
-use super::constraints::{Constraints, Interval, RowLayout};
+use super::constraints::{Constraints, RowLayout};
 use super::exact::Exact;
 use super::forms::{fall, motion, pace, project};
-use super::hermite::{COUNT, MASS};
+use super::hermite::{COUNT, LAST, MASS};
 use super::interior_point::{Effort, Outcome};
 use super::relaxed::Relaxed;
 use super::speed_limit;
@@ -194,28 +194,19 @@ fn tangent(
     let mut change = Vec::with_capacity(core.len());
     let terms = lagrangian(rows, plan, whole, &mut space.state.dual);
     for n in core.clone() {
-        let interval = rows.interval(n);
-        let h = interval.h;
+        let (own, h) = (&terms[n], rows.h(n));
         let from = 2 * (n - core.start);
-        time += terms[n].time;
-        least += terms[n].value;
+        time += own.time;
+        fastest += own.fastest;
+        least += own.value;
         for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
-            slope[from + k] += terms[n].slope[k] * scale;
+            slope[from + k] += own.slope[k] * scale;
         }
-        // How much w can rise and fall on the interval: the 3/8 rule is exact for the quadratic w'.
-        let mut moves = [0.0; 2];
-        for p in 0..COUNT {
-            let [w, rise, fall] = limits_at(rows, &interval, p);
-            fastest += MASS[p] * h / w.sqrt();
-            moves[0] += MASS[p] * rise * h;
-            moves[1] += MASS[p] * fall * h;
-            if p == 0 || p == COUNT - 1 {
-                let at = from + p / (COUNT - 1) * 2;
-                boxes[at][1] = boxes[at][1].min(w);
-                boxes[at + 1] = [boxes[at + 1][0].max(-fall), boxes[at + 1][1].min(rise)];
-            }
+        for (at, [w, rise, fall]) in [from, from + 2].into_iter().zip(own.most) {
+            boxes[at][1] = boxes[at][1].min(w);
+            boxes[at + 1] = [boxes[at + 1][0].max(-fall), boxes[at + 1][1].min(rise)];
         }
-        change.push(moves);
+        change.push(own.moves);
     }
     let last = x.len() - 2;
     for end in (0..2).filter(|&end| at_ends[end]) {
@@ -315,12 +306,19 @@ fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
     }
 }
 
-/// On an interval the plan's time in s, and value and local slope of the Lagrangian.
+/// What the bound takes from an interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Terms {
+    /// The times of the plan and at the greatest speeds, in s.
     pub time: f64,
+    pub fastest: f64,
+    /// Value and local slope of the Lagrangian.
     pub value: f64,
     pub slope: [f64; 4],
+    /// The greatest w, w' and −w' at both ends.
+    pub most: [[f64; 3]; 2],
+    /// How much w can rise and fall at most: the 3/8 rule is exact for the quadratic w'.
+    pub moves: [f64; 2],
 }
 
 /// The terms of all intervals at a spline x; the multipliers are made admissible.
@@ -344,11 +342,16 @@ pub(super) fn lagrangian_on<S: Simd>(
         let h = block.h.load(simd);
         let per_h = h.inverse();
         let [plan, u] = [&plan, &x].map(|spline| spline.local(b, h, block.live));
-        let (mut time, mut value, mut slope) = (zero, zero, [zero; 4]);
+        let (mut time, mut fastest, mut value, mut slope) = (zero, zero, zero, [zero; 4]);
+        let (mut most_at, mut moves) = ([[zero; 3]; COUNT], [zero; 2]);
         for p in 0..COUNT {
             let dual = layout.of_mut(dual, b, p);
             let cost = h * MASS[p];
             time += cost * pace(motion(p, per_h, &plan)[0]);
+            most_at[p] = limits_at(simd, rows, b, p);
+            let [most, rise, drop] = most_at[p];
+            fastest += cost * pace(most);
+            moves = [moves[0] + cost * rise, moves[1] + cost * drop];
             let mut jerk = zero;
             for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
                 jerk += of_axis[2].load(simd) + of_axis[3];
@@ -369,25 +372,40 @@ pub(super) fn lagrangian_on<S: Simd>(
             value += fixed + last * pace - pull[0] * w - pull[1] * w1 - pull[2] * w2;
             project(p, per_h, &[-pull[0] - last * fall(pace), -pull[1], -pull[2]], &mut slope);
         }
-        let (time, value, slope) = (time.values(), value.values(), slope.map(Register::values));
+        let [time, fastest, value] = [time, fastest, value].map(Register::values);
+        let (slope, moves) = (slope.map(Register::values), moves.map(Register::values));
+        let most = [0, LAST].map(|p| most_at[p].map(Register::values));
         for (lane, out) in out.iter_mut().enumerate() {
-            *out = Terms { time: time[lane], value: value[lane], slope: slope.map(|slope| slope[lane]) };
+            *out = Terms {
+                time: time[lane],
+                fastest: fastest[lane],
+                value: value[lane],
+                slope: slope.map(|slope| slope[lane]),
+                most: most.map(|most| most.map(|most| most[lane])),
+                moves: moves.map(|moves| moves[lane]),
+            };
         }
     }
     out
 }
 
-/// The greatest w, w' and −w' by the limits of speed and acceleration at collocation point p of an interval.
-fn limits_at(rows: &Constraints, interval: &Interval, p: usize) -> [f64; 3] {
-    let w = 1.0 / interval.speed[p];
-    let (mut rise, mut fall) = (f64::INFINITY, f64::INFINITY);
-    for (limit, [q1, q2, _]) in rows.acceleration.iter().zip(interval.q[p]) {
-        let most = limit.most.map(|most| most / limit.per_mean);
-        let against = usize::from(q1 < 0.0);
-        rise = rise.min(2.0 * (most[against] + q2.abs() * w) / q1.abs());
-        fall = fall.min(2.0 * (most[1 - against] + q2.abs() * w) / q1.abs());
+/// The greatest w, w' and −w' by the limits of speed and acceleration at collocation point p of a block.
+#[inline(always)]
+fn limits_at<S: Simd>(simd: S, rows: &Constraints, block: usize, p: usize) -> [Register<S>; 3] {
+    let least = Register::all(simd, f64::MIN_POSITIVE);
+    let w = rows.blocks[block].points[p].speed.load(simd).max(least).inverse();
+    let mut most = [Register::all(simd, f64::INFINITY); 2];
+    for (limit, [q1, q2, _]) in rows.acceleration.iter().zip(rows.q(block, p)) {
+        let bend = q2.load(simd).abs() * w;
+        let [with, against] =
+            limit.most.map(|most| (bend + Register::all(simd, most / limit.per_mean)) * 2.0);
+        // The one of these that is against the direction of the axis limits nothing.
+        let q1 = q1.load(simd);
+        let [ahead, back] = [q1.max(least).inverse(), (-q1).max(least).inverse()];
+        most[0] = (with * ahead).min(against * back).min(most[0]);
+        most[1] = (against * ahead).min(with * back).min(most[1]);
     }
-    [w, rise, fall]
+    [w, most[0], most[1]]
 }
 
 /// Narrows the boxes of w to the values that can be reached from station to station, forward and backward.

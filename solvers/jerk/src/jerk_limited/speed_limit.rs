@@ -48,15 +48,16 @@ struct Step {
 
 /// Lowers the speed caps of a window.
 pub fn lower(rows: &mut Constraints) {
+    let axes = rows.axes();
     let (mut points, steps) = points(rows);
     for _ in 0..ROUNDS {
         for (n, step) in steps.iter().enumerate() {
             let (before, after) = points.split_at_mut(n + 1);
-            after[0].lower(&before[n], &step.energy[0], step);
+            after[0].lower(&before[n], &step.energy[0][..axes], step);
         }
         for (n, step) in steps.iter().enumerate().rev() {
             let (before, after) = points.split_at_mut(n + 1);
-            before[n].lower(&after[0], &step.energy[1], step);
+            before[n].lower(&after[0], &step.energy[1][..axes], step);
         }
         convex(&mut points);
     }
@@ -67,15 +68,15 @@ pub fn lower(rows: &mut Constraints) {
 
 impl Point {
     /// Lowers w to what can be reached from another point.
-    fn lower(&mut self, from: &Self, energy: &Axes, step: &Step) {
+    fn lower(&mut self, from: &Self, energy: &[f64], step: &Step) {
         // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
         if self.s == from.s {
             self.w = self.w.min(from.w);
         }
-        for k in 0..MOST_AXES {
+        for (k, energy) in energy.iter().enumerate() {
             let square = self.first[k] * self.first[k];
             if square > 0.0 && self.s != from.s {
-                self.w = self.w.min((from.first[k] * from.first[k] * from.w + energy[k]) / square);
+                self.w = self.w.min((from.first[k] * from.first[k] * from.w + energy) / square);
             }
         }
         let cubed = |w: f64| w * w.sqrt();
@@ -98,16 +99,19 @@ fn points(rows: &Constraints) -> (Vec<Point>, Vec<Step>) {
     let mut points: Vec<Point> = Vec::with_capacity(COUNT * rows.count());
     let mut steps = Vec::with_capacity(COUNT * rows.count());
     let mut slope = 0.0;
-    for interval in rows.intervals() {
+    for n in 0..rows.count() {
         for p in 0..COUNT {
-            let [first, second] = [0, 1].map(|order| interval.q[p].map(|q| q[order]));
+            let (mut first, mut second) = ([0.0; MOST_AXES], [0.0; MOST_AXES]);
+            for axis in 0..rows.axes() {
+                [first[axis], second[axis], _] = rows.derivatives(n, p, axis);
+            }
             let bend = length(&second);
             let normal = second.map(|second: f64| second / bend.max(f64::MIN_POSITIVE));
             let across: f64 = (0..MOST_AXES).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
-            let w = (1.0 / interval.speed[p]).min(across / bend);
+            let w = (1.0 / rows.speed(n, p)).min(across / bend);
             let mut next = Point { first, normal, bend, w, convex: 0.0, s: 0.0, integral: 0.0 };
             if let Some(last) = points.last() {
-                let h = if p == 0 { 0.0 } else { interval.h / 3.0 };
+                let h = if p == 0 { 0.0 } else { rows.h(n) / 3.0 };
                 let change = 3.0 * 0.5 * (along(&last.first) + along(&next.first)) * h;
                 next.s = last.s + h;
                 next.integral = last.integral + h * (slope + 0.5 * change);
@@ -220,7 +224,7 @@ mod tests {
         let mut rows = Constraints::new(&limits);
         rows.sample(&Clothoid(c), &limits, &stations, &[0; 40], &[1.0; 40], cap);
         lower(&mut rows);
-        rows.intervals().map(|interval| 1.0 / interval.speed[0]).collect()
+        (0..rows.count()).map(|n| 1.0 / rows.speed(n, 0)).collect()
     }
 
     /// Two lines along the second axis; the first one moves the first axis by rounding.
@@ -244,8 +248,8 @@ mod tests {
         let mut rows = Constraints::new(&limits);
         rows.sample(&Rounded, &limits, &stations, &[0, 0, 1, 1], &[1.0; 4], |_| f64::INFINITY);
         lower(&mut rows);
-        for interval in rows.intervals() {
-            assert!(interval.speed.iter().all(|per_w| (1e4 * per_w - 1.0).abs() < 1e-9));
+        for n in 0..rows.count() {
+            assert!((0..COUNT).all(|p| (1e4 * rows.speed(n, p) - 1.0).abs() < 1e-9));
         }
     }
 
