@@ -47,7 +47,7 @@ struct Measures<const M: usize> {
 /// The parts of a subrun, by arc length.
 #[derive(Clone)]
 pub struct ArcLengthPath<'a, const M: usize> {
-    problem: &'a Problem<'a, M>,
+    pub problem: &'a Problem<'a, M>,
     pub parts: &'a [Part],
     measures: Vec<Measures<M>>,
     tables: Vec<OnceLock<Box<[Row]>>>,

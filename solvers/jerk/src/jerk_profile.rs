@@ -120,14 +120,15 @@ impl JerkProfile {
         next < kind.len() && is_steady(at) && !is_steady(next)
     }
 
-    /// Appends a movement between two parameters of a piece. One too short to show in u is merged into its neighbour.
+    /// Appends a movement between two parameters of a part. One too short to show in u is merged into its neighbour.
     fn push<const M: usize>(
         &mut self,
-        problem: &Problem<M>,
-        piece: usize,
+        path: &ArcLengthPath<M>,
+        part: usize,
         [u0, u1]: [f64; 2],
         movement: &Movement,
     ) {
+        let (problem, piece) = (path.problem, path.parts[part].piece);
         let u0 = self.left_from.take().filter(|from| from.0 == piece).map_or(u0, |from| from.1);
         let phases = &mut self.phases;
         let last = phases.len().wrapping_sub(1);
@@ -164,21 +165,15 @@ impl JerkProfile {
     }
 
     /// Appends the way between two lengths of a subrun at its feed, in mm/s.
-    pub fn push_held<const M: usize>(
-        &mut self,
-        problem: &Problem<M>,
-        path: &ArcLengthPath<M>,
-        [from, to]: [f64; 2],
-        feed: f64,
-    ) {
+    pub fn push_held<const M: usize>(&mut self, path: &ArcLengthPath<M>, [from, to]: [f64; 2], feed: f64) {
         let state = State { s: 0.0, v: feed, a: 0.0 };
         let mut part = path.part(from);
         while part < path.parts.len() && path.knots()[part] < to {
-            problem.watch.check_at(part);
+            path.problem.watch.check_at(part);
             let u = [from, to].map(|s| path.locate(part, s));
             let duration = path.length_between(part, u[0], u[1]) / feed;
             let movement = Movement { law: PhaseLaw::Feed, value: feed * feed, ends: [state; 2], duration };
-            self.push(problem, path.parts[part].piece, u, &movement);
+            self.push(path, part, u, &movement);
             part += 1;
         }
     }

@@ -132,7 +132,7 @@ impl<const M: usize> Task<'_, M> {
             for end in [0, 1] {
                 let own = accelerations[i + end];
                 if lines[i].is_none() && planned[i].end_acceleration(end) > own {
-                    planned[i].turn_with(self.problem, &paths[i], end, own);
+                    planned[i].turn_with(&paths[i], end, own);
                 }
             }
         }
@@ -265,7 +265,7 @@ impl<const M: usize> Task<'_, M> {
         let watch = effort.watch.part((ends[1] - ends[0]) / path.total());
         let mut phases = JerkProfile::default();
         if let Some(feed) = held {
-            phases.push_held(self.problem, path, ends, feed);
+            phases.push_held(path, ends, feed);
             phases.lower_bound.push((ends[1] - ends[0]) / feed);
             watch.advance(1);
             self.kinks(path, junctions, |_| feed * feed, ends, &mut phases);
@@ -282,7 +282,7 @@ impl<const M: usize> Task<'_, M> {
             path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
             fault => fault,
         })?;
-        phases.push_profile(self.problem, &own.path, &self.limits.jerk, &plan.profile);
+        phases.push_profile(&own.path, &self.limits.jerk, &plan.profile);
         // The phases are kept until all stretches of the subrun are planned.
         phases.phases.shrink_to_fit();
         phases.stopped = !plan.converged && effort.expired();
@@ -315,7 +315,7 @@ impl<const M: usize> Task<'_, M> {
     fn along_line(&self, path: &ArcLengthPath<M>, line: &Line, accelerations: [f64; 2]) -> JerkProfile {
         let ends = line.ends(accelerations);
         let mut phases = JerkProfile::default();
-        phases.push_sections(self.problem, path, &s_curve::cross(&line.segment, ends), ends[1]);
+        phases.push_sections(path, &s_curve::cross(&line.segment, ends), ends[1]);
         phases
     }
 

@@ -7,7 +7,6 @@ use crate::s_curve::{Section, SegmentEnd};
 use feedplan_geometry::bisection::boundary;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phases;
-use feedplan_planner::problem::Problem;
 
 /// A section of constant jerk; after `cut` it lies on one part.
 struct Span {
@@ -43,7 +42,6 @@ impl JerkProfile {
     /// Appends a section of constant jerk between two states; `duration` in s.
     pub fn push_jerk<const M: usize>(
         &mut self,
-        problem: &Problem<M>,
         path: &ArcLengthPath<M>,
         ends: [State; 2],
         jerk: f64,
@@ -51,20 +49,19 @@ impl JerkProfile {
     ) {
         let mut spans = vec![];
         Span { part: 0, ends, jerk, duration }.cut(path, &mut spans);
-        self.push_spans(problem, path, &spans);
+        self.push_spans(path, &spans);
     }
 
     /// Appends sections of constant jerk along a whole subrun, to an end.
     pub fn push_sections<const M: usize>(
         &mut self,
-        problem: &Problem<M>,
         path: &ArcLengthPath<M>,
         sections: &[Section],
         end: SegmentEnd,
     ) {
         let mut spans = vec![];
         for (i, section) in sections.iter().enumerate() {
-            problem.watch.check_at(i);
+            path.problem.watch.check_at(i);
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
                 Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
@@ -73,20 +70,14 @@ impl JerkProfile {
             let Section { jerk, duration, .. } = *section;
             Span { part: 0, ends: [from, to], jerk, duration }.cut(path, &mut spans);
         }
-        self.push_spans(problem, path, &spans);
+        self.push_spans(path, &spans);
     }
 
     /// Lowers the acceleration at a rest where the path turns back from that of the ramp there.
     ///
     /// Over thirds of the ramp's time the acceleration is, from the rest on and in parts of the change d, d less, 5/6 d
     /// more, 1/3 d less, and that of the ramp: time, length and speed stay. The jerk is at most 5.5 d over the time.
-    pub fn turn_with<const M: usize>(
-        &mut self,
-        problem: &Problem<M>,
-        path: &ArcLengthPath<M>,
-        end: usize,
-        acceleration: f64,
-    ) {
+    pub fn turn_with<const M: usize>(&mut self, path: &ArcLengthPath<M>, end: usize, acceleration: f64) {
         let change = self.end_acceleration(end) - acceleration;
         let own = &mut self.phases;
         let at = if end == 0 { 0 } else { own.len() - 1 };
@@ -106,7 +97,7 @@ impl JerkProfile {
             spans.reverse();
         }
         let mut ramp = Self::default();
-        ramp.push_spans(problem, path, &spans);
+        ramp.push_spans(path, &spans);
         let mut ramp = ramp.phases;
         let last = ramp.len() - 1;
         (ramp.u0[0], ramp.p0[0], ramp.u1[last], ramp.p1[last]) =
@@ -119,9 +110,9 @@ impl JerkProfile {
     /// Appends sections that are cut at the knots. Arc lengths far along a path have too few digits for sections of
     /// some nanometres. So the sections of a part follow one another from both of its ends by their own lengths, and
     /// the longest section takes the rounding. The duration of each is corrected for the length between its parameters.
-    fn push_spans<const M: usize>(&mut self, problem: &Problem<M>, path: &ArcLengthPath<M>, spans: &[Span]) {
+    fn push_spans<const M: usize>(&mut self, path: &ArcLengthPath<M>, spans: &[Span]) {
         for spans in spans.chunk_by(|a, b| a.part == b.part) {
-            problem.watch.check_at(spans[0].part);
+            path.problem.watch.check_at(spans[0].part);
             let (part, last) = (spans[0].part, spans.len());
             let longest =
                 (0..last).fold(0, |most, i| if spans[i].length() > spans[most].length() { i } else { most });
@@ -143,7 +134,7 @@ impl JerkProfile {
                 let duration = span.duration + if keeps { 0.0 } else { moved / fastest };
                 let movement =
                     Movement { law: PhaseLaw::PathJerk, value: span.jerk, ends: span.ends, duration };
-                self.push(problem, path.parts[part].piece, u, &movement);
+                self.push(path, part, u, &movement);
             }
         }
     }

@@ -3,7 +3,6 @@
 
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::phase_law::PhaseLaw;
-use feedplan_planner::problem::Problem;
 
 use super::{JerkProfile, Movement, State};
 use crate::arc_length_path::ArcLengthPath;
@@ -30,38 +29,36 @@ impl JerkProfile {
     /// from both ends of the profile; the longest phase, in which they show least, takes their difference.
     pub fn push_profile<const M: usize>(
         &mut self,
-        problem: &Problem<M>,
         path: &ArcLengthPath<M>,
         jerk_limits: &[f64; M],
         profile: &Profile,
     ) {
-        let ways = ways_between(problem, path, &profile.s);
+        let ways = ways_between(path, &profile.s);
         let ramp_ways = [0, 1].map(|end| Way::of_ramp(path, profile, end));
         let (mut states, meeting, off) = moved_states(profile, &ways, &ramp_ways);
         let ramps = [0, 1].map(|end| {
             movement_on_ramp(profile, end, ramp_ways[end].as_ref(), &mut states[[0, ways.len()][end]])
         });
-        self.push_ramp(problem, path, &ramp_ways[0], &ramps[0]);
+        self.push_ramp(path, &ramp_ways[0], &ramps[0]);
         for (n, way) in ways.iter().enumerate() {
-            problem.watch.check_at(n);
+            path.problem.watch.check_at(n);
             let off = if n == meeting { off } else { 0.0 };
             let ends = [states[n], states[n + 1]];
             let movement = movement_between(path, jerk_limits, way.part, (way.length, off), ends);
-            self.push(problem, path.parts[way.part].piece, way.u, &movement);
+            self.push(path, way.part, way.u, &movement);
         }
-        self.push_ramp(problem, path, &ramp_ways[1], &ramps[1]);
+        self.push_ramp(path, &ramp_ways[1], &ramps[1]);
     }
 
     fn push_ramp<const M: usize>(
         &mut self,
-        problem: &Problem<M>,
         path: &ArcLengthPath<M>,
         way: &Option<Way>,
         ramp: &Option<Movement>,
     ) {
         match (ramp, way) {
-            (Some(ramp), Some(way)) => self.push(problem, path.parts[way.part].piece, way.u, ramp),
-            (Some(ramp), None) => self.push_jerk(problem, path, ramp.ends, ramp.value, ramp.duration),
+            (Some(ramp), Some(way)) => self.push(path, way.part, way.u, ramp),
+            (Some(ramp), None) => self.push_jerk(path, ramp.ends, ramp.value, ramp.duration),
             (None, _) => {}
         }
     }
@@ -90,11 +87,11 @@ impl Way {
 }
 
 /// The ways between neighbouring stations; the knots between them are stations.
-fn ways_between<const M: usize>(problem: &Problem<M>, path: &ArcLengthPath<M>, s: &[f64]) -> Vec<Way> {
+fn ways_between<const M: usize>(path: &ArcLengthPath<M>, s: &[f64]) -> Vec<Way> {
     let (knots, mut part) = (path.knots(), path.part(s[0]));
     let mut ways: Vec<Way> = Vec::with_capacity(s.len() - 1);
     for ends in s.windows(2) {
-        problem.watch.check_at(ways.len());
+        path.problem.watch.check_at(ways.len());
         while knots[part + 1] <= ends[0] && part + 1 < path.parts.len() {
             part += 1;
         }

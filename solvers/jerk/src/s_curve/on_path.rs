@@ -63,7 +63,7 @@ pub fn plan<const M: usize>(
     over_subruns(problem, jerk, |subrun, limits, watch| {
         let path = ArcLengthPath::new(problem, &subrun.parts);
         match quickest(problem, &path, subrun, limits, (cuttings, look_ahead), watch)? {
-            Some(own) => Ok(along(problem, &path, limits, &own.sections)),
+            Some(own) => Ok(along(&path, limits, &own.sections)),
             None => Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.subrun(subrun),
         }
     })
@@ -100,7 +100,7 @@ pub fn of_sections<const M: usize>(
         match own.and_then(|(&from, &to)| sections.get(from..to)).filter(|own| !own.is_empty()) {
             Some(own) => {
                 watch.advance(1);
-                Ok(along(problem, &ArcLengthPath::new(problem, &subrun.parts), limits, own))
+                Ok(along(&ArcLengthPath::new(problem, &subrun.parts), limits, own))
             }
             None => {
                 let effort = Effort { watch, ..Effort::default() };
@@ -111,14 +111,9 @@ pub fn of_sections<const M: usize>(
 }
 
 /// The phases of sections from rest to rest, and the junctions that limit the speed.
-fn along<const M: usize>(
-    problem: &Problem<M>,
-    path: &ArcLengthPath<M>,
-    limits: &Limits<M>,
-    sections: &[Section],
-) -> JerkProfile {
+fn along<const M: usize>(path: &ArcLengthPath<M>, limits: &Limits<M>, sections: &[Section]) -> JerkProfile {
     let mut phases = JerkProfile::default();
-    phases.push_sections(problem, path, sections, SegmentEnd::moving(0.0));
+    phases.push_sections(path, sections, SegmentEnd::moving(0.0));
     let mut next = 0;
     for Junction { cap, jumps } in path.junctions(&limits.jerk) {
         while next + 1 < sections.len() && sections[next + 1].position <= cap.s {
