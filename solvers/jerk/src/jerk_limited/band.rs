@@ -178,7 +178,7 @@ impl Band {
         true
     }
 
-    /// Scales the matrix to a unit diagonal. An element that is not positive makes numbers that are none.
+    /// Scales the matrix to a unit diagonal. A diagonal element that is not positive leads to NaN, which `Pivot::new` refuses.
     #[inline(always)]
     fn rescale(&mut self) {
         let count = self.intervals + 1;

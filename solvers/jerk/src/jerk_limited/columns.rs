@@ -106,3 +106,40 @@ fn eight(column: &[f64], at: usize) -> Lanes {
 pub fn store<S: Simd>(column: &mut [f64], at: usize, values: Register<S>) {
     column[at..at + LANES].copy_from_slice(&values.values());
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{dispatch, Level};
+
+    use super::*;
+
+    const LIVE: Lanes = Lanes::new([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+
+    #[test]
+    fn lanes_without_an_interval_see_nothing_of_the_last_station() {
+        let spline = Columns::new(&[4.0, 7.0, 5.0, 8.0, 6.0, 9.0]);
+        let u = dispatch!(Level::new(), simd => {
+            spline.local(0, Register::all(simd, 2.0), LIVE).map(Register::values)
+        });
+        let at = |lane: usize| u.map(|values| values[lane]);
+        assert_eq!([at(0), at(1)], [[4.0, 14.0, 5.0, 16.0], [5.0, 16.0, 6.0, 18.0]]);
+        for lane in 2..LANES {
+            assert_eq!(at(lane), [1.0, 0.0, 1.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn a_station_has_the_terms_of_the_intervals_on_both_sides_of_it() {
+        let mut terms = Terms::default();
+        terms.resize(2);
+        dispatch!(Level::new(), simd => {
+            let h = Register::all(simd, 2.0);
+            terms.set(0, h, [1.0, 2.0, 3.0, 4.0].map(|value| Register::all(simd, value)));
+        });
+        terms.close(2);
+        let at = |station: usize| [terms.start.at(station), terms.end.at(station)];
+        assert_eq!(at(0), [[1.0, 4.0], [0.0, 0.0]]);
+        assert_eq!(at(1), [[1.0, 4.0], [3.0, 8.0]]);
+        assert_eq!(at(2), [[0.0, 0.0], [3.0, 8.0]]);
+    }
+}
