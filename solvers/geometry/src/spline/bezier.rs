@@ -158,28 +158,31 @@ fn triangle_at_four<S: Simd, const N: usize>(
     for i in 0..N {
         b[i] = Register::all(simd, numbers[i]) - anchor;
     }
-    let cut = |b: &mut [Register<S>; N], left: usize| {
-        for i in 0..left {
-            b[i] = s * b[i] + t * b[i + 1];
-        }
-    };
     let mut out = [Lanes::ZERO; 3];
     for left in (4..N).rev() {
-        cut(&mut b, left);
+        cut(&mut b[..=left], s, t);
     }
     if N > 3 {
         let steps = [b[1] - b[0], b[2] - b[1], b[3] - b[2]];
         let third = (steps[2] - steps[1]) - (steps[1] - steps[0]);
         out[2] = (third * (d * (d - 1.0) * (d - 2.0)) * (scale * scale * scale)).into();
-        cut(&mut b, 3);
+        cut(&mut b[..4], s, t);
     }
     if N > 2 {
         let second = (b[2] - b[1]) - (b[1] - b[0]);
         out[1] = (second * (d * (d - 1.0)) * (scale * scale)).into();
-        cut(&mut b, 2);
+        cut(&mut b[..3], s, t);
     }
     out[0] = ((b[1] - b[0]) * d * scale).into();
     out
+}
+
+/// A step of de Casteljau's algorithm at t = 1 − s: one number fewer.
+#[inline(always)]
+fn cut<S: Simd>(b: &mut [Register<S>], s: Register<S>, t: Register<S>) {
+    for i in 0..b.len() - 1 {
+        b[i] = s * b[i] + t * b[i + 1];
+    }
 }
 
 /// |C'|² by u, at four places.
