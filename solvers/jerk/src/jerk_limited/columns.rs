@@ -33,6 +33,11 @@ impl Columns {
         self.slope[intervals + 1..].fill(0.0);
     }
 
+    pub fn fill(&mut self, value: f64) {
+        self.w.fill(value);
+        self.slope.fill(value);
+    }
+
     pub fn take(&mut self, x: &[f64]) {
         for ((w, slope), x) in self.w.iter_mut().zip(&mut self.slope).zip(x.chunks_exact(2)) {
             (*w, *slope) = (x[0], x[1]);
@@ -89,6 +94,17 @@ impl Terms {
         store(&mut self.end.slope, at + 1, d1 * h);
     }
 
+    /// Adds a part of the terms of each station.
+    pub fn add_to(&self, out: &mut Columns, part: f64) {
+        let Self { start, end } = self;
+        let columns = [(&mut out.w, &start.w, &end.w), (&mut out.slope, &start.slope, &end.slope)];
+        for (out, start, end) in columns {
+            for ((out, start), end) in out.iter_mut().zip(start).zip(end) {
+                *out += part * (start + end);
+            }
+        }
+    }
+
     /// Takes away the terms beyond the last interval.
     #[inline(always)]
     pub fn close(&mut self, intervals: usize) {
@@ -141,5 +157,9 @@ mod tests {
         assert_eq!(at(0), [[1.0, 4.0], [0.0, 0.0]]);
         assert_eq!(at(1), [[1.0, 4.0], [3.0, 8.0]]);
         assert_eq!(at(2), [[0.0, 0.0], [3.0, 8.0]]);
+        let mut sums = Columns::default();
+        sums.resize(2, 0.0);
+        terms.add_to(&mut sums, -2.0);
+        assert_eq!([sums.at(0), sums.at(1), sums.at(2)], [[-2.0, -8.0], [-8.0, -24.0], [-6.0, -16.0]]);
     }
 }

@@ -134,31 +134,15 @@ impl<X: Model> InteriorPoint<X> {
 
     /// The predictor's right-hand side.
     pub(super) fn descend(&mut self) {
-        let Self { rhs, gradient, .. } = self;
-        let columns = [
-            (&mut rhs.w, &gradient.start.w, &gradient.end.w),
-            (&mut rhs.slope, &gradient.start.slope, &gradient.end.slope),
-        ];
-        for (rhs, start, end) in columns {
-            for ((rhs, start), end) in rhs.iter_mut().zip(start).zip(end) {
-                *rhs = -(start + end);
-            }
-        }
+        self.rhs.fill(0.0);
+        self.gradient.add_to(&mut self.rhs, -1.0);
     }
 
     /// The corrector's right-hand side: λ s of every row to `target`, and `second` times the predictor's products.
     pub(super) fn correct(&mut self, target: f64, second: f64) {
         self.descend();
         for (terms, part) in self.pulls.iter().zip([target, second]) {
-            let columns = [
-                (&mut self.rhs.w, &terms.start.w, &terms.end.w),
-                (&mut self.rhs.slope, &terms.start.slope, &terms.end.slope),
-            ];
-            for (rhs, start, end) in columns {
-                for ((rhs, start), end) in rhs.iter_mut().zip(start).zip(end) {
-                    *rhs += part * (start + end);
-                }
-            }
+            terms.add_to(&mut self.rhs, part);
         }
     }
 
