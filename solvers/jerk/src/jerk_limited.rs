@@ -20,6 +20,7 @@
 //! | `moving_axes` | the axes that move on a path |
 //! | `held` | where the feed is held, and the stretches between such places |
 //! | `speed_limit`, `lower_bound` | speeds that no motion exceeds; a lower bound on the time on the same grid |
+//! | `cases` | a closer lower bound where the relaxation leaves a wide gap |
 //! | `on_path` | the planner on the package's own paths |
 //! | `turns` | the accelerations with which lines turn back |
 //!
@@ -28,6 +29,7 @@
 //! own; the predictor and corrector are those of Mehrotra (SIAM J. Optim. 2, 1992).
 
 mod band;
+mod cases;
 mod coarse;
 mod columns;
 mod constraints;
@@ -48,6 +50,8 @@ mod newton;
 pub mod on_path;
 mod prepare;
 pub(crate) mod profile;
+#[cfg(test)]
+mod profiles;
 mod relaxed;
 pub(crate) mod rest_ramp;
 mod sides;

@@ -212,7 +212,7 @@ fn the_butterfly_holds_all_limits_near_its_bound() {
     let nurbs = Nurbs::butterfly();
     let parameters = nurbs.parameters();
     let gap = assert_curve(&ByLength::new(nurbs, &parameters, 8), 3.376);
-    assert!(gap < 0.016, "{gap}");
+    assert!(gap < 0.005, "{gap}");
 }
 
 /// Numbers in [0, 1) from a seed.

@@ -75,7 +75,7 @@ fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints, between: &Intersampl
     let row = |h: &Lanes| h.map(|h| 0.3 * h);
     let all_rows = |block: &Block| vec![row(&block.h); rows.layout().all()];
     let mut dual: Vec<Lanes> = rows.blocks.iter().flat_map(all_rows).collect();
-    for terms in lagrangian_on(simd, rows, x, x, &mut dual) {
+    for terms in lagrangian_on(simd, rows, x, x, &mut dual, &[]) {
         out.extend([terms.time, terms.fastest, terms.value]);
         out.extend(terms.slope.into_iter().chain(terms.most.concat()).chain(terms.moves));
     }

@@ -18,6 +18,8 @@
 //! The sums divide into those of windows without their overlaps (`Part`). Only at the stations where two of them meet
 //! does g have a term from each side; both are added before the box is used (`join`).
 //!
+//! Where this leaves a wide gap, a bound by cases is closer (`cases`).
+//!
 //! The bound is that of the problem on its grid: splines, limits at collocation points, the time by the 3/8 rule.
 
 use std::ops::Range;
@@ -34,7 +36,7 @@ use super::interior_point::{Effort, Outcome};
 use super::relaxed::Relaxed;
 use super::speed_limit;
 use super::window_end::WindowEnd;
-use super::working_space::InteriorPoint;
+use super::working_space::{EndRow, InteriorPoint};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
 /// How the solution of the relaxation begins and ends.
@@ -64,21 +66,41 @@ const BALANCES: usize = 8;
 const ROUNDING: f64 = 1e-9;
 
 /// The bound on the intervals of a window without its overlaps: at least `least` + Σ price · (w, w') at both ends.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Part {
     /// The time of the plan, and at the greatest speeds, by the 3/8 rule, in s.
-    time: f64,
-    fastest: f64,
+    pub time: f64,
+    pub fastest: f64,
     /// In s.
-    least: f64,
+    pub least: f64,
     /// Prices of (w, w') at both ends, 0 at those of the path.
-    price: [[f64; 2]; 2],
+    pub price: [[f64; 2]; 2],
     /// Least and greatest w and w' at both ends.
-    boxes: [[[f64; 2]; 2]; 2],
+    pub boxes: [[[f64; 2]; 2]; 2],
+}
+
+impl Part {
+    /// The bound of the intervals `core` for the states of the spline x at both their ends, in s.
+    pub fn at(&self, x: &[f64], core: &Range<usize>) -> f64 {
+        let cost = |end: usize, n: usize| self.price[end][0] * x[2 * n] + self.price[end][1] * x[2 * n + 1];
+        self.least + cost(0, core.start) + cost(1, core.end)
+    }
 }
 
 /// A lower bound from the parts along a path, as a part of the plan's time; NaN where they prove none above 0.
 pub fn join(parts: &[Part]) -> f64 {
+    let whole = joined(parts);
+    // At very low feeds rounding leaves the multipliers few digits; the greatest speeds need none.
+    let part = whole.least.max(whole.fastest) / whole.time;
+    if part > 0.0 && part < 1.0 + ROUNDING {
+        part.min(1.0)
+    } else {
+        f64::NAN
+    }
+}
+
+/// The part that neighbours make together.
+pub(super) fn joined(parts: &[Part]) -> Part {
     let mut least: f64 = parts.iter().map(|part| part.least).sum();
     for pair in parts.windows(2) {
         for i in 0..2 {
@@ -87,13 +109,13 @@ pub fn join(parts: &[Part]) -> f64 {
             least += lowest(pair[0].price[1][i] + pair[1].price[0][i], both);
         }
     }
-    // At very low feeds rounding leaves the multipliers few digits; the greatest speeds need none.
-    let fastest: f64 = parts.iter().map(|part| part.fastest).sum();
-    let part = least.max(fastest) / parts.iter().map(|part| part.time).sum::<f64>();
-    if part > 0.0 && part < 1.0 + ROUNDING {
-        part.min(1.0)
-    } else {
-        f64::NAN
+    let [first, last] = [&parts[0], &parts[parts.len() - 1]];
+    Part {
+        time: parts.iter().map(|part| part.time).sum(),
+        fastest: parts.iter().map(|part| part.fastest).sum(),
+        least,
+        price: [first.price[0], last.price[1]],
+        boxes: [first.boxes[0], last.boxes[1]],
     }
 }
 
@@ -119,13 +141,20 @@ pub struct Planned<'a> {
     pub solved: &'a InteriorPoint<Exact>,
 }
 
-/// The part of the intervals `core` of a window.
+/// A solution x of the relaxation that is not beside the plan, with the limits under the speeds of `speed_limit`.
+pub struct Solution {
+    pub rows: Constraints,
+    pub x: Vec<f64>,
+}
+
+/// The part of the intervals `core` of a window, with the solution of the relaxation unless it is beside the plan; its
+/// multipliers stay in `space`.
 pub fn part(
     planned: &Planned,
-    core: Range<usize>,
+    core: &Range<usize>,
     effort: &Effort,
     space: &mut InteriorPoint<Relaxed>,
-) -> Part {
+) -> (Part, Option<Solution>) {
     loosen(planned, &mut space.state.dual);
     let tight = excess(planned.rows, &space.state.dual) <= TIGHT;
     let starts = if tight { &[NEAR, FAR][..] } else { &[FAR] };
@@ -165,12 +194,24 @@ pub fn part(
             break;
         }
     }
-    let (mut best, mut loss) = tangent(planned, &core, &x, space);
+    let part = balanced(planned, core, ends, &mut x, space);
+    (part, lowered.map(|rows| Solution { rows, x }))
+}
+
+/// The part by the solution x of the relaxation, whose multipliers are balanced.
+pub(super) fn balanced(
+    planned: &Planned,
+    core: &Range<usize>,
+    ends: [WindowEnd; 2],
+    x: &mut [f64],
+    space: &mut InteriorPoint<Relaxed>,
+) -> Part {
+    let (mut best, mut loss) = tangent(planned, core, x, space);
     for _ in 0..BALANCES {
-        if loss <= LOSS * best.time || !space.settle(planned.rows, &ends, &mut x) {
+        if loss <= LOSS * best.time || !space.settle(planned.rows, &ends, x) {
             break;
         }
-        let (part, less) = tangent(planned, &core, &x, space);
+        let (part, less) = tangent(planned, core, x, space);
         if less < loss {
             (best, loss) = (part, less);
         }
@@ -185,14 +226,38 @@ fn tangent(
     x: &[f64],
     space: &mut InteriorPoint<Relaxed>,
 ) -> (Part, f64) {
+    let terms = terms(planned, x, space);
+    sum(planned, core, x, &terms, &space.ends)
+}
+
+/// The terms of all intervals of a window at x; the multipliers are made admissible.
+pub(super) fn terms(planned: &Planned, x: &[f64], space: &mut InteriorPoint<Relaxed>) -> Vec<Terms> {
+    let Planned { rows, x: plan, .. } = *planned;
+    let InteriorPoint { state, model: Relaxed { chord, prices, .. }, .. } = space;
+    let mut terms = lagrangian(rows, plan, x, &mut state.dual, chord);
+    for (end, (own, n)) in prices.iter().zip([0, rows.count() - 1]).enumerate() {
+        let at = 2 * (n + end);
+        terms[n].value += own.of([x[at], x[at + 1]]);
+        terms[n].slope[2 * end] += own.price[0];
+        terms[n].slope[2 * end + 1] += own.price[1] / rows.h(n);
+    }
+    terms
+}
+
+/// The part of some intervals from their terms at x, and what the boxes take from it, in s.
+pub(super) fn sum(
+    planned: &Planned,
+    core: &Range<usize>,
+    x: &[f64],
+    terms: &[Terms],
+    end_rows: &[Option<EndRow>; 2],
+) -> (Part, f64) {
     let Planned { rows, at_ends, x: plan, .. } = *planned;
-    let whole = x;
     let x = &x[2 * core.start..2 * core.end + 2];
     let (mut time, mut fastest, mut least) = (0.0, 0.0, 0.0);
     let mut slope = vec![0.0; x.len()];
     let mut boxes = [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1);
     let mut change = Vec::with_capacity(core.len());
-    let terms = lagrangian(rows, plan, whole, &mut space.state.dual);
     for n in core.clone() {
         let (own, h) = (&terms[n], rows.h(n));
         let from = 2 * (n - core.start);
@@ -213,7 +278,7 @@ fn tangent(
         let (at, sign) = (end * last, if end == 0 { 1.0 } else { -1.0 });
         match planned.ends[end] {
             WindowEnd::Rest { ramp, greatest } => {
-                let dual = space.ends[end].map_or(0.0, |row| row.dual);
+                let dual = end_rows[end].map_or(0.0, |row| row.dual);
                 let w = x[at];
                 time += ramp.way() / plan[end * (plan.len() - 2)].sqrt();
                 fastest += ramp.way() / greatest.sqrt();
@@ -263,7 +328,7 @@ fn excess(rows: &Constraints, dual: &[Lanes]) -> f64 {
 }
 
 /// c less the multipliers of jerk at collocation point p of intervals of length h.
-fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> Lanes {
+pub(super) fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> Lanes {
     let mut rest = h.map(|h| MASS[p] * h);
     for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
         for row in &of_axis[2..] {
@@ -276,7 +341,7 @@ fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> Lanes {
 }
 
 /// Takes the multipliers of the limits as they are that pull like those of the tightened limits.
-fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
+pub(super) fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
     out.clone_from(&planned.solved.state.dual);
     let scale = |dual: &mut Lanes, tight: &Lanes, own: &Lanes| {
         for (lane, dual) in dual.values_mut().iter_mut().enumerate() {
@@ -308,7 +373,7 @@ fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
 
 /// What the bound takes from an interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Terms {
+pub struct Terms {
     /// The times of the plan and at the greatest speeds, in s.
     pub time: f64,
     pub fastest: f64,
@@ -321,9 +386,15 @@ pub(super) struct Terms {
     pub moves: [f64; 2],
 }
 
-/// The terms of all intervals at a spline x; the multipliers are made admissible.
-fn lagrangian(rows: &Constraints, plan: &[f64], x: &[f64], dual: &mut [Lanes]) -> Vec<Terms> {
-    dispatch!(Level::new(), simd => lagrangian_on(simd, rows, plan, x, dual))
+/// The terms of all intervals at a spline x, without prices; the multipliers are made admissible.
+fn lagrangian(
+    rows: &Constraints,
+    plan: &[f64],
+    x: &[f64],
+    dual: &mut [Lanes],
+    chord: &[[Lanes; COUNT]],
+) -> Vec<Terms> {
+    dispatch!(Level::new(), simd => lagrangian_on(simd, rows, plan, x, dual, chord))
 }
 
 #[inline(always)]
@@ -333,6 +404,7 @@ pub(super) fn lagrangian_on<S: Simd>(
     plan: &[f64],
     x: &[f64],
     dual: &mut [Lanes],
+    chord: &[[Lanes; COUNT]],
 ) -> Vec<Terms> {
     let [plan, x] = [plan, x].map(Columns::new);
     let layout = rows.layout();
@@ -356,7 +428,16 @@ pub(super) fn lagrangian_on<S: Simd>(
             for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
                 jerk += of_axis[2].load(simd) + of_axis[3];
             }
-            // The Lagrangian is bounded below in y only if the multipliers of its rows add up to its cost.
+            // The Lagrangian is bounded below in y only if the multipliers of jerk add up to its cost at most; the multiplier
+            // of a chord adds to the cost.
+            let chord = chord.get(b).map_or(Lanes::ZERO, |chord| chord[p]);
+            let speed = dual[layout.speed()].values_mut().iter_mut();
+            for ((speed, chord), over) in speed.zip(chord.values()).zip((jerk - cost).values()) {
+                if *chord > 0.0 {
+                    *speed = speed.max(over / chord);
+                }
+            }
+            let cost = cost + dual[layout.speed()].load(simd) * chord;
             let most = cost * jerk.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
             let fit = Register::all(simd, 1.0).min(most);
             let mut fixed = -dual[layout.speed()].load(simd);
@@ -421,126 +502,18 @@ fn narrow(change: &[[f64; 2]], boxes: &mut [[f64; 2]]) {
 #[cfg(test)]
 mod tests {
     use super::super::hermite::local;
-    use super::super::prepare::Prepared;
-    use super::super::window::{ramps, Window};
+    use super::super::profiles::{around, planned, random, relaxed_times, Winding};
+    use super::super::window::ramps;
     use super::*;
-    use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
-    use feedplan_geometry::watch::Watch;
 
-    /// A plane curve that turns to both sides ever more sharply.
-    struct Winding {
-        knots: [f64; 2],
-        turn: f64,
-    }
-
-    impl Geometry<2> for Winding {
-        fn knots(&self) -> &[f64] {
-            &self.knots
-        }
-
-        fn at(&self, _: usize, s: f64) -> PathPoint<2> {
-            let (angle, rate, change) = (self.turn * s.sin(), self.turn * s.cos(), -self.turn * s.sin());
-            let (sin, cos) = angle.sin_cos();
-            let first = [cos, sin];
-            let second = [-sin * rate, cos * rate];
-            let third = [-cos * rate * rate - sin * change, -sin * rate * rate + cos * change];
-            PathPoint { first, second, third, speed_cap: 200.0 }
-        }
-    }
-
-    /// Σ c max(w^(−1/2), |L(w)|/J) over some intervals: jerk beyond its limit takes time instead.
+    /// The time over some intervals, where jerk beyond its limit takes time instead.
     fn relaxed_time(rows: &Constraints, x: &[f64], core: &Range<usize>) -> f64 {
         relaxed_times(rows, x)[core.clone()].iter().sum()
     }
 
-    /// The same of each interval.
-    fn relaxed_times(rows: &Constraints, x: &[f64]) -> Vec<f64> {
-        let x = Columns::new(x);
-        dispatch!(Level::new(), simd => {
-            let mut times = vec![];
-            for (b, block) in rows.blocks.iter().enumerate() {
-                let h = block.h.load(simd);
-                let mut time = Register::all(simd, 0.0);
-                for p in 0..COUNT {
-                    let motion = motion(p, h.inverse(), &x.local(b, h, block.live));
-                    let mut y = pace(motion[0]);
-                    for k in 0..rows.axes() {
-                        y = y.max(rows.axis(b, p, k, motion)[1].abs());
-                    }
-                    time += y * h * MASS[p];
-                }
-                times.extend(time.values());
-            }
-            times
-        })
-    }
-
-    /// Speed profiles around a plan that keep the limits of speed and acceleration, from 1e-4 to half of it away, rough
-    /// and smooth; the ends are multiplied by the same factor as the slopes there.
-    fn around(plan: &[f64], rows: &Constraints, count: usize) -> Vec<Vec<f64>> {
-        let mut random = random();
-        let keeps = |x: &[f64]| {
-            let within = rows.utilisation(x).iter().all(|used| used[0] <= 1.0 && used[1] <= 1.0);
-            within && x.iter().step_by(2).all(|&w| w > 0.0)
-        };
-        let mut out = vec![];
-        while out.len() < count {
-            let size = 10f64.powf(-2.2 + 1.8 * random());
-            let (waves, phase) = (30.0 * (1.0 + random()), 3.0 * random());
-            let rough = random() > 0.0;
-            let last = plan.len() / 2 - 1;
-            let mut x = plan.to_vec();
-            for n in 0..=last {
-                let angle = waves * n as f64 / last as f64 + phase;
-                let factor = 1.0 - size * (1.0 + if rough { random() } else { angle.sin() });
-                x[2 * n] *= factor;
-                x[2 * n + 1] *= factor;
-                if !rough && n > 0 && n < last {
-                    let h = rows.h(n - 1) + rows.h(n);
-                    x[2 * n + 1] -= size * plan[2 * n] * angle.cos() * waves * 2.0 / (last as f64 * h);
-                }
-            }
-            // Towards rest every use of a limit falls.
-            while !keeps(&x) {
-                x.iter_mut().for_each(|x| *x *= 0.9);
-            }
-            out.push(x);
-        }
-        out
-    }
-
-    /// Numbers from −1 to 1.
-    fn random() -> impl FnMut() -> f64 {
-        let mut seed = 1u64;
-        move || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
-
-    /// Plans a path whole and calls `work` with what the bound takes, and the effort.
-    fn planned(turn: f64, work: impl Fn(&Planned, &Effort)) {
-        let limits =
-            Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
-        let geometry = Winding { knots: [0.0, 20.0], turn };
-        let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
-        let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
-        let mut window = Window::new(&limits);
-        prepared.fill(0..prepared.grid.pieces.len(), &mut window);
-        let rows = window.rows.clone();
-        let mut x = prepared.x.clone();
-        let watch = Watch::default();
-        let (tolerance, max_iterations, barrier) = (1e-7, 400, 1.0);
-        let effort = Effort { tolerance, max_iterations, deadline: None, barrier, warm: false, watch };
-        let mut exact = InteriorPoint::default();
-        window.improve(prepared.ends, &mut x, &effort, &mut exact);
-        let (tight, ends, at_ends) = (&window.rows, prepared.ends, [true; 2]);
-        work(&Planned { rows: &rows, tight, ends, at_ends, x: &x, solved: &exact }, &effort);
-    }
-
     #[test]
     fn the_lagrangian_of_any_multipliers_is_below_the_time_and_above_its_tangents() {
-        planned(2.2, |own, _| {
+        planned(&Winding::new(2.2), |own, _| {
             let mut random = random();
             let profiles = around(own.x, own.rows, 40);
             let (count, blocks) = (own.rows.count(), &own.rows.blocks);
@@ -556,7 +529,7 @@ mod tests {
                 let found: Vec<_> = profiles
                     .iter()
                     .map(|z| {
-                        let terms = lagrangian(own.rows, z, z, &mut dual.clone());
+                        let terms = lagrangian(own.rows, z, z, &mut dual.clone(), &[]);
                         for (Terms { value, .. }, time) in terms.iter().zip(relaxed_times(own.rows, z)) {
                             assert!(*value <= time + 1e-12, "{value} and {time} s");
                         }
@@ -583,10 +556,10 @@ mod tests {
     #[test]
     fn no_profile_beats_the_bound_even_if_jerk_only_costs_time() {
         for turn in [0.6, 2.2] {
-            planned(turn, |own, effort| {
+            planned(&Winding::new(turn), |own, effort| {
                 let count = own.rows.count();
                 let mut space = InteriorPoint::default();
-                let bound = part(own, 0..count, effort, &mut space).least;
+                let bound = part(own, &(0..count), effort, &mut space).0.least;
                 let times: Vec<f64> = around(own.x, own.rows, 300)
                     .iter()
                     .map(|z| relaxed_time(own.rows, z, &(0..count)) + ramps(&own.ends, z))
@@ -611,14 +584,14 @@ mod tests {
 
     #[test]
     fn parts_add_up_and_hold_for_all_speeds_at_their_ends() {
-        planned(2.2, |own, effort| {
+        planned(&Winding::new(2.2), |own, effort| {
             let count = own.rows.count();
             let mut space = InteriorPoint::default();
-            let whole = part(own, 0..count, effort, &mut space);
+            let (whole, _) = part(own, &(0..count), effort, &mut space);
             let cores = [0..count / 3, count / 3..2 * count / 3, 2 * count / 3..count];
             let parts = cores.clone().map(|core| {
                 let at_ends = [core.start == 0, core.end == count];
-                part(&Planned { at_ends, ..*own }, core, effort, &mut space)
+                part(&Planned { at_ends, ..*own }, &core, effort, &mut space).0
             });
             assert!((join(&parts) / join(&[whole]) - 1.0).abs() < 1e-6);
             let [_, Part { least, price, .. }, _] = &parts;

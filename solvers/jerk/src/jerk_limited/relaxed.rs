@@ -5,6 +5,8 @@
 //!
 //! with L(w) = q''' w + 3/2 q'' w' + 1/2 q' w'' and the weights c of the 3/8 rule. Its minimum is at most that of the
 //! true problem. y is eliminated at each point, so that Newton's matrix keeps its bandwidth.
+//!
+//! For `cases` the row of speed may limit y too, and the states at the ends may have a price.
 
 use fearless_simd::Simd;
 
@@ -13,13 +15,16 @@ use super::constraints::{Constraints, RowLayout};
 use super::forms::{fall, motion, pace, project, Local};
 use super::hermite::{COUNT, MASS};
 use super::model::Model;
-use feedplan_geometry::lanes::eight::{Lanes, Register};
+use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
 /// The variables of the relaxation at the collocation points of each block.
 pub struct Relaxed {
     pub y: Vec<[Lanes; COUNT]>,
     /// y starts above its least possible value by this part of it.
     pub above: f64,
+    /// The coefficients of y in the rows of speed, 1 − w/w_max − chord y ≥ 0; 0 beyond the given blocks.
+    pub chord: Vec<[Lanes; COUNT]>,
+    pub prices: [Price; 2],
     step: Vec<[Lanes; COUNT]>,
     trial: Vec<[Lanes; COUNT]>,
     /// w^(−1/2), as the slacks were last evaluated.
@@ -30,10 +35,42 @@ pub struct Relaxed {
     pulls: Vec<[[Lanes; 2]; COUNT]>,
 }
 
+/// An end's share of the time, price · ((w, w') − from), in s.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Price {
+    pub price: [f64; 2],
+    pub from: [f64; 2],
+}
+
+impl Price {
+    /// The share of a state.
+    pub fn of(&self, state: [f64; 2]) -> f64 {
+        (0..2).map(|i| self.price[i] * (state[i] - self.from[i])).sum()
+    }
+}
+
 impl Default for Relaxed {
     fn default() -> Self {
-        let [y, step, trial, pace] = std::array::from_fn(|_| vec![]);
-        Self { y, above: 0.1, step, trial, pace, cross: vec![], pulls: vec![] }
+        let [y, chord, step, trial, pace] = std::array::from_fn(|_| vec![]);
+        let prices = [Price::default(); 2];
+        Self { y, above: 0.1, chord, prices, step, trial, pace, cross: vec![], pulls: vec![] }
+    }
+}
+
+impl Relaxed {
+    /// Adds the prices of the ends to the gradients of their intervals.
+    #[inline(always)]
+    fn add_prices<S: Simd>(&self, simd: S, rows: &Constraints, block: usize, out: &mut [Register<S>; 4]) {
+        for (end, n) in [0, rows.count() - 1].into_iter().enumerate() {
+            if n / LANES == block {
+                let [w, slope] = self.prices[end].price;
+                for (k, price) in [w, slope / rows.h(n)].into_iter().enumerate() {
+                    let mut own = Lanes::ZERO;
+                    own.values_mut()[n % LANES] = price;
+                    out[2 * end + k] += own.load(simd);
+                }
+            }
+        }
     }
 }
 
@@ -44,6 +81,7 @@ impl Model for Relaxed {
         for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
             lanes.resize(count, [Lanes::ONE; COUNT]);
         }
+        self.chord.resize(count, [Lanes::ZERO; COUNT]);
         self.pulls.resize(count, [[Lanes::ZERO; 2]; COUNT]);
         self.cross.resize(count, [[Lanes::ONE; 4]; COUNT]);
         for (b, block) in rows.blocks.iter().enumerate() {
@@ -55,7 +93,11 @@ impl Model for Relaxed {
                 for k in 0..rows.axes() {
                     least = least.max(rows.axis(b, p, k, motion)[1].abs());
                 }
-                self.y[b][p] = (least * (1.0 + self.above)).into();
+                // Half-way to the chord at most.
+                let room = Register::all(simd, 1.0) - motion[0] * block.points[p].speed;
+                let chord = self.chord[b][p].load(simd).max(Register::all(simd, f64::MIN_POSITIVE));
+                let half = (least + room * chord.inverse()) * 0.5;
+                self.y[b][p] = (least * (1.0 + self.above)).min(half).into();
             }
         }
     }
@@ -73,6 +115,8 @@ impl Model for Relaxed {
         let pace = pace(motion[0]);
         let y = if trial { &self.trial } else { &self.y }[block][p].load(pace.simd());
         rows.slack(block, p, motion, y, y - pace, out);
+        let speed = &mut out[rows.layout().speed()];
+        *speed = (speed.load(pace.simd()) - y * self.chord[block][p]).into();
         self.pace[block][p] = pace.into();
     }
 
@@ -89,6 +133,8 @@ impl Model for Relaxed {
         let step = self.step[block][p].load(w.simd());
         let last = step + fall(self.pace[block][p].load(w.simd())) * w;
         rows.slack_step(block, p, motion, step, last, out);
+        let speed = &mut out[rows.layout().speed()];
+        *speed = (speed.load(w.simd()) - step * self.chord[block][p]).into();
     }
 
     #[inline(always)]
@@ -110,8 +156,9 @@ impl Model for Relaxed {
             let [weight, dual] = [weight, dual].map(|all| layout.of(all, 0, p));
             let mut form = rows.curvature(simd, block, p, weight);
             let (last, pace) = (weight[layout.positive()].load(simd), self.pace[block][p].load(simd));
-            let fall = fall(pace);
-            let mut cross = [last, last * fall, zero, zero];
+            let (fall, chord) = (fall(pace), self.chord[block][p].load(simd));
+            let limit = weight[layout.speed()].load(simd) * chord;
+            let mut cross = [last + limit * chord, last * fall + limit * own.points[p].speed, zero, zero];
             form[0] += last * fall * fall + dual[layout.positive()] * fall * pace * pace * 1.5;
             for ((k, weight), &[q1, q2, q3]) in
                 weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(rows.q(block, p))
@@ -137,6 +184,7 @@ impl Model for Relaxed {
             let cost = h * -MASS[p];
             project(p, per_h, &[p0 * cost, p1 * cost, p2 * cost], &mut local.gradient);
         }
+        self.add_prices(simd, rows, block, &mut local.gradient);
         local
     }
 
@@ -151,11 +199,13 @@ impl Model for Relaxed {
         which: usize,
     ) -> [Register<S>; 3] {
         let (mut pull, jerk) = rows.pull(simd, block, p, aim);
-        let last = aim[rows.layout().positive()].load(simd);
+        let layout = rows.layout();
+        let last = aim[layout.positive()].load(simd);
         pull[0] += last * fall(self.pace[block][p].load(simd));
-        self.pulls[block][p][which] = (jerk + last).into();
+        let own = jerk + last - aim[layout.speed()].load(simd) * self.chord[block][p];
+        self.pulls[block][p][which] = own.into();
         let [per, cross @ ..] = &self.cross[block][p];
-        let part = (jerk + last) * *per;
+        let part = own * *per;
         for k in 0..3 {
             pull[k] += -(part * cross[k]);
         }
@@ -207,7 +257,7 @@ impl Model for Relaxed {
             time += cost * h * block.live;
         }
         if least.least() > 0.0 {
-            time.sum()
+            time.sum() + self.prices[0].of(x.at(0)) + self.prices[1].of(x.at(rows.count()))
         } else {
             f64::INFINITY
         }

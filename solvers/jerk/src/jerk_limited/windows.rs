@@ -10,6 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::cases;
 use super::constraints::Constraints;
 use super::exact::Exact;
 use super::hermite::duration;
@@ -272,7 +273,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             let planned =
                 Planned { rows: loose, tight: &window.rows, ends: bound_ends, at_ends, x: &y, solved: exact };
             let core = core.start - range.start..core.end - range.start;
-            lower_bound::part(&planned, core, &effort, relaxed)
+            cases::part(&planned, &core, &effort, relaxed)
         });
         (y, verdict, part)
     }
