@@ -48,6 +48,11 @@ pub struct Disc {
 pub trait Integrand: Copy {
     /// f(u).
     fn at(&self, u: f64) -> f64;
+    /// f at several u.
+    #[inline(always)]
+    fn at_each<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        u.map(|u| self.at(u))
+    }
 
     /// Cauchy's estimate of f^(2n), valid for all of [a, b].
     fn disc(&self, a: f64, b: f64) -> Disc;
@@ -180,27 +185,35 @@ impl<F: Integrand> Table<'_, F> {
 #[inline]
 pub fn quadrature<F: Integrand>(f: &F, a: f64, b: f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let mut sum = 0.0;
+    let mut nodes = [middle; N];
     for i in 0..N / 2 {
-        sum += W[i] * (f.at(middle - half * X[i]) + f.at(middle + half * X[i]));
+        nodes[i] -= half * X[i];
+        nodes[N / 2 + i] += half * X[i];
+    }
+    let (values, mut sum) = (f.at_each(nodes), 0.0);
+    for i in 0..N / 2 {
+        sum += W[i] * (values[i] + values[N / 2 + i]);
     }
     half * sum
 }
 
-/// The same where [a, b] is a part of a panel of the width `panel`: fewer nodes do on a short part, because the error of a rule
-/// of m nodes shrinks with the power 2 m + 1 of the part.
+/// The same where [a, b] is a part of a panel of the width `panel`, and f(b): fewer nodes do on a short part, because the error of
+/// a rule of m nodes shrinks with the power 2 m + 1 of the part.
 #[inline]
-pub fn quadrature_of_part<F: Integrand>(f: &F, a: f64, b: f64, panel: f64) -> f64 {
+pub fn quadrature_of_part<F: Integrand>(f: &F, a: f64, b: f64, panel: f64) -> [f64; 2] {
     let (middle, half, part) = (0.5 * (a + b), 0.5 * (b - a), ((b - a) / panel).abs());
+    // Four values fill a vector.
     if part < TWO_NODES {
         let x = half * 0.577_350_269_189_625_8;
-        return half * (f.at(middle - x) + f.at(middle + x));
+        let [before, after, end, _] = f.at_each([middle - x, middle + x, b, b]);
+        return [half * (before + after), end];
     }
     if part < THREE_NODES {
         let x = half * 0.774_596_669_241_483_4;
-        return half * (5.0 * (f.at(middle - x) + f.at(middle + x)) + 8.0 * f.at(middle)) / 9.0;
+        let [before, centre, after, end] = f.at_each([middle - x, middle, middle + x, b]);
+        return [half * (5.0 * (before + after) + 8.0 * centre) / 9.0, end];
     }
-    quadrature(f, a, b)
+    [quadrature(f, a, b), f.at(b)]
 }
 
 /// N_table: the number of equal panels that integrate over `width` with an error of at most `error`; not

@@ -59,10 +59,11 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located
         }
         // From the nearer end of the bracket, once that has come near.
         let near = if u - low.u < high.u - u { low } else { high };
-        let sum = if (u - near.u).abs() < NEAR * panel {
-            near.sum + quadrature_of_part(&table.f, near.u, u, panel)
+        let (sum, rate) = if (u - near.u).abs() < NEAR * panel {
+            let [way, rate] = quadrature_of_part(&table.f, near.u, u, panel);
+            (near.sum + way, Some(rate))
         } else {
-            start.sum + quadrature(&table.f, start.u, u)
+            (start.sum + quadrature(&table.f, start.u, u), None)
         };
         let miss = (sum - s).abs();
         best = if miss < last_miss || iterations == 1 { Located { u, miss, iterations } } else { best };
@@ -71,7 +72,7 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located
             break;
         }
         let before = high.u - low.u;
-        let row = Node { u, sum, rate: table.f.at(u) };
+        let row = Node { u, sum, rate: rate.unwrap_or_else(|| table.f.at(u)) };
         if sum > s {
             high = row;
         } else {

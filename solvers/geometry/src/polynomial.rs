@@ -8,6 +8,8 @@ mod integral;
 mod parts;
 mod roots;
 
+use fearless_simd::{dispatch, Level};
+
 /// Greatest number of coefficients of any polynomial.
 pub const MOST: usize = 74;
 /// If `C` is at most this, loops run over all `C` coefficients: their number is then known to the compiler.
@@ -370,6 +372,11 @@ impl<const C: usize> Polynomial<C> {
             }
         }
         sum
+    }
+
+    /// The same in the vectors of the processor.
+    pub fn values_in_vectors<const K: usize>(&self, x: [f64; K]) -> [f64; K] {
+        dispatch!(Level::new(), _simd => self.values(x))
     }
 
     /// Whether no Bernstein coefficient, and so no value, is below `least`.

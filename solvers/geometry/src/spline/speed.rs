@@ -4,6 +4,8 @@
 //! S = h·h = s₀ + s₁z + … about m and Σ_{k>0} |s_k| ρᵏ ≤ s₀, S has no zero in |z| < ρ, so √S is analytic there and at most
 //! √(2 s₀). In the same way |ω| is at least ω(m)/2.
 
+use fearless_simd::{dispatch, Level};
+
 use super::rational::Hodograph;
 use super::{binomial, Piece, MAX_DEGREE, MAX_HODOGRAPH, MAX_SQUARE};
 use crate::arc_length::{Disc, Integrand};
@@ -152,6 +154,14 @@ impl<const M: usize> Integrand for Speed<'_, M> {
         dot(&h, &h).sqrt() / (omega * omega * self.width)
     }
 
+    #[inline]
+    fn at_each<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        match self.omega {
+            [] => dispatch!(Level::new(), _simd => lengths(self.h, self.width, u)),
+            _ => u.map(|u| self.at(u)),
+        }
+    }
+
     fn disc(&self, a: f64, b: f64) -> Disc {
         let (middle, half) = (0.5 * (a + b) / self.width, 0.5 * (b - a) / self.width);
         let n = self.h.len() - 1;
@@ -196,6 +206,33 @@ impl<const M: usize> Integrand for Speed<'_, M> {
     fn foot_error(&self, width: f64) -> f64 {
         width * (self.at_foot + self.slope * width)
     }
+}
+
+/// |h|/width of a polynomial piece at several u, in the vectors of the processor.
+#[inline(always)]
+fn lengths<const M: usize, const K: usize>(rows: &[[f64; M]], width: f64, mut u: [f64; K]) -> [f64; K] {
+    let (mut rest, mut sum) = ([1.0; K], [0.0; K]);
+    for l in 0..K {
+        u[l] /= width;
+        rest[l] -= u[l];
+    }
+    // One axis after the other: with all at once the compiler makes vectors of axes.
+    for k in 0..M {
+        let (mut h, mut power) = ([rows[0][k]; K], [1.0; K]);
+        for row in &rows[1..] {
+            for l in 0..K {
+                power[l] *= u[l];
+                h[l] = h[l] * rest[l] + power[l] * row[k];
+            }
+        }
+        for l in 0..K {
+            sum[l] += h[l] * h[l];
+        }
+    }
+    for l in 0..K {
+        sum[l] = sum[l].sqrt() / width;
+    }
+    sum
 }
 
 /// The greatest radius of a disc without singularities, in half panels; 1 if there is none.

@@ -37,6 +37,11 @@ impl Tip<'_> {
         self.square.value(u / self.width).max(0.0).sqrt()
     }
 
+    #[inline]
+    fn at_each<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        self.square.values_in_vectors(u.map(|u| u / self.width)).map(|square| square.max(0.0).sqrt())
+    }
+
     // As for |C'|: no zero of D within the disc.
     fn disc(&self, a: f64, b: f64) -> Disc {
         let (middle, half) = (0.5 * (a + b) / self.width, 0.5 * (b - a) / self.width);
@@ -75,6 +80,14 @@ impl<const M: usize> Source<'_, M> {
         match self {
             Self::Own(speed) => speed.at(u),
             Self::Tip(tip) => tip.at(u),
+        }
+    }
+
+    #[inline(always)]
+    fn at_each<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        match self {
+            Self::Own(speed) => speed.at_each(u),
+            Self::Tip(tip) => tip.at_each(u),
         }
     }
 
@@ -172,6 +185,19 @@ impl<const M: usize> Integrand for Rate<'_, M> {
         } else {
             speed / self.line.at(u).sqrt()
         }
+    }
+
+    #[inline(always)]
+    fn at_each<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        let mut rates = self.source.at_each(u);
+        // Divided by 1 nothing changes.
+        if self.line.slope != 0.0 || self.line.start != 1.0 {
+            for (rate, u) in rates.iter_mut().zip(u) {
+                let square = if self.line.slope == 0.0 { self.line.start } else { self.line.at(u) };
+                *rate /= square.sqrt();
+            }
+        }
+        rates
     }
 
     // v² loses at most half of its least value within the disc.
