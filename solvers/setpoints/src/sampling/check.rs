@@ -1,6 +1,11 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use super::path_data::PathData;
+use super::BLOCK;
 use crate::phase_motion::{flaw, PiecePath, MAX_TIP};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
@@ -43,27 +48,37 @@ pub(super) fn check<const M: usize>(
     if !offsets(phase_runs, phases.len()) {
         return Err("the profile does not belong to this path: their runs differ".into());
     }
-    for r in 0..runs {
-        let of_run = path.curve.offsets[path.runs[r]]..path.curve.offsets[path.runs[r + 1]];
-        let points = &path.curve.control[of_run];
-        let still = || points.iter().all(|point| *point == points[0]);
-        if phase_runs[r] == phase_runs[r + 1] && !still() {
-            let line = path.lines[path.runs[r]];
-            return Err(format!(
-                "line {line}: the profile has no phases in run {}: plan this path again",
-                r + 1
-            ));
+    // At least one part of each run, so that a run without phases is looked at as well.
+    let parts: Vec<(usize, Range<usize>)> = (0..runs)
+        .flat_map(|r| {
+            let (from, to) = (phase_runs[r], phase_runs[r + 1]);
+            (from..to.max(from + 1)).step_by(BLOCK).map(move |start| (r, start..to.min(start + BLOCK)))
+        })
+        .collect();
+    let first = parts.into_par_iter().find_map_first(|(r, part)| {
+        if part.is_empty() {
+            return flaw_of_nothing(path, r);
         }
         let mut piece = None;
-        for i in phase_runs[r]..phase_runs[r + 1] {
+        part.into_iter().find_map(|i| {
             watch.each(phases.len()).count(i);
             let known = phases.get(i).ok_or_else(|| format!("has the unknown kind {}", phases.kind[i]));
-            known
-                .and_then(|phase| check_phase(path, r, &phase, &mut piece))
-                .map_err(|what| format!("phase {i} of the profile {what}: plan this path again"))?;
-        }
-    }
-    Ok(())
+            let flaw = known.and_then(|phase| check_phase(path, r, &phase, &mut piece)).err();
+            flaw.map(|what| format!("phase {i} of the profile {what}: plan this path again"))
+        })
+    });
+    first.map_or(Ok(()), Err)
+}
+
+/// What is wrong with a run without phases: that it moves.
+fn flaw_of_nothing<const M: usize>(path: &PathData<M>, run: usize) -> Option<String> {
+    let of_run = path.curve.offsets[path.runs[run]]..path.curve.offsets[path.runs[run + 1]];
+    let points = &path.curve.control[of_run];
+    let moves = points.iter().any(|point| *point != points[0]);
+    moves.then(|| {
+        let line = path.lines[path.runs[run]];
+        format!("line {line}: the profile has no phases in run {}: plan this path again", run + 1)
+    })
 }
 
 /// Whether coefficients and their offsets are those of so many pieces.
