@@ -32,7 +32,9 @@ pub struct Cubic {
     speed_sq: SpeedSq,
     /// The slower end is the start.
     from_start: bool,
-    parts: Vec<Series>,
+    /// In the order of time; most phases have one.
+    first: Series,
+    others: Vec<Series>,
     /// The time of all the length, in the unit of the series.
     total: f64,
     error: f64,
@@ -45,25 +47,37 @@ impl Cubic {
         let back = || SpeedSq::between([speeds[1], speeds[0]], [-phase.a1, -phase.a0], length);
         let own = if from_start { speed_sq } else { back() };
         let unit = if phase.duration > 0.0 { phase.duration } else { 2.0 * length / (speeds[0] + speeds[1]) };
-        let (mut parts, mut x, mut time, mut width, mut error) = (Vec::new(), 0.0, 0.0, 1.0, 0.0);
-        loop {
+        let (mut others, mut time, mut x, mut width, mut error) = (Vec::new(), 0.0, 0.0, 1.0, 0.0);
+        // A series that is good from here on, or as short as any; how long it lasts, and where it ends.
+        let mut next = |time: f64, x: f64, mut width: f64| loop {
             let series = Series::new(&own, time, x, width, unit / length);
             let [end, slope] = series.at(1.0);
             let fails = series.error > ERROR || slope <= 0.0 || end > 1.0 + OVER;
-            if fails && width > SHORTEST {
-                width *= 0.5;
-                continue;
+            if !fails || width <= SHORTEST {
+                error += series.error;
+                return (series, width, end);
             }
-            error += series.error;
-            parts.push(series);
-            if end >= 1.0 - OVER || end.is_nan() || parts.len() == MOST_PARTS {
-                break;
-            }
-            (time, x, width) = (time + width, end, 2.0 * width);
+            width *= 0.5;
+        };
+        let first;
+        (first, width, x) = next(time, x, width);
+        while !(x >= 1.0 - OVER || x.is_nan() || others.len() + 1 == MOST_PARTS) {
+            time += width;
+            let series;
+            (series, width, x) = next(time, x, 2.0 * width);
+            others.push(series);
         }
-        let last = &parts[parts.len() - 1];
+        let last = others.last().unwrap_or(&first);
         let total = last.from + last.width * last.time(1.0);
-        Self { speed_sq, from_start, parts, total, error }
+        Self { speed_sq, from_start, first, others, total, error }
+    }
+
+    /// The last series that begins at a place where `has_begun` holds, or the first.
+    fn series(&self, has_begun: impl Fn(&Series) -> bool) -> &Series {
+        match self.others.partition_point(has_begun) {
+            0 => &self.first,
+            number => &self.others[number - 1],
+        }
     }
 
     /// Why nothing can follow a phase.
@@ -75,8 +89,7 @@ impl Cubic {
     /// The part of the length when these parts of the duration are done and left, and its error.
     pub fn part(&self, done: f64, left: f64) -> (Part, f64) {
         let time = self.total * if self.from_start { done } else { left };
-        let number = self.parts[1..].partition_point(|part| part.from <= time);
-        let series = &self.parts[number];
+        let series = self.series(|series| series.from <= time);
         let [share, _] = series.at((time - series.from) / series.width);
         (Part { from_start: self.from_start, share: share.clamp(0.0, 1.0) }, self.error)
     }
@@ -91,8 +104,7 @@ impl Cubic {
 
     pub fn at_part(&self, part: Part, duration: f64) -> Pace {
         let x = if part.from_start == self.from_start { part.share } else { 1.0 - part.share };
-        let number = self.parts[1..].partition_point(|part| part.x <= x);
-        let series = &self.parts[number];
+        let series = self.series(|series| series.x <= x);
         let passed = (series.from + series.width * series.time(x)) / self.total;
         let passed = passed.clamp(0.0, 1.0);
         self.pace(part, duration * if self.from_start { passed } else { 1.0 - passed })
@@ -162,7 +174,10 @@ impl Series {
         let mut count = 3;
         while count < MOST_TERMS && terms[count - 1].abs() + terms[count - 2].abs() > NOTHING {
             let k = count - 2;
-            let square: f64 = (1..k).map(|i| terms[i] * terms[k - i]).sum();
+            // Each product but that of the middle comes twice.
+            let pairs: f64 = (1..k.div_ceil(2)).map(|i| terms[i] * terms[k - i]).sum();
+            let middle = if k % 2 == 0 { terms[k / 2] * terms[k / 2] } else { 0.0 };
+            let square = 2.0 * pairs + middle;
             terms[count] = (p1 * terms[k] + p2 * square) * PER_TERM[k];
             count += 1;
         }
@@ -230,7 +245,8 @@ mod tests {
                 let (piece, axis, value, [u0, u1], [p0, p1]) = (0, 255, 0.0, [0.0, 1.0], speeds);
                 let phase = Phase { piece, law, axis, value, u0, u1, p0, p1, duration, a0, a1 };
                 let cubic = Cubic::new(&phase, speeds, length);
-                assert!(cubic.parts.len() <= most + 8 && cubic.error < 1e-12, "{}", cubic.parts.len());
+                let parts = 1 + cubic.others.len();
+                assert!(parts <= most + 8 && cubic.error < 1e-12, "{parts}");
                 for x in [0.001_f64, 0.2, 0.5, 0.9, 0.9999] {
                     let passed = if x <= 0.5 {
                         half(0.0, x.cbrt())
