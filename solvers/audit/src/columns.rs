@@ -30,6 +30,8 @@ pub struct Columns<'a, const M: usize> {
     pub limits: &'a Limits<M>,
     /// The limits of the rates, and 1 over them.
     pub rates: [[Sided<M>; 2]; 3],
+    /// 1 over the smaller of the limits of both directions.
+    pub per_least: [[f64; M]; 3],
     curves: Curves<'a, M>,
     joints: Option<Box<JointColumns<'a, M>>>,
 }
@@ -40,7 +42,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         let joints = joints.map(|of| Box::new(JointColumns::new(of)));
         let jerk = Sided { positive: limits.jerk, negative: limits.jerk };
         let rates = [limits.velocity, limits.acceleration, jerk].map(|limit| [limit, limit.inverse()]);
-        Self { path: *path, limits, rates, curves: Curves::new(path.pieces), joints }
+        let per_least = rates.each_ref().map(|[_, per]| per.greater());
+        Self { path: *path, limits, rates, per_least, curves: Curves::new(path.pieces), joints }
     }
 
     /// Number of columns.

@@ -247,6 +247,16 @@ impl<const M: usize> Curve<M> {
         vector_of(|k| slope[k] * self.per_width)
     }
 
+    /// The length of C', each axis times its scale, at several u.
+    #[inline]
+    pub fn speeds<const K: usize>(&self, u: [f64; K], scale: &[f64; M]) -> [f64; K] {
+        let (mut t, mut rest) = ([0.0; K], [0.0; K]);
+        for i in 0..K {
+            (t[i], rest[i]) = self.parts(u[i]);
+        }
+        self.hodographs.speeds(t, rest, (self.per_width, scale))
+    }
+
     /// C(u) and C'(u).
     #[inline]
     pub fn place(&self, u: f64) -> [[f64; M]; 2] {
@@ -259,8 +269,26 @@ impl<const M: usize> Curve<M> {
     #[inline]
     pub fn derivatives(&self, u: f64) -> [[f64; M]; 3] {
         let (t, rest) = self.parts(u);
-        let [_, first, second, third] = self.hodographs.derivatives(t, rest);
-        by_width([first, second, third], self.per_width)
+        by_width(self.hodographs.rates(t, rest), self.per_width)
+    }
+
+    /// The first three derivatives of each axis at several u, of a piece without weights.
+    #[inline(always)]
+    pub fn derivatives_at_each<const K: usize>(&self, u: &[f64; K]) -> [[[f64; K]; M]; 3] {
+        let (mut t, mut rest, mut scale) = ([0.0; K], [0.0; K], 1.0);
+        for i in 0..K {
+            (t[i], rest[i]) = self.parts(u[i]);
+        }
+        let mut derivatives = self.hodographs.rates_at_each(&t, &rest);
+        for derivative in &mut derivatives {
+            scale *= self.per_width;
+            for k in 0..M {
+                for i in 0..K {
+                    derivative[k][i] *= scale;
+                }
+            }
+        }
+        derivatives
     }
 
     /// What the rounding of the first three derivatives is relative to.

@@ -3,8 +3,10 @@
 //! C = P_0 + N/ω, polynomial where ω = 1. The coefficients of the derivatives of N and ω are differences of theirs; sums of
 //! positive weights of these lose no digits (scheme of Schumaker and Volk 1986). The quotient rule makes the derivatives of C.
 
+use fearless_simd::{dispatch, Level};
+
 use super::polygon::{Polygon, MOST};
-use super::vectors::{inner, vector_of};
+use super::vectors::{inner, length, vector_of};
 
 /// Coefficients of a function of the piece, times binomials.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];
@@ -131,6 +133,47 @@ impl<const M: usize> Hodographs<M> {
         }
     }
 
+    /// The length of dC/dt by u = t/`per`, each axis times its `scale`, at several t.
+    pub fn speeds<const K: usize>(
+        &self,
+        t: [f64; K],
+        rest: [f64; K],
+        (per, scale): (f64, &[f64; M]),
+    ) -> [f64; K] {
+        let factors = (per, scale);
+        if self.rational {
+            return std::array::from_fn(|i| {
+                let slope = self.slope(t[i], rest[i]);
+                length(&vector_of::<M>(|k| slope[k] * per * scale[k]))
+            });
+        }
+        dispatch!(Level::new(), _simd => lengths(&self.rows[1][..self.degree], t, rest, factors))
+    }
+
+    /// The first three derivatives by t.
+    #[inline]
+    pub fn rates(&self, t: f64, rest: f64) -> [[f64; M]; 3] {
+        if self.rational {
+            let [_, rates @ ..] = self.local::<4>(t, rest);
+            return rates;
+        }
+        let mut rates = [[0.0; M]; 3];
+        for order in 1..=self.degree.min(3) {
+            rates[order - 1] = sum(&self.rows[order][..=self.degree - order], t, rest);
+        }
+        rates
+    }
+
+    /// The first three derivatives by t of each axis at several t, of a piece without weights.
+    #[inline(always)]
+    pub fn rates_at_each<const K: usize>(&self, t: &[f64; K], rest: &[f64; K]) -> [[[f64; K]; M]; 3] {
+        let mut rates = [[[0.0; K]; M]; 3];
+        for order in 1..=self.degree.min(3) {
+            rates[order - 1] = sum_at_each(&self.rows[order][..=self.degree - order], t, rest);
+        }
+        rates
+    }
+
     /// C and its first R − 1 derivatives by t.
     #[inline]
     pub fn derivatives<const R: usize>(&self, t: f64, rest: f64) -> [[f64; M]; R] {
@@ -163,6 +206,50 @@ fn sum<const M: usize>(rows: &[[f64; M]], t: f64, rest: f64) -> [f64; M] {
         }
     }
     value
+}
+
+/// The same of each axis at several t.
+#[inline(always)]
+fn sum_at_each<const M: usize, const K: usize>(
+    rows: &[[f64; M]],
+    t: &[f64; K],
+    rest: &[f64; K],
+) -> [[f64; K]; M] {
+    let mut values = [[0.0; K]; M];
+    // One axis after the other: with all at once the compiler makes vectors of axes.
+    for k in 0..M {
+        let (mut value, mut power) = ([rows[0][k]; K], [1.0; K]);
+        for row in &rows[1..] {
+            for i in 0..K {
+                power[i] *= t[i];
+                value[i] = value[i] * rest[i] + power[i] * row[k];
+            }
+        }
+        values[k] = value;
+    }
+    values
+}
+
+/// The lengths of Σ rows_i t^i rest^(n − i) at several t, each axis times these factors, in the vectors of the processor.
+#[inline(always)]
+fn lengths<const M: usize, const K: usize>(
+    rows: &[[f64; M]],
+    t: [f64; K],
+    rest: [f64; K],
+    (per, scale): (f64, &[f64; M]),
+) -> [f64; K] {
+    let value = sum_at_each(rows, &t, &rest);
+    let mut sum = [0.0; K];
+    for k in 0..M {
+        for i in 0..K {
+            let value = value[k][i] * per * scale[k];
+            sum[i] += value * value;
+        }
+    }
+    for i in 0..K {
+        sum[i] = sum[i].sqrt();
+    }
+    sum
 }
 
 /// The coefficients, times binomials, of a function of this degree and of its first derivatives; returns the greatest lengths of

@@ -6,11 +6,12 @@
 //!
 //! The path: `vectors`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
 //! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics). The profile: `phases`, `phase_order`, `quadrature`,
-//! `phase_motion`, `speed_by_length`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
+//! `phase_motion`, `speed_by_length`, `bulge`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
 //! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Loops: `parallel`. Other crates call `kernels`.
 
 mod against_plan;
 mod arc_slope;
+mod bulge;
 mod chord;
 mod close_places;
 mod columns;
@@ -244,6 +245,12 @@ impl<const M: usize> Tally<M> {
     pub fn is_passed(&self, check: Check, axis: usize, most: f64, limit: f64) -> bool {
         let known = self.worst[check as usize][axis].ratio;
         known >= 0.0 && most <= known * limit
+    }
+
+    /// The worst ratio of each axis.
+    #[inline(always)]
+    pub fn ratios(&self, check: Check) -> [f64; M] {
+        vectors::vector_of(|k| self.worst[check as usize][k].ratio)
     }
 
     /// The same of value, limit and their ratio.

@@ -14,9 +14,7 @@ pub struct Peak {
 #[inline(always)]
 pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<Peak> {
     let (bend, slope) = (2.0 * b - a - c, c - a);
-    // Neither the vertex nor what it may have missed adds more than half of `bend`, and all of it: most rates are far below.
-    let is_far_below = b.abs() + 1.5 * bend.abs() < worst;
-    if is_far_below || slope.abs() >= 2.0 * bend.abs() {
+    if is_far_below([a, b, c], worst) || slope.abs() >= 2.0 * bend.abs() {
         return None;
     }
     let top = b + slope * slope / (8.0 * bend);
@@ -25,6 +23,23 @@ pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<Peak> {
     let missed = bend * bend / most;
     let peak = Peak { at: 0.5 * slope / bend, top };
     (top.abs() + missed > (1.0 + NEGLIGIBLE) * most).then_some(peak)
+}
+
+/// Whether no peak of the share is beyond the `worst` so far, however the three bend: neither the vertex nor what it may have missed
+/// adds more than half of the bend, and all of it.
+#[inline(always)]
+fn is_far_below([a, b, c]: [f64; 3], worst: f64) -> bool {
+    b.abs() + 1.5 * (2.0 * b - a - c).abs() <= worst
+}
+
+/// The same of all axes: most shares are far below.
+#[inline(always)]
+pub fn are_far_below<const M: usize>([a, b, c]: [&[f64; M]; 3], worst: &[f64; M]) -> bool {
+    let mut all = true;
+    for k in 0..M {
+        all &= is_far_below([a[k], b[k], c[k]], worst[k]);
+    }
+    all
 }
 
 impl Peak {

@@ -5,11 +5,12 @@
 
 use std::rc::Rc;
 
+use super::bulge::{bulge, Bulge, Known};
 use super::curve::Curve;
 use super::quadrature::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
-use super::speed_by_length::{Bounds, Pace, SpeedByLength};
+use super::speed_by_length::{Pace, SpeedByLength};
 use super::station::Station;
-use super::vectors::{inner, length, times};
+use super::vectors::inner;
 use super::{EPS, ROUNDINGS};
 
 /// An interval on which the rule is good: the distance of its start from the anchor and the length up to there, and the same of
@@ -28,15 +29,6 @@ pub struct Place {
     pub way: f64,
     pub pace: Pace,
     time: Option<f64>,
-}
-
-/// How far, at most, velocity, acceleration, jerk and dT/ds between two places are as vectors from the straight line between
-/// those of the two, and the greatest speed along the path.
-#[derive(Clone, Copy, Debug)]
-pub struct Bulge {
-    pub rates: [f64; 3],
-    pub curvature: f64,
-    pub most_speed: f64,
 }
 
 /// A phase ready to be evaluated at any u.
@@ -74,15 +66,18 @@ impl<const M: usize> PhaseByLength<M> {
         phase
     }
 
-    /// |C'| at a distance from the anchor, as the axes count.
-    fn slope(&self, d: f64) -> f64 {
-        let tangent = self.curve.derivative(if self.anchored_at_end { self.u[1] - d } else { self.u[0] + d });
-        length(&times(&self.scale, &tangent))
+    /// |C'| at distances from the anchor, as the axes count.
+    #[inline(always)]
+    fn slopes<const K: usize>(&self, mut at: [f64; K]) -> [f64; K] {
+        for d in &mut at {
+            *d = if self.anchored_at_end { self.u[1] - *d } else { self.u[0] + *d };
+        }
+        self.curve.speeds(at, &self.scale)
     }
 
     /// Adds the lengths of parts between two distances from the anchor.
     fn measure(&mut self, from: f64, to: f64, halvings: &mut u32) {
-        let ([fine, doubt], half) = kronrod_halves(|d| self.slope(d), from, to);
+        let ([fine, doubt], half) = kronrod_halves(|d| self.slopes(d), from, to);
         let middle = 0.5 * (from + to);
         let good = doubt.abs() <= RULES_AGREE * fine;
         if good || *halvings == 0 || !(from < middle && middle < to) {
@@ -113,7 +108,7 @@ impl<const M: usize> PhaseByLength<M> {
             self.whole[1]
         } else if d > from + EPS * self.u[1] {
             // On half of an interval Gauss's rule is closer than it was on the whole one.
-            before + gauss(|d| self.slope(d), from, d)
+            before + gauss(|d| self.slopes(d), from, d)
         } else {
             before
         };
@@ -152,61 +147,24 @@ impl<const M: usize> PhaseByLength<M> {
     }
 
     /// What is known of the places between two, in the order of travel; nothing where |C'| has no bound.
-    ///
-    /// On an interval of length h a function is off the straight line between its ends by no more than h²/8 times its greatest
-    /// second derivative. With g = |C'| and T = C'/g all derivatives by u follow from the bounds of those of C: T·T' = 0, so
-    /// g' = T·C'', gT' = C'' − g'T, and so on, each by the ones before; then K = T'/g, dK/ds = K'/g.
-    pub fn bulge(&self, [from, to]: [&Place; 2], known: [&Station<M>; 2]) -> Option<Bulge> {
-        let [m2, m3, m4, m5] = self.curve.bounds();
-        let h = to.u - from.u;
-        let [near, far] = known;
-        let g = near.slope.min(far.slope) - 0.5 * m2 * h;
-        if g.is_nan() || g <= 0.0 {
-            return None;
-        }
-        let per = 1.0 / g;
-        let t1 = m2 * per;
-        let t2 = (m3 + 3.0 * m2 * t1) * per;
-        let g2 = m3 + m2 * t1;
-        let t3 = (m4 + 4.0 * m2 * t2 + (2.0 * m3 + 3.0 * g2) * t1) * per;
-        let g3 = m4 + m2 * t2 + 2.0 * m3 * t1;
-        let t4 = (m5 + 5.0 * m2 * t3 + (3.0 * m3 + 6.0 * g2) * t2 + (3.0 * m4 + 4.0 * g3) * t1) * per;
-        let r1 = t1 * per;
-        let r2 = (2.0 * m2 * r1 + g2 * per) * per;
-        let r3 = (3.0 * (m2 * r2 + g2 * r1) + g3 * per) * per;
-        let (direction, inverse) = (Bounds([1.0, t1, t2]), Bounds([per, r1, r2]));
-        let mut bend = Bounds([t1, t2, t3]).times(inverse);
-        let third = t4 * per + 3.0 * (t3 * r1 + t2 * r2) + t1 * r3;
-        let mut change = Bounds([bend.0[1], bend.0[2], third]).times(inverse);
-        let eighth = 0.125 * h * h;
+    pub fn bulge(&self, [from, to]: [&Place; 2], [near, far]: [&Station<M>; 2]) -> Option<Bulge> {
         let most = |a: &[f64; M], b: &[f64; M]| inner(a, a).max(inner(b, b)).sqrt();
-        let curvature = eighth * bend.0[2];
-        bend.0[0] = bend.0[0].min(most(&near.second, &far.second) + curvature);
-        change.0[0] = change.0[0].min(most(&near.third, &far.third) + eighth * change.0[2]);
-        let steepest = near.slope.max(far.slope) + 0.5 * m2 * h;
-        let way = (to.way - from.way).abs();
-        let [v, a, j] =
-            self.speed.bounds([&from.pace, &to.pace], way).map(|by_length| by_length.at(steepest, m2));
-        let square = v.times(v);
-        let bulge = |of: Bounds| eighth * of.0[2];
-        Some(Bulge {
-            rates: [
-                bulge(direction.times(v)),
-                bulge(direction.times(a)) + bulge(bend.times(square)),
-                bulge(direction.times(j))
-                    + 3.0 * bulge(bend.times(v.times(a)))
-                    + bulge(change.times(square.times(v))),
-            ],
-            curvature,
-            most_speed: v.0[0],
-        })
+        let known = Known {
+            interval: to.u - from.u,
+            slopes: [near.slope.min(far.slope), near.slope.max(far.slope)],
+            second: most(&near.second, &far.second),
+            third: most(&near.third, &far.third),
+            paces: [&from.pace, &to.pace],
+            way: (to.way - from.way).abs(),
+        };
+        bulge(self.curve.bounds(), &self.speed, &known)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vectors::{distance, vector_of};
+    use crate::vectors::{distance, length, vector_of};
 
     #[test]
     fn at_rest_where_the_tangent_vanishes_the_length_starts_with_the_cube_of_the_time() {

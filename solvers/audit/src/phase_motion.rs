@@ -270,7 +270,7 @@ impl<const M: usize> PhaseMotion<M> {
                     let u = u + way * y * (2.0 * near + (far - near) * y) / (near + far);
                     columns.held_slope(a.place.piece, u, &self.share)[0]
                 };
-                let whole = integral(&mut slope, 0.0, 1.0, &mut { MOST_HALVINGS });
+                let whole = integral(&mut |y: [f64; 8]| y.map(&mut slope), 0.0, 1.0, &mut { MOST_HALVINGS });
                 [2.0 * step / (near + far) * whole, rounding]
             }
         }

@@ -4,7 +4,6 @@ use super::columns::Columns;
 use super::curve::Followed;
 use super::phase_by_length::PhaseByLength;
 use super::speed_by_length::{Pace, SpeedByLength};
-use super::vectors::{length, times};
 use super::{EPS, ROUNDINGS};
 
 /// The profile's arrays, one entry a phase; see `feedplan.profile.SpeedProfile`.
@@ -139,7 +138,7 @@ impl Phases<'_> {
         }
         let (kind, piece, u) = (self.kind[i], self.piece[i] as usize, [self.u0[i], self.u1[i]]);
         let (scale, curve) = (columns.scale(), columns.curve(piece).clone());
-        let slopes = u.map(|u| length(&times(&scale, &curve.derivative(u))));
+        let slopes = curve.speeds(u, &scale);
         let mut speeds = [slopes[0] * self.p0[i].sqrt(), slopes[1] * self.p1[i].sqrt()];
         // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
         let anchored_at_end = kind != FEED && speeds[1] < speeds[0];

@@ -2,8 +2,9 @@
 //!
 //! On a phase whose p is known by the parameter the velocities of all columns are taken at some ten places, closer together where p
 //! changes fast and very close at both ends, where accelerations have their extremes. Between two places the acceleration is the
-//! difference of the velocities over the time, less what the errors of both can add. Phases by length: `by_length`.
+//! difference of the velocities over the time, less what the errors of both can add. Phases by length: `at_once`, `by_length`.
 
+mod at_once;
 mod by_length;
 
 use super::chord::chord_error;
@@ -12,10 +13,11 @@ use super::parallel;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{self, PhaseMotion, State};
 use super::phase_order::PhaseOrder;
-use super::phases::Phases;
+use super::phases::{Phases, SPEED_CUBIC};
 use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
+use at_once::{Places, PLACES};
 use by_length::{Look, Looker};
 
 /// Even intervals of a phase.
@@ -61,11 +63,18 @@ pub fn audit_profile<'a, const M: usize>(
         let mut columns = columns();
         let good = |i: usize| phases.has_good_numbers(i, columns.count());
         let (mut is_good, mut last) = (block.start > 0 && good(block.start - 1), None);
+        let begun = phases.runs.partition_point(|&first| first < block.start as i64);
+        let mut runs = phases.runs[begun..].iter().peekable();
         for i in block {
             tell(seen, i);
             let was_good = std::mem::replace(&mut is_good, of.phase(i, &mut columns, &mut last, tally));
+            // Of runs without a phase several begin at once.
+            let mut begins = false;
+            while runs.next_if_eq(&&(i as i64)).is_some() {
+                begins = true;
+            }
             // What has no good numbers is reported with the phase itself.
-            if i > 0 && was_good && is_good && phases.runs.binary_search(&(i as i64)).is_err() {
+            if i > 0 && was_good && is_good && !begins {
                 of.joint([i - 1, i], &mut columns, tally);
             }
         }
@@ -99,6 +108,12 @@ impl<const M: usize> Audited<'_, M> {
             return true;
         }
         let width_rounding = EPS * width / (u[1] - u[0]);
+        if let Some(elapsed) = self.at_once(i, columns, tally) {
+            tally.samples += PLACES as u64;
+            *last = None;
+            self.duration(i, [elapsed, 0.0], width_rounding, line, tally);
+            return true;
+        }
         let by_length = phases.by_length(i, columns);
         if self.limits.judges_jerk {
             self.jerks(columns).alone(i, width_rounding, by_length.is_some(), line, tally);
@@ -158,6 +173,26 @@ impl<const M: usize> Audited<'_, M> {
         };
         self.duration(i, elapsed, width_rounding, line, tally);
         true
+    }
+
+    /// The time of a phase that cannot change the tally, where eight places of it and a bound of what lies between show that.
+    fn at_once(&self, i: usize, columns: &mut Columns<M>, tally: &Tally<M>) -> Option<f64> {
+        let (phases, piece) = (self.phases, self.phases.piece[i] as usize);
+        if phases.kind[i] != SPEED_CUBIC || !columns.are_axes() {
+            return None;
+        }
+        let curve = columns.curve(piece).clone();
+        if curve.polygon.is_rational() {
+            return None;
+        }
+        let phase = at_once::Phase {
+            u: [phases.u0[i], phases.u1[i]],
+            p: [phases.p0[i], phases.p1[i]],
+            a: [phases.a0[i], phases.a1[i]],
+        };
+        let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
+        let places = Places { curve: &curve, columns, limits: self.limits, feeds, feeds_along };
+        places.time(&phase, tally)
     }
 
     /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share

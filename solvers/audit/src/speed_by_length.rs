@@ -4,6 +4,8 @@
 //! At constant jerk the time is found by Newton's method within a bracket; where v² is a cubic polynomial of the length, it is
 //! the integral of 1/v.
 
+use fearless_simd::{dispatch, Level};
+
 use super::quadrature::{integral, MOST_HALVINGS};
 use super::EPS;
 
@@ -52,8 +54,7 @@ impl SpeedByLength {
             Self::Constant { speed } => way / speed,
             Self::Jerk { start, duration } => time_at_jerk(start, *duration, way),
             Self::Cubic { c, length } => {
-                let mut slowness = |x: f64| length / square(c, x).sqrt();
-                integral(&mut slowness, 0.0, way / length, &mut { MOST_HALVINGS })
+                integral(&mut |x| slowness(c, *length, x), 0.0, way / length, &mut { MOST_HALVINGS })
             }
         }
     }
@@ -178,6 +179,18 @@ impl Pace {
     }
 }
 
+/// `length` over the root of the square at several x, in the vectors of the processor.
+fn slowness(c: &[f64; 4], length: f64, x: [f64; 8]) -> [f64; 8] {
+    dispatch!(Level::new(), _simd => {
+        let mut slowness = [length; 8];
+        for i in 0..8 {
+            slowness[i] /= square(c, x[i]).sqrt();
+        }
+        slowness
+    })
+}
+
+#[inline(always)]
 fn square(c: &[f64; 4], x: f64) -> f64 {
     c[0] + x * (c[1] + x * (c[2] + x * c[3]))
 }

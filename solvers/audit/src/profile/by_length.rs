@@ -9,7 +9,7 @@
 use crate::chord::chord_error;
 use crate::columns::{Columns, RATES};
 use crate::curve::Curve;
-use crate::peak::{peak, Peak};
+use crate::peak::{are_far_below, peak, Peak};
 use crate::phase_by_length::{PhaseByLength, Place};
 use crate::phase_motion::ROUNDING;
 use crate::station::{Rounded, Roundings, Station};
@@ -22,7 +22,7 @@ const MOST_REFINED: u32 = 3;
 
 /// Where more than this share of a limit may be used beyond what both ends use, a parabola is not trusted; an interval is halved
 /// so often at most.
-const WIDE: f64 = 0.03;
+pub const WIDE: f64 = 0.03;
 const MOST_HALVINGS: u32 = 6;
 
 /// Shares of the limits that a place uses: velocity, acceleration and jerk of each axis with their signs, then feeds and chord
@@ -126,6 +126,9 @@ impl<const M: usize> Looker<'_, '_, M> {
     /// is not close enough: one rate after the other.
     fn refine(&mut self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
         for (row, check) in RATES.into_iter().enumerate() {
+            if are_far_below(places.map(|look| &look.used.rates[row]), &tally.ratios(check)) {
+                continue;
+            }
             for k in 0..self.columns.count() {
                 let (rate, worst) = (|used: &Use<M>| used.rates[row][k], tally.get(check, k).ratio);
                 if let Some(peak) = peak(places.map(|look| rate(&look.used)), worst) {
@@ -192,8 +195,16 @@ impl<const M: usize> Looker<'_, '_, M> {
         let rates = [velocity, station.acceleration(pace), station.jerk(pace)];
         for row in 0..if limits.judges_jerk { 3 } else { 2 } {
             let (check, value, [most, per]) = (RATES[row], &rates[row], &self.columns.rates[row]);
-            let (limit, per) = (most.of_each(value), per.of_each(value));
-            used.rates[row] = times(value, &per);
+            let (known, mut are_passed) = (tally.ratios(check), true);
+            used.rates[row] = times(value, &per.of_each(value));
+            for k in 0..M {
+                are_passed &= used.rates[row][k].abs() <= known[k];
+            }
+            // Most places use less of all limits than others that were found.
+            if are_passed {
+                continue;
+            }
+            let limit = most.of_each(value);
             for k in 0..M {
                 if tally.is_passed(check, k, value[k].abs(), limit[k]) {
                     continue;
@@ -245,37 +256,54 @@ impl<const M: usize> Looker<'_, '_, M> {
             return Between::Unbounded;
         };
         let (mut is_certain, mut is_narrow) = (true, true);
-        // By how much a rate may be greater than a use of its limit that is known.
-        let mut weigh = |check: Check, axis: usize, known: f64, more: f64, limit: f64| {
-            is_certain &= more <= (tally.get(check, axis).ratio + PASS_EXCESS - known) * limit;
-            is_narrow &= more <= WIDE * limit;
+        // A use of a limit may be beyond both ends by so much, in parts of the limit, or off the straight line between them.
+        let mut weigh = |worst: f64, known: f64, beyond: f64, off: f64| {
+            is_certain &= beyond <= worst + PASS_EXCESS - known;
+            is_narrow &= off <= WIDE;
         };
+        let worst = |check: Check| tally.get(check, 0).ratio;
         let judged = if limits.judges_jerk { 3 } else { 2 };
         let moves = self.curve.derivative_size();
-        for k in (0..limits.axes).filter(|&k| moves[k] > 0.0) {
-            let least = [limits.velocity.least(k), limits.acceleration.least(k), limits.jerk[k]];
-            for (row, check) in RATES.into_iter().enumerate().take(judged) {
+        for (row, check) in RATES.into_iter().enumerate().take(judged) {
+            let (worst, per_least) = (tally.ratios(check), &self.columns.per_least[row]);
+            for k in 0..M {
                 let [near, far] = ends.map(|used| used.rates[row][k].abs());
-                weigh(check, k, near.max(far), bulge.rates[row], least[row]);
+                let off = if moves[k] > 0.0 { bulge.rates[row] * per_least[k] } else { 0.0 };
+                weigh(worst[k], near.max(far), beyond([near, far], off), off);
             }
         }
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
             let [near, far] = ends.map(|used| used.tip[feed]);
             let known = near.max(far);
             // No share of the speed along the path is greater than that speed.
-            weigh(Check::Feed, 0, known, bulge.rates[0].min(bulge.most_speed - known * limit), limit);
+            let [off, faster] = [bulge.rates[0] / limit, bulge.most_speed / limit - known];
+            weigh(worst(Check::Feed), known, beyond([near, far], off).min(faster), off.min(faster));
         }
         if limits.chord_tolerance.is_finite() {
             let curvature = from.station.curvature.max(to.station.curvature) + bulge.curvature;
             let most = chord_error(bulge.most_speed * limits.period, curvature);
             let ([near, far], limit) = (ends.map(|used| used.tip[FEEDS]), limits.chord_tolerance);
-            weigh(Check::Chord, 0, near.max(far), most - near.max(far) * limit, limit);
+            let known = near.max(far);
+            let more = most / limit - known;
+            weigh(worst(Check::Chord), known, more, more);
         }
         match () {
             () if is_certain => Between::Certain,
             () if is_narrow => Between::Narrow,
             () => Between::Wide,
         }
+    }
+}
+
+/// How far above both ends a function may be that is off the straight line between them by no more than `off`, less towards the
+/// ends: by 4 `off` x (1 − x) at the part x of the way. Where it changes by more than 4 `off` it is greatest at an end.
+#[inline(always)]
+fn beyond([near, far]: [f64; 2], off: f64) -> f64 {
+    let steep = 4.0 * off - (far - near).abs();
+    if steep <= 0.0 {
+        0.0
+    } else {
+        steep * steep / (16.0 * off)
     }
 }
 
