@@ -119,6 +119,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         // Where the tool of joints stands still from one run to the next, each side has a chord of its own.
         let are_axes = columns.are_axes();
         let stops = |piece: usize| !are_axes && path.runs.binary_search(&(piece as i64)).is_ok();
+        let known = tally.get(Check::Feed, 0).ratio;
         let mut chord_start = tips[0];
         for piece in from.piece..=to.piece {
             let (is_first, is_last) = (piece == from.piece, piece == to.piece);
@@ -145,14 +146,28 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 }
             }
             for (feed, limit) in feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
+                // Most steps are on one piece, and no faster than what was found: their squares tell.
+                let most = known * limit * step + 2.0 * rounding;
+                if are_axes && is_first && is_last && known >= 0.0 {
+                    let way = limits.counted(feed, &from_to(&last, &next));
+                    if inner(&way, &way) <= most * most {
+                        continue;
+                    }
+                }
                 let part = columns.tip_way(piece, feed, &last, &next);
                 ways[feed] += part;
                 least_times[feed] += part / limit;
             }
         }
         for (way, least_time) in ways.into_iter().zip(least_times) {
-            let feed = if least_time > 0.0 { way / least_time } else { f64::INFINITY };
-            tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
+            // Most steps change nothing, and products are had sooner than quotients.
+            let certain = way - 2.0 * rounding;
+            let known = tally.get(Check::Feed, 0).ratio;
+            let is_passed = known >= 0.0 && certain * least_time <= known * way * step;
+            if !is_passed {
+                let feed = if least_time > 0.0 { way / least_time } else { f64::INFINITY };
+                tally.offer(Check::Feed, 0, certain / step, feed, time, line);
+            }
         }
         if has_chord {
             let certain = error_sq.sqrt() - rounding - before.nearest.off.max(row.nearest.off).max(0.0);

@@ -4,7 +4,7 @@
 //! exceeds a limit the motion does. A position is known to `EPS` of its magnitude and a time to `EPS` of its own.
 
 use super::rows::Row;
-use super::vectors::{from_to, inner, length};
+use super::vectors::{from_to, inner, length, vector_of};
 use super::{Limits, EPS, PASS_EXCESS, PASS_MARK, ROUNDINGS};
 
 /// Consecutive setpoints.
@@ -57,7 +57,7 @@ impl<const M: usize> Differences<'_, M> {
         let row = &self.rows[n];
         let before = &self.rows[n.saturating_sub(1)];
         let periods = row.t.abs() / self.limits.period;
-        let mut rounding = std::array::from_fn(|k| {
+        let mut rounding = vector_of(|k| {
             let magnitude = row.q[k].abs().max(row.nearest.magnitude);
             let way = (row.q[k] - before.q[k]).abs() * periods;
             0.5 * self.resolution + ROUNDINGS * EPS * (magnitude + way)
@@ -75,19 +75,22 @@ impl<const M: usize> Differences<'_, M> {
     #[inline]
     pub fn acceleration_by(&self, c: usize, h0: f64, h1: f64, rounding: &[f64; M]) -> Quotient<M> {
         let [q0, q1, q2] = [c - 1, c, c + 1].map(|n| &self.rows[n].q);
+        let (per0, per1, per_mean) = (1.0 / h0, 1.0 / h1, 2.0 / (h0 + h1));
+        let per_both = 4.0 * per0 * per1;
         Quotient {
-            value: std::array::from_fn(|k| 2.0 * ((q2[k] - q1[k]) / h1 - (q1[k] - q0[k]) / h0) / (h0 + h1)),
-            rounding: std::array::from_fn(|k| 4.0 * rounding[k] / (h0 * h1)),
+            value: vector_of(|k| ((q2[k] - q1[k]) * per1 - (q1[k] - q0[k]) * per0) * per_mean),
+            rounding: vector_of(|k| rounding[k] * per_both),
         }
     }
 
-    /// Mean jerk of axis `k` over three steps that take `span`, from the accelerations around the two rows inside them.
+    /// Mean jerk of each axis over three steps that take `span`, from the accelerations around the two rows inside them.
     ///
     /// Each mean acceleration is weighted by a triangle over two steps; the centres of the two are a third of `span` apart.
     #[inline]
-    pub fn jerk(&self, k: usize, early: &Quotient<M>, late: &Quotient<M>, span: f64) -> f64 {
-        let change = (late.value[k] - early.value[k]).abs() - late.rounding[k] - early.rounding[k];
-        3.0 * change / span
+    pub fn jerk(&self, early: &Quotient<M>, late: &Quotient<M>, span: f64) -> [f64; M] {
+        let per_third = 3.0 / span;
+        let change = |k: usize| (late.value[k] - early.value[k]).abs() - late.rounding[k] - early.rounding[k];
+        vector_of(|k| change(k) * per_third)
     }
 
     /// Whether an acceleration above its limit at row `c` can be a corner, where no path is known: at most two neighbouring

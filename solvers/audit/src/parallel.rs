@@ -7,6 +7,11 @@ use rayon::prelude::*;
 
 use super::Tally;
 
+/// Threads that work on a loop.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
 fn each_block(blocks: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..blocks).into_par_iter().for_each(work);
 }

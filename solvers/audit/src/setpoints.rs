@@ -9,7 +9,7 @@ use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
 use super::parallel;
 use super::rows::{Nearest, Row};
-use super::tracking::Plan;
+use super::tracking::{self, Plan};
 use super::vectors::{length, vector};
 use super::{Check, Limits, Seen, Tally, PLACE_TOLERANCE};
 
@@ -34,7 +34,19 @@ pub struct Chunk<'a> {
     pub line: Option<&'a [i32]>,
 }
 
-impl Chunk<'_> {
+impl<'a> Chunk<'a> {
+    fn part(&self, rows: Range<usize>) -> Self {
+        let of_axes = |table: &'a [f64]| &table[self.axes * rows.start..self.axes * rows.end];
+        Self {
+            axes: self.axes,
+            t: &self.t[rows.clone()],
+            position: of_axes(self.position),
+            velocity: self.velocity.map(of_axes),
+            acceleration: self.acceleration.map(of_axes),
+            line: self.line.map(|line| &line[rows.clone()]),
+        }
+    }
+
     /// Setpoint `i`, its place not yet known.
     pub(crate) fn row<const M: usize>(&self, i: usize) -> Row<M> {
         let of = |table| vector(table, self.axes, i);
@@ -72,6 +84,15 @@ impl<const M: usize> Stream<M> {
 
     /// The next setpoints; `plan` must be the same every time. What `seen` ends is of no more use.
     pub(crate) fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
+        // One block for each thread at a time: the rows are read twice, and stay in the caches of the processors.
+        let (count, most) = (chunk.t.len(), tracking::BLOCK * parallel::threads());
+        for start in (0..count).step_by(most) {
+            self.push_part(plan, &chunk.part(start..count.min(start + most)), start == 0, seen);
+        }
+    }
+
+    /// Where the part is not the first one of a chunk, the blocks of setpoints begin as they do inside of it, whatever their number.
+    fn push_part(&mut self, plan: Option<&Plan>, chunk: &Chunk, is_first: bool, seen: Seen) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
         rows.extend((0..chunk.t.len()).map(|i| chunk.row(i)));
@@ -81,7 +102,7 @@ impl<const M: usize> Stream<M> {
         let plan = plan.map(|plan| plan.with_clock(&self.clock));
         let plan = plan.as_ref();
         if let Some(plan) = plan {
-            plan.find_nearest(&self.limits, &mut rows, old, seen);
+            plan.find_nearest(&self.limits, &mut rows, (old, is_first), seen);
         }
         let view = View { differences: self.differences(&rows), plan };
         let found = parallel::tally(&self.tally, chunk.t.len(), BLOCK, &|block, tally| {
@@ -206,12 +227,13 @@ impl<const M: usize> View<'_, M> {
         if n > 0 {
             let (before, step) = (&rows[n - 1], recent.steps[2]);
             self.grid(n, tally);
+            let per_step = 1.0 / step;
             for k in 0..M {
                 let way = row.q[k] - before.q[k];
-                let velocity = (way.abs() - 2.0 * rounding[k]) / step;
+                let velocity = (way.abs() - 2.0 * rounding[k]) * per_step;
                 tally.offer(Check::Velocity, k, velocity, limits.velocity.of(k, way), time, line);
             }
-            self.recorded(n, step, rounding, tally);
+            self.recorded(n, [step, per_step], rounding, tally);
         }
         if n >= 3 {
             self.jerk(n, recent, tally);
@@ -248,13 +270,13 @@ impl<const M: usize> View<'_, M> {
 
     /// Recorded velocities: their mean over a step differs from the mean velocity by at most a quarter of what
     /// the acceleration can change in it. Recorded accelerations: within the limit.
-    fn recorded(&self, n: usize, step: f64, rounding: &[f64; M], tally: &mut Tally<M>) {
+    fn recorded(&self, n: usize, [step, per_step]: [f64; 2], rounding: &[f64; M], tally: &mut Tally<M>) {
         let (limits, rows) = (self.differences.limits, self.differences.rows);
         let (row, before) = (&rows[n], &rows[n - 1]);
         if let (Some(new), Some(old)) = (row.velocity, before.velocity) {
             for k in 0..M {
-                let mean = (row.q[k] - before.q[k]) / step;
-                let off = (mean - 0.5 * (new[k] + old[k])).abs() - 2.0 * rounding[k] / step;
+                let mean = (row.q[k] - before.q[k]) * per_step;
+                let off = (mean - 0.5 * (new[k] + old[k])).abs() - 2.0 * rounding[k] * per_step;
                 // An eighth of the way from the least acceleration to the greatest.
                 let span = limits.acceleration.positive[k] + limits.acceleration.negative[k];
                 let limit = 0.125 * span * step + 0.5 * limits.jump[k];
@@ -274,9 +296,9 @@ impl<const M: usize> View<'_, M> {
         let (row, limits) = (&self.differences.rows[n], self.differences.limits);
         let span: f64 = recent.steps.iter().sum();
         let [_, early, late] = &recent.accelerations;
+        let jerk = self.differences.jerk(early, late, span);
         for k in 0..M {
-            let value = self.differences.jerk(k, early, late, span);
-            tally.offer(Check::Jerk, k, value, limits.jerk[k], row.t, row.line);
+            tally.offer(Check::Jerk, k, jerk[k], limits.jerk[k], row.t, row.line);
         }
     }
 

@@ -18,7 +18,7 @@ use super::vectors::{inner, length};
 use super::{tell, Limits, Seen, PLACE_TOLERANCE};
 
 /// Setpoints a thread takes at a time.
-const BLOCK: usize = 4096;
+pub const BLOCK: usize = 4096;
 
 /// After so many consecutive setpoints off the path the others of their block get the place of the last one: the verdict is
 /// clear, and a search for each would take very long.
@@ -83,16 +83,17 @@ impl<'a> Plan<'a> {
         profile.extend(&self.path, limits.period, rows, away, clock);
     }
 
-    /// Finds the places of the rows from `old` on.
+    /// Finds the places of the rows from `old` on; `continues`: from the place of the row before them.
     pub fn find_nearest<const M: usize>(
         &self,
         limits: &Limits<M>,
         rows: &mut [Row<M>],
-        old: usize,
+        (old, continues): (usize, bool),
         seen: Seen,
     ) {
         let (known, fresh) = rows.split_at_mut(old);
         // Without a profile every search starts from the place before; with one its time says where to start.
+        let continues = continues || self.profile.is_none();
         let block = if self.profile.is_some() { BLOCK } else { fresh.len().max(1) };
         parallel::each_part(fresh, block, &|number, rows| {
             let mut finder = Finder::new(self, limits);
@@ -100,7 +101,7 @@ impl<'a> Plan<'a> {
             for i in 0..rows.len() {
                 tell(seen, i);
                 let (before, rest) = rows.split_at_mut(i);
-                let first = if number == 0 { known.last() } else { None };
+                let first = if number == 0 && continues { known.last() } else { None };
                 let (previous, row) = (before.last().or(first), &mut rest[0]);
                 row.nearest = match previous {
                     Some(last) if astray > MOST_ASTRAY => last.nearest,
