@@ -43,6 +43,7 @@ use bezier::split;
 use certificate::Certificate;
 use corner::append_corners;
 pub use curve::{Covered, Smooth};
+use feedplan_geometry::instances;
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 pub use offsets::Offsets;
@@ -71,10 +72,18 @@ pub struct SmoothOptions<const D: usize> {
     pub bounds: [[f64; 2]; D],
 }
 
+instances! {
+    /// The fit of a polyline, for other crates.
+    pub trait SmoothFit for [2, 3, 6] Polyline<M> = {
+        /// The curve along this polyline; see `smooth_fit`.
+        fn fit(&self, cut: &[bool], options: &SmoothOptions<M>, watch: Watch) -> Smooth<M> = smooth_fit;
+    }
+}
+
 /// The curve along a polyline of one chord or more. It is cut into pieces near the vertices for which `cut` is true.
 ///
 /// A polyline must end at vertices that turn back: no curve passes them without a stop.
-pub fn smooth_fit<const D: usize>(
+pub(crate) fn smooth_fit<const D: usize>(
     line: &Polyline<D>,
     cut: &[bool],
     options: &SmoothOptions<D>,

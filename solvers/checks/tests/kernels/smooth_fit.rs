@@ -9,7 +9,7 @@ use feedplan_checks::{padded, Random};
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::jerk_limited::{Effort, End, Limits, Problem};
 use feedplan_path::smooth_fit::polyline::Polyline;
-use feedplan_path::smooth_fit::{smooth_fit, Smooth, SmoothOptions};
+use feedplan_path::smooth_fit::{Smooth, SmoothFit, SmoothOptions};
 
 const LONG: f64 = 5.0;
 
@@ -21,9 +21,12 @@ fn polyline<const D: usize>(points: Vec<[f64; D]>, tolerance: f64) -> Polyline<D
     line
 }
 
-fn fit<const D: usize>(line: &Polyline<D>) -> Smooth<D> {
+fn fit<const D: usize>(line: &Polyline<D>) -> Smooth<D>
+where
+    Polyline<D>: SmoothFit<D>,
+{
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; D] };
-    smooth_fit(line, &vec![false; line.vertex.len()], &options, Watch::default())
+    line.fit(&vec![false; line.vertex.len()], &options, Watch::default())
 }
 
 fn square(side: f64) -> Vec<[f64; 2]> {
@@ -86,7 +89,7 @@ fn a_line_is_reproduced_exactly() {
     let mut cut = vec![false; 31];
     cut[10] = true;
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 2] };
-    let parts = smooth_fit(&many, &cut, &options, Watch::default());
+    let parts = many.fit(&cut, &options, Watch::default());
     assert_eq!(parts.covered.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(), [(0, 9), (10, 29)]);
     assert!(distance(&parts.curve.piece(0).control[1], &many.vertex[10]) < 1e-15);
 }
@@ -203,7 +206,7 @@ fn derivatives_to_the_fourth_agree_at_joints_also_where_pieces_are_cut() {
     assert!(worst.iter().all(|&jump| jump < 1e-9), "{worst:?}");
     let cut: Vec<bool> = (0..=400).map(|i| i % 7 == 3).collect();
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 3] };
-    let parts = smooth_fit(&line, &cut, &options, Watch::default());
+    let parts = line.fit(&cut, &options, Watch::default());
     assert!(parts.curve.len() > smooth.curve.len() + 40);
     check(&line, &parts, "cut");
     for covered in &parts.covered {
@@ -216,7 +219,7 @@ fn derivatives_to_the_fourth_agree_at_joints_also_where_pieces_are_cut() {
 fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
     let line = polyline(square(20.0), 0.1);
     let bounds = [[-1e-6, 100.0], [-100.0, 100.0]];
-    let smooth = smooth_fit(&line, &[false; 5], &SmoothOptions { long: LONG, bounds }, Watch::default());
+    let smooth = line.fit(&[false; 5], &SmoothOptions { long: LONG, bounds }, Watch::default());
     check(&line, &smooth, "bounds");
     assert!(smooth.curve.control.iter().all(|point| point[0] >= -1e-6));
     // The side on the bound is a line, with a stop where it begins.
@@ -224,7 +227,10 @@ fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
 }
 
 /// Random polylines in D axes among P, the others of which rest.
-fn random_polylines<const D: usize, const P: usize>(seed: u64, count: usize) -> usize {
+fn random_polylines<const D: usize, const P: usize>(seed: u64, count: usize) -> usize
+where
+    Polyline<P>: SmoothFit<P>,
+{
     let mut random = Random(seed);
     let mut rough = 0;
     for case in 0..count {
