@@ -6,6 +6,7 @@ use feedplan_checks::campaign::seeds;
 use feedplan_checks::jerk::plan;
 use feedplan_checks::polylines::{dense, derivatives, distance, length, random_polyline, to_segment, walk};
 use feedplan_checks::{padded, Random};
+use feedplan_geometry::spline::bezier;
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::jerk_limited::{Effort, End, Limits, Problem};
 use feedplan_path::smooth_fit::polyline::Polyline;
@@ -286,8 +287,7 @@ impl Curve<2> for Fitted {
     fn at(&self, u: f64) -> [[f64; 2]; 4] {
         let i = self.1.partition_point(|&knot| knot <= u).clamp(1, self.0.curve.len()) - 1;
         let piece = self.0.curve.piece(i);
-        let [c, c1, c2, c3, _] = derivatives(&piece, ((u - self.1[i]) / piece.width).clamp(0.0, 1.0));
-        [c, c1, c2, c3]
+        bezier::derivatives(&piece, (u - self.1[i]).clamp(0.0, piece.width))
     }
 }
 
