@@ -10,19 +10,21 @@ use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
 use crate::lanes::four::{Lanes, Register};
 
-/// Calls a function with the number of control points as a constant, so that its loops are unrolled.
+/// Evaluates an expression with the number of control points as a constant, so that its loops are unrolled.
 macro_rules! with_count {
-    ($piece:expr, $function:ident($($argument:expr),*)) => {
-        match $piece.control.len() {
-            2 => $function::<M, 2>($($argument),*),
-            3 => $function::<M, 3>($($argument),*),
-            4 => $function::<M, 4>($($argument),*),
-            5 => $function::<M, 5>($($argument),*),
-            6 => $function::<M, 6>($($argument),*),
-            7 => $function::<M, 7>($($argument),*),
-            8 => $function::<M, 8>($($argument),*),
-            9 => $function::<M, 9>($($argument),*),
-            _ => $function::<M, { MAX_DEGREE + 1 }>($($argument),*),
+    ($count:expr, $n:ident, $call:expr) => {
+        with_count!($count, $n, $call, 2 3 4 5 6 7 8 9)
+    };
+    ($count:expr, $n:ident, $call:expr, $($known:literal)+) => {
+        match $count {
+            $($known => {
+                const $n: usize = $known;
+                $call
+            })+
+            _ => {
+                const $n: usize = MAX_DEGREE + 1;
+                $call
+            }
         }
     };
 }
@@ -30,7 +32,7 @@ macro_rules! with_count {
 /// C, C', C'' and C''' at u, by u.
 #[inline]
 pub fn derivatives<const M: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
-    with_count!(piece, derivatives_of(piece, u))
+    with_count!(piece.control.len(), N, derivatives_of::<M, N>(piece, u))
 }
 
 fn derivatives_of<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
@@ -112,24 +114,21 @@ pub fn derivatives_at_four<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[L
         let c = u.map(|u| derivatives(piece, u));
         std::array::from_fn(|k| [1, 2, 3].map(|order| Lanes::new(c.map(|c| c[order][k]))))
     } else {
-        with_count!(piece, derivatives_at_four_of(piece, u))
+        let mut c = [[Lanes::ZERO; 3]; M];
+        axes_at_four(piece.control.as_flattened(), u.map(|u| u / piece.width), 1.0 / piece.width, &mut c);
+        c
     }
 }
 
-fn derivatives_at_four_of<const M: usize, const N: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[Lanes; 3]; M] {
-    let mut c = [[Lanes::ZERO; 3]; M];
-    let control = piece.control.as_flattened();
-    axes_at_four::<N>(control, u.map(|u| u / piece.width), 1.0 / piece.width, &mut c);
-    c
-}
-
-/// Derivatives of each axis at four places, compiled once for any number of axes.
-fn axes_at_four<const N: usize>(control: &[f64], t: [f64; 4], scale: f64, c: &mut [[Lanes; 3]]) {
+/// Derivatives of each axis at four places, compiled in this crate for any number of axes.
+fn axes_at_four(control: &[f64], t: [f64; 4], scale: f64, c: &mut [[Lanes; 3]]) {
     let axes = c.len();
-    dispatch!(Level::new(), simd => {
-        for (k, c) in c.iter_mut().enumerate() {
-            *c = triangle_at_four(simd, &axis::<N>(control, axes, k), t, scale);
-        }
+    with_count!(control.len() / axes, N, {
+        dispatch!(Level::new(), simd => {
+            for (k, c) in c.iter_mut().enumerate() {
+                *c = triangle_at_four(simd, &axis::<N>(control, axes, k), t, scale);
+            }
+        })
     });
 }
 
@@ -188,62 +187,60 @@ fn cut<S: Simd>(b: &mut [Register<S>], s: Register<S>, t: Register<S>) {
 /// |C'|² by u, at four places.
 #[inline]
 pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
-    with_count!(piece, speeds_sq_of(piece, u))
-}
-
-fn speeds_sq_of<const M: usize, const N: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
     let scale = 1.0 / piece.width;
     let t = u.map(|u| u * scale);
+    let control = piece.control.as_flattened();
     let sum = if piece.is_rational() {
-        rational_speeds_sq::<M, N>(piece, t)
+        rational_speeds_sq(control, M, piece.weights, t)
     } else {
-        axes_speeds_sq::<N>(piece.control.as_flattened(), M, t)
+        axes_speeds_sq(control, M, t)
     };
     sum.map(|sum| sum * (scale * scale))
 }
 
-/// |C'|² by t of a polynomial piece, compiled once for any number of axes.
-fn axes_speeds_sq<const N: usize>(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
-    dispatch!(Level::new(), simd => {
-        let t = Lanes::new(t).load(simd);
-        let mut sum = Register::all(simd, 0.0);
-        for k in 0..axes {
-            let numbers = axis::<N>(control, axes, k);
-            let mut b = [t; N];
-            for i in 0..N {
-                b[i] = Register::all(simd, numbers[i] - numbers[0]);
+/// |C'|² by t of a polynomial piece, compiled in this crate for any number of axes.
+fn axes_speeds_sq(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
+    with_count!(control.len() / axes, N, {
+        dispatch!(Level::new(), simd => {
+            let t = Lanes::new(t).load(simd);
+            let mut sum = Register::all(simd, 0.0);
+            for k in 0..axes {
+                let numbers = axis::<N>(control, axes, k);
+                let mut b = [t; N];
+                for i in 0..N {
+                    b[i] = Register::all(simd, numbers[i] - numbers[0]);
+                }
+                let [_, tangent] = value_and_slope(b, t);
+                sum += tangent * tangent;
             }
-            let [_, tangent] = value_and_slope(b, t);
-            sum += tangent * tangent;
-        }
-        sum.values()
+            sum.values()
+        })
     })
 }
 
-fn rational_speeds_sq<const M: usize, const N: usize>(piece: &Piece<M>, t: [f64; 4]) -> [f64; 4] {
-    let control = &piece.control[..N];
-    let weights: &[f64; N] = piece.weights[..N].try_into().expect("a weight for each point");
-    let of = |numbers: &[f64; N]| {
-        dispatch!(Level::new(), simd => {
-            let numbers = numbers.map(|number| Register::all(simd, number));
-            value_and_slope(numbers, Lanes::new(t).load(simd)).map(Register::values)
-        })
-    };
-    let [w0, w1] = of(weights);
-    let inverse = w0.map(|w| 1.0 / w);
-    let mut sum = [0.0; 4];
-    for k in 0..M {
-        let mut points = [0.0; N];
-        for i in 0..N {
-            points[i] = (control[i][k] - control[0][k]) * weights[i];
+/// The same of a rational piece.
+fn rational_speeds_sq(control: &[f64], axes: usize, weights: &[f64], t: [f64; 4]) -> [f64; 4] {
+    with_count!(weights.len(), N, {
+        let of = |numbers: [f64; N]| {
+            dispatch!(Level::new(), simd => {
+                let numbers = numbers.map(|number| Register::all(simd, number));
+                value_and_slope(numbers, Lanes::new(t).load(simd)).map(Register::values)
+            })
+        };
+        let weights: [f64; N] = weights.try_into().expect("a weight for each point");
+        let [w0, w1] = of(weights);
+        let inverse = w0.map(|w| 1.0 / w);
+        let mut sum = [0.0; 4];
+        for k in 0..axes {
+            let numbers = axis::<N>(control, axes, k);
+            let [m0, m1] = of(std::array::from_fn(|i| (numbers[i] - numbers[0]) * weights[i]));
+            for lane in 0..4 {
+                let tangent = (m1[lane] - w1[lane] * inverse[lane] * m0[lane]) * inverse[lane];
+                sum[lane] += tangent * tangent;
+            }
         }
-        let [m0, m1] = of(&points);
-        for lane in 0..4 {
-            let tangent = (m1[lane] - w1[lane] * inverse[lane] * m0[lane]) * inverse[lane];
-            sum[lane] += tangent * tangent;
-        }
-    }
-    sum
+        sum
+    })
 }
 
 /// Value and derivative by t of a polynomial in Bernstein form, at four places.
