@@ -9,7 +9,7 @@ import pytest
 from tests.clusters import LocalCluster, make_certificates, running
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
     home = tmp_path_factory.mktemp("cluster")
     with running(home, 2, certificates=make_certificates(home / "certificates")) as found:
