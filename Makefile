@@ -11,20 +11,25 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Modules that are compiled in each start of Python, instead of once, would take a tenth of a second each time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test native lint clippy collected page wheel docs bench campaign clean cargo
+.PHONY: demo test pytest native lint clippy linuxcnc page wheel docs bench campaign clean cargo
 
 demo: $(VENV)/built $(PAGE)
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
-# Half of the time tests wait for the services and programs that they start: two of them share a processor. The tests of a
-# file share its servers, clusters and browser, so one process runs them all.
-test: native lint collected $(PAGE)
+# What each needs is built first; then they run side by side where make has more than one job (`.ci/run`).
+test: native lint pytest
+
+# The tests are compiled once here, and not by each process that runs them. Half of the time tests wait for the services and
+# programs that they start: two of them share a processor. The tests of a file share its servers, clusters and browser, so one
+# process runs them all.
+pytest: $(VENV)/dev $(PAGE) $(filter linuxcnc,$(MAKECMDGOALS))
+	@$(BIN)/pytest --collect-only --quiet --quiet >/dev/null
 	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile --no-loadscope-reorder
 
-# They need no Python. They come first: the module links what has been compiled for them.
-native: cargo
+# They link what has been compiled for the module, which comes first: the tests in Python wait for it.
+native: | $(VENV)/built
 	$(CARGO) cargo test --release --quiet --lib --tests --manifest-path solvers/Cargo.toml
 
 lint: clippy $(VENV)/dev
@@ -35,13 +40,12 @@ lint: clippy $(VENV)/dev
 	$(BIN)/lint-imports
 	cargo fmt --all --check --manifest-path solvers/Cargo.toml
 
-# It generates no code and waits for none: it runs beside the builds, in a folder of its own, at a lower priority.
 clippy: cargo
-	$(CARGO)/lint nice cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+	$(CARGO) cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
-# The tests are compiled here once, and not by each process that runs them.
-collected: $(VENV)/dev
-	@$(BIN)/pytest --collect-only --quiet --quiet >/dev/null
+# The interpreter that G-code is compared with, and an emulator of ARM64: tests that need them are skipped without them.
+linuxcnc:
+	.ci/linuxcnc
 
 page: $(PAGE)
 
