@@ -307,43 +307,22 @@ impl<const M: usize> Geometry<M> for ArcLengthPath<'_, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A slight bend of degree 7, as smooth paths have.
-    fn slight_bend() -> Problem<'static, 2> {
-        Problem {
-            control: &[
-                [2.618383093684835, -3.103134081782292],
-                [2.617980931741674, -3.1032933506629217],
-                [2.617578769798513, -3.103452619543552],
-                [2.617176607855352, -3.1036118884241817],
-                [2.6158726545425224, -3.1041143539233813],
-                [2.615467607292026, -3.104266135113684],
-                [2.6150625600415305, -3.1044179163039876],
-                [2.6146575127910343, -3.1045696974942905],
-            ],
-            weight: &[],
-            offset: &[0, 8],
-            width: &[0.003027860538125467],
-            tip: None,
-            way: None,
-            feed_share: &[],
-            runs: &[0, 1],
-            feed: &[100.0],
-            junction_speed: &[0.0, 0.0],
-            max_velocity: [[100.0; 2]; 2],
-            max_acceleration: [[1e4; 2]; 2],
-            chord_tolerance: f64::INFINITY,
-            period: 0.001,
-            start_speed: 0.0,
-            end_speed: 0.0,
-            watch: Default::default(),
-        }
-    }
+    use crate::one_piece::one_piece;
 
     #[test]
     fn parameters_on_a_part_that_is_symmetric_about_its_middle() {
-        // The quintic of the whole part is right half-way.
-        let problem = slight_bend();
+        // A slight bend of degree 7, as smooth paths have; the quintic of the whole part is right half-way.
+        let control = [
+            [2.618383093684835, -3.103134081782292],
+            [2.617980931741674, -3.1032933506629217],
+            [2.617578769798513, -3.103452619543552],
+            [2.617176607855352, -3.1036118884241817],
+            [2.6158726545425224, -3.1041143539233813],
+            [2.615467607292026, -3.104266135113684],
+            [2.6150625600415305, -3.1044179163039876],
+            [2.6146575127910343, -3.1045696974942905],
+        ];
+        let problem = one_piece(&control, &[0, 8], &[0.003027860538125467]);
         let parts = [Part { piece: 0, u: [0.21, 0.79].map(|share| share * problem.width[0]) }];
         let path = ArcLengthPath::new(&problem, &parts);
         for i in 1..100 {
@@ -361,7 +340,7 @@ mod tests {
         // From a slow start, where |C'| is 1e-3 of its greatest, and round a bend.
         let control = [[0.0, 0.0], [1e-3, 0.0], [1.0, 0.1], [2.0, 2.0], [1.5, 3.0], [3.0, 5.0]];
         let parts = [Part { piece: 0, u: [0.0, 1.0] }];
-        let problem = Problem { offset: &[0, 6], width: &[1.0], control: &control, ..slight_bend() };
+        let problem = one_piece(&control, &[0, 6], &[1.0]);
         let path = ArcLengthPath::new(&problem, &parts);
         let length = |i: usize| path.total() * i as f64 / 400.0;
         for i in 1..400 {

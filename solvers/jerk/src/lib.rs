@@ -9,6 +9,8 @@ pub mod curvature_jumps;
 pub mod feed;
 pub mod jerk_limited;
 pub mod jerk_profile;
+#[cfg(test)]
+mod one_piece;
 pub mod path_limits;
 mod path_problem;
 mod planners;

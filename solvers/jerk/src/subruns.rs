@@ -338,30 +338,14 @@ fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::one_piece::one_piece;
 
     #[test]
     fn a_path_that_turns_the_most_at_its_end_is_not_cut_beside_it() {
         // x = t + t², y = 0.03 t⁴: slow and straight at t = 0, with a curvature that rises to the end.
         let control = [[0.0, 0.0], [0.25, 0.0], [2.0 / 3.0, 0.0], [1.25, 0.0], [2.0, 0.03]];
-        let problem = Problem {
-            control: &control,
-            weight: &[],
-            offset: &[0, 5],
-            width: &[1.0],
-            tip: None,
-            way: None,
-            feed_share: &[],
-            runs: &[0, 1],
-            feed: &[1e3],
-            junction_speed: &[0.0, 0.0],
-            max_velocity: [[1e3; 2]; 2],
-            max_acceleration: [[1e4; 2]; 2],
-            chord_tolerance: f64::INFINITY,
-            period: 0.01,
-            start_speed: 0.0,
-            end_speed: 0.0,
-            watch: Default::default(),
-        };
+        let slow = one_piece(&control, &[0, 5], &[1.0]);
+        let problem = Problem { feed: &[1e3], max_velocity: [[1e3; 2]; 2], period: 0.01, ..slow };
         let found = subruns(&problem);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].parts, [Part { piece: 0, u: [0.0, 1.0] }]);

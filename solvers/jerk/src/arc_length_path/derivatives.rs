@@ -302,38 +302,22 @@ fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::one_piece::one_piece;
     use feedplan_planner::problem::{SpeedSquare, Tip};
 
     #[test]
     fn four_places_have_the_numbers_of_each() {
         let control = [[0.0, 0.0, 1.0], [1.0, 0.5, 0.0], [2.0, 3.0, -1.0], [2.5, 1.0, 0.0], [4.0, 0.0, 2.0]];
         let square = [9.0, 7.0, 2.0, 5.0, 6.0, 8.0];
-        let (offset, width) = ([0, 5], [2.0]);
+        let offset = [0, 5];
         let speed = SpeedSquare { coefficients: &square, offset: &[0, 6] };
-        let plain = Problem {
-            control: &control,
-            weight: &[],
-            offset: &offset,
-            width: &width,
-            tip: None,
-            way: None,
-            feed_share: &[],
-            runs: &[0, 1],
-            feed: &[100.0],
-            junction_speed: &[0.0, 0.0],
-            max_velocity: [[100.0; 3]; 2],
-            max_acceleration: [[1e4; 3]; 2],
-            chord_tolerance: 1e-4,
-            period: 0.001,
-            start_speed: 0.0,
-            end_speed: 0.0,
-            watch: Default::default(),
-        };
+        let free = one_piece(&control, &offset, &[2.0]);
+        let plain = Problem { chord_tolerance: 1e-4, ..free };
         let tip = Some(Tip { speed, control: &control, weight: &[], offset: &offset });
         let u = [0.0, 0.3, 1.2, 2.0];
         for problem in [
+            free,
             plain,
-            Problem { chord_tolerance: f64::INFINITY, ..plain },
             Problem { weight: &[1.0, 2.0, 1.0, 3.0, 1.0], ..plain },
             Problem { feed_share: &[[1.0, 0.0, 0.5]], ..plain },
             Problem { way: Some(speed), tip, ..plain },
