@@ -7,6 +7,8 @@
 //! greatest accelerations within all these bounds exist, and each line takes its least time with them. They come from
 //! the greatest accelerations of the axes by lowering both ends of each line that is too short, until none is.
 
+use feedplan_geometry::bisection::boundary;
+
 use crate::s_curve::{Segment, SegmentEnd};
 
 /// A line of a chain, and the speeds at its ends in mm/s, which are 0 where it turns back.
@@ -29,18 +31,8 @@ impl Line {
     /// The accelerations, at most these, of which the greater one is as great as can be.
     fn lowered(&self, [from, to]: [f64; 2]) -> [f64; 2] {
         let at_most = |most: f64| [from.min(most), to.min(most)];
-        let (mut low, mut high) = (0.0, from.max(to));
-        loop {
-            let middle = 0.5 * (low + high);
-            if middle <= low || middle >= high {
-                return at_most(low);
-            }
-            if self.can_cross(at_most(middle)) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        let [most, _] = boundary(0.0, from.max(to), |most| self.can_cross(at_most(most)));
+        at_most(most)
     }
 
     /// The greatest acceleration, at most this, at an end, whatever that at the other end.
