@@ -99,7 +99,7 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
     let count = 1 + random.below(4);
     let kind = random.below(10);
     let most = if random.chance(0.2) { 9 } else { 5 };
-    let unit = if kind == 9 { 10f64.powf(random.between(-6.0, 6.0)) } else { 1.0 };
+    let unit = if kind == 9 { random.power(-6.0, 6.0) } else { 1.0 };
     let mut corner = vec![false; count + 1];
     let mut start = [0.0; M];
     let mut tangent: [f64; M] = random.normals();

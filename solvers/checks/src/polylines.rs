@@ -95,7 +95,7 @@ pub fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Ve
 /// A random polyline without reversals: a walk, a zigzag, noise on a curve, dense points, or all of them.
 pub fn random_polyline<const D: usize>(random: &mut Random) -> Vec<[f64; D]> {
     let chords = 2 + (150.0 * random.uniform().powi(2)) as usize;
-    let step = 10f64.powf(3.5 * random.uniform() - 2.5);
+    let step = random.power(-2.5, 1.0);
     let kind = (5.0 * random.uniform()) as usize;
     let noise = [0.0, 0.003, 0.3][(3.0 * random.uniform()) as usize] * step;
     let phase: [f64; D] = std::array::from_fn(|_| random.uniform());

@@ -22,6 +22,11 @@ impl Random {
         self.between(low, high).exp()
     }
 
+    /// 10 to a random power between these two.
+    pub fn power(&mut self, low: f64, high: f64) -> f64 {
+        10f64.powf(self.between(low, high))
+    }
+
     pub fn below(&mut self, count: usize) -> usize {
         (self.uniform() * count as f64) as usize
     }

@@ -9,6 +9,7 @@ use feedplan_checks::by_length::{ByLength, Lemniscate, Nurbs, Trefoil};
 use feedplan_checks::campaign::seeds;
 use feedplan_checks::jerk::plan;
 use feedplan_checks::wave::Wave;
+use feedplan_checks::Random;
 use feedplan_jerk::jerk_limited::{
     Effort, End, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile, SpeedCap,
 };
@@ -215,29 +216,10 @@ fn the_butterfly_holds_all_limits_near_its_bound() {
     assert!(gap < 0.005, "{gap}");
 }
 
-/// Numbers in [0, 1) from a seed.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn power(&mut self, low: f64, high: f64) -> f64 {
-        10f64.powf(self.between(low, high))
-    }
-}
-
 /// Up to 24 bends on 0.03 mm to 1 m, as sharp as 1e-4 of their distance, under limits over orders of magnitude.
 fn random_case(seed: u64) -> (Bends, [f64; 3]) {
     let mut random = Random(seed);
-    random.next();
-    let count = 1 + (24.0 * random.next()) as usize;
+    let count = 1 + random.below(24);
     let length = random.power(-1.5, 3.0);
     let mut places: Vec<f64> = (0..count).map(|_| random.between(0.02, 0.98) * length).collect();
     places.sort_by(f64::total_cmp);

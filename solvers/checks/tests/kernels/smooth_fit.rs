@@ -239,7 +239,7 @@ where
         if points.len() < 2 {
             continue;
         }
-        let tolerance = 10f64.powf(3.0 * random.uniform() - 3.5);
+        let tolerance = random.power(-3.5, -0.5);
         let line = polyline(points.iter().map(|point| padded::<D, P>(point, 0.0)).collect(), tolerance);
         let smooth = fit(&line);
         check(&line, &smooth, &format!("{D} axes, case {case}"));
