@@ -82,11 +82,6 @@ impl<const M: usize> Spline<M> {
         }
         Self::new(degree, unrolled, control, weights)
     }
-
-    /// The parameter interval of the curve.
-    pub fn domain(&self) -> [f64; 2] {
-        [self.knots[self.degree], self.knots[self.control.len()]]
-    }
 }
 
 /// Degree, coordinates and weights of control points.
@@ -151,7 +146,6 @@ mod tests {
         let spline = Spline::periodic(2, vec![0.0, 1.0, 2.0, 3.0, 5.0], square, vec![]).unwrap();
         assert_eq!(spline.knots, [-3.0, -2.0, 0.0, 1.0, 2.0, 3.0, 5.0, 6.0, 7.0]);
         assert_eq!(spline.control, [[0.0], [1.0], [2.0], [1.0], [0.0], [1.0]]);
-        assert_eq!(spline.domain(), [0.0, 5.0]);
     }
 
     #[test]
