@@ -180,4 +180,9 @@ def test_more_arcs_than_moments_have_the_same_shares(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("feedplan.report.activity._MOMENTS", len(made.profile) - 1)
     even = account(made.problem, made.profile, made.program, True)
     assert math.fsum(share.part for share in even.limits) == pytest.approx(1.0)
-    assert {share.limit: share.part for share in even.limits} == pytest.approx(exact, abs=0.02)
+    found = {share.limit: share.part for share in even.limits}
+    # Few moments may miss a limit that few phases use.
+    both = exact.keys() | found.keys()
+    assert {limit: found.get(limit, 0.0) for limit in both} == pytest.approx(
+        {limit: exact.get(limit, 0.0) for limit in both}, abs=0.02
+    )

@@ -16,6 +16,7 @@
 //! | `constraints`, `exact`, `relaxed` | the limits as slacks; the true problem and its convex relaxation |
 //! | `interior_point`, `newton`, `working_space`, `columns`, `band` | the primal-dual interior-point method on one window |
 //! | `intersample_check`, `window` | the limits between the collocation points |
+//! | `refinement` | the rough plan on a coarse grid, and where shorter intervals pay |
 //! | `windows` | paths of any length |
 //! | `moving_axes` | the axes that move on a path |
 //! | `held` | where the feed is held, and the stretches between such places |
@@ -24,7 +25,7 @@
 //! | `on_path` | the planner on the package's own paths |
 //! | `turns` | the accelerations with which lines turn back |
 //!
-//! The limits hold to 5e-7 of themselves, as checked at 12 samples of each interval with the path's true derivatives.
+//! The limits hold to 5e-7 of themselves, as checked at 16 samples of each interval with the path's true derivatives.
 //! Every iterate is a valid plan, so that a planner that is stopped returns the best plan so far. The method is our
 //! own; the predictor and corrector are those of Mehrotra (SIAM J. Optim. 2, 1992).
 
@@ -52,6 +53,7 @@ mod prepare;
 pub(crate) mod profile;
 #[cfg(test)]
 mod profiles;
+mod refinement;
 mod relaxed;
 pub(crate) mod rest_ramp;
 mod sides;

@@ -129,11 +129,14 @@ fn lines_take_as_long_as_seven_sections() {
         let length = 10f64.powi(exponent);
         let line = Line::new(length);
         let problem = problem(&line, FAST);
-        let plan = planned(&problem);
-        let part = plan.time / seven_sections(length, FAST) - 1.0;
-        assert!((-1e-9..1e-5).contains(&part), "{length} mm: {part:e} above the formula");
-        assert!(plan.converged);
-        assert_held(&problem, &plan.profile);
+        for (resolution, most) in [(16.0, 6e-5), (64.0, 6e-6)] {
+            let plan =
+                plan(&problem, &Effort { resolution, ..proving() }).expect("the line can be travelled");
+            let part = plan.time / seven_sections(length, FAST) - 1.0;
+            assert!((-1e-9..most).contains(&part), "{length} mm: {part:e} above the formula");
+            assert!(plan.converged);
+            assert_held(&problem, &plan.profile);
+        }
     }
 }
 
@@ -205,7 +208,7 @@ fn the_lemniscate_is_optimal_and_holds_all_limits() {
 fn the_trefoil_is_optimal_and_holds_all_limits() {
     let parameters: Vec<f64> = (0..=60).map(|i| 0.3 + PI * i as f64 / 30.0).collect();
     let gap = assert_curve(&ByLength::new(Trefoil(20.0), &parameters, 20), 2.0352);
-    assert!(gap < 2e-5, "{gap:e}");
+    assert!(gap < 3e-5, "{gap:e}");
 }
 
 #[test]
@@ -338,8 +341,9 @@ fn windows_agree_where_the_optimum_lies_on_limits_all_along() {
     let windows = plan(&problem, &Effort { window: 1000, ..Effort::default() }).expect("a plan");
     assert!(whole.converged && windows.converged);
     assert!(whole.iterations < 60.0, "{} iterations", whole.iterations);
+    // The grid of each follows its own rough plan.
     let loss = windows.time / whole.time - 1.0;
-    assert!(loss < 1e-6, "{loss:e}");
+    assert!(loss < 5e-6, "{loss:e}");
     assert_held(&problem, &windows.profile);
 }
 

@@ -107,19 +107,7 @@ fn restrict(x: &[f64]) -> Vec<f64> {
 /// A spline on the coarse grid at the stations of the fine grid.
 fn prolong(x: &[f64], rows: &Constraints) -> Vec<f64> {
     let lengths: Vec<f64> = (0..rows.count()).map(|n| rows.h(n)).collect();
-    let mut out = Vec::with_capacity(2 * rows.count() + 2);
-    for (n, short) in lengths.chunks(GROUP).enumerate() {
-        let h: f64 = short.iter().sum();
-        let u = hermite::local(x, n, h);
-        let mut s = 0.0;
-        for own in short {
-            let [value, slope, _] = hermite::at(s / h).map(|basis| hermite::combine(&basis, &u));
-            out.extend([value, slope / h]);
-            s += own;
-        }
-    }
-    out.extend(&x[x.len() - 2..]);
-    out
+    hermite::prolong(x, lengths.chunks(GROUP))
 }
 
 #[cfg(test)]

@@ -71,6 +71,25 @@ impl Grid {
         grid
     }
 
+    /// The grid with each interval in a number of equal parts.
+    pub fn refined(&self, parts: &[u32]) -> Self {
+        let mut grid = Self { stations: vec![self.stations[0]], ..Self::default() };
+        let mut caps = self.caps.iter().peekable();
+        for (n, &count) in parts.iter().enumerate() {
+            if let Some(&(_, speed)) = caps.next_if(|cap| cap.0 == n) {
+                grid.caps.push((grid.stations.len() - 1, speed));
+            }
+            let [start, end] = [self.stations[n], self.stations[n + 1]];
+            let h = (end - start) / f64::from(count);
+            grid.stations.extend((1..count).map(|i| start + f64::from(i) * h));
+            grid.stations.push(end);
+            grid.pieces.resize(grid.stations.len() - 1, self.pieces[n]);
+            grid.jerk_factor.resize(grid.stations.len() - 1, self.jerk_factor[n]);
+        }
+        grid.caps.extend(caps.map(|cap| (grid.stations.len() - 1, cap.1)));
+        grid
+    }
+
     /// Adds stations from the last one to the end of some samples of one piece.
     fn fill(&mut self, samples: &[EnvelopeSample], density: &[f64], more: f64) {
         let mut sum = Vec::with_capacity(samples.len());
@@ -222,5 +241,23 @@ mod tests {
         assert_eq!(grid.pieces[station(3.001)], 2);
         assert_eq!((grid.stations[0], grid.stations[grid.stations.len() - 1]), (0.01, 49.99));
         assert!(grid.stations.windows(2).all(|pair| pair[0] < pair[1]));
+
+        let parts: Vec<u32> = (0..grid.pieces.len() as u32).map(|n| 1 + n % 3).collect();
+        let fine = grid.refined(&parts);
+        let mut first = 0;
+        for (n, &parts) in parts.iter().enumerate() {
+            let end = first + parts as usize;
+            assert_eq!(
+                (fine.stations[first], fine.stations[end], fine.cap(first)),
+                (grid.stations[n], grid.stations[n + 1], grid.cap(n))
+            );
+            assert!(fine.pieces[first..end].iter().all(|&piece| piece == grid.pieces[n]));
+            assert!(fine.jerk_factor[first..end].iter().all(|&factor| factor == grid.jerk_factor[n]));
+            let h = (fine.stations[end] - fine.stations[first]) / f64::from(parts);
+            let own = &fine.stations[first..=end];
+            assert!(own.windows(2).all(|pair| (pair[1] - pair[0] - h).abs() < 1e-13));
+            first = end;
+        }
+        assert_eq!(fine.pieces.len(), first);
     }
 }

@@ -68,6 +68,23 @@ pub fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
     x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
 }
 
+/// The spline x at the stations of a finer grid, from the lengths of the parts of each interval.
+pub fn prolong<'a>(x: &[f64], intervals: impl Iterator<Item = &'a [f64]>) -> Vec<f64> {
+    let mut out = Vec::with_capacity(2 * x.len());
+    for (n, parts) in intervals.enumerate() {
+        let h: f64 = parts.iter().sum();
+        let u = local(x, n, h);
+        let mut s = 0.0;
+        for part in parts {
+            let [value, slope, _] = at(s / h).map(|basis| combine(&basis, &u));
+            out.extend([value, slope / h]);
+            s += part;
+        }
+    }
+    out.extend(&x[x.len() - 2..]);
+    out
+}
+
 /// ∫ ds/√w over interval n, in s; infinite where w is not positive.
 pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
     let u = local(x, n, h);

@@ -20,6 +20,8 @@ const STEEPEST: f64 = 0.9;
 /// between. The limit of speed is used fully, but for rounding.
 pub const USE: f64 = 0.9;
 const FULL: f64 = 1.0 + 1e-9;
+/// The same as `USE` where the grid was refined.
+const KEPT: f64 = 0.96;
 /// Relative rounding of w.
 const ROUNDING: f64 = 1e-12;
 /// An interval that uses more is lowered to this use.
@@ -151,6 +153,16 @@ fn least(tau: &[f64], rho: &[f64]) -> Vec<f64> {
 /// them: w divided by it meets them.
 pub fn used([v, a, j]: [f64; 3]) -> f64 {
     (v * v / FULL).max(a.max(j.cbrt().powi(2)) / USE)
+}
+
+/// The same over what is left of the limits on a finer grid, where fewer points are between the collocation points; infinite
+/// above the limit of speed.
+pub fn kept([v, a, j]: [f64; 3]) -> f64 {
+    if v * v > FULL {
+        f64::INFINITY
+    } else {
+        a.max(j.cbrt().powi(2)) / KEPT
+    }
 }
 
 /// The factor on r that lowers an interval with this use to `LOWERED`.

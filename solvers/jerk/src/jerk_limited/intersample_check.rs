@@ -1,17 +1,17 @@
-//! The use of the limits between the collocation points of a spline w: by the path's true derivatives at 12 samples of
+//! The use of the limits between the collocation points of a spline w: by the path's true derivatives at 16 samples of
 //! each interval, and by the peaks of polynomials through these samples.
 
 use fearless_simd::{dispatch, Level, Simd};
 
 use super::columns::Columns;
-use super::constraints::Constraints;
-use super::hermite::{self, combine, Basis, LAST};
+use super::constraints::{Constraints, RowLayout};
+use super::hermite::{self, combine, Basis, LAST, VALUE};
 use super::sides::Sides;
 use crate::path_problem::{Geometry, Limits};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
 /// Samples of an interval, its ends included.
-const SAMPLES: usize = 12;
+const SAMPLES: usize = 16;
 /// Peaks are only sought where a sample uses more than this part of a limit.
 const NEAR: f64 = 0.97;
 
@@ -27,6 +27,13 @@ const fn bases() -> [[Basis; 3]; SAMPLES] {
     }
     out
 }
+
+/// Weights of the samples in a mean over the interval.
+const MEAN: [f64; SAMPLES] = {
+    let mut out = [1.0 / (SAMPLES - 1) as f64; SAMPLES];
+    (out[0], out[SAMPLES - 1]) = (0.5 * out[0], 0.5 * out[0]);
+    out
+};
 
 /// The limits on neighbouring intervals.
 #[derive(Clone, Copy, Debug)]
@@ -119,14 +126,10 @@ impl IntersampleCheck {
         for (b, (block, out)) in self.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
             let h = rows.blocks[b].h.load(simd);
             let (u, per_h) = (x.local(b, h, rows.blocks[b].live), h.inverse());
-            let mut motion = [[zero; 4]; SAMPLES];
+            let motion = motions(&u, per_h);
             let mut uses = [zero; SAMPLES];
-            for (i, basis) in BASES.iter().enumerate() {
-                let w = combine(&basis[0], &u);
-                let half = combine(&basis[1], &u) * per_h * 0.5;
-                let bend = combine(&basis[2], &u) * (per_h * per_h) * 0.5;
-                motion[i] = [w, half, bend, w.max(zero).sqrt()];
-                uses[i] = w * block.caps[i];
+            for (uses, (motion, cap)) in uses.iter_mut().zip(motion.iter().zip(&block.caps)) {
+                *uses = motion[0] * *cap;
             }
             let [from, to] = block.at_stations;
             let at_stations = (u[0] * from).max(u[2] * to);
@@ -156,6 +159,93 @@ impl IntersampleCheck {
         }
         out
     }
+
+    /// The time that each interval loses because the spline x uses limits in it unevenly, to first order in s: Σ λ (greatest −
+    /// mean use) over all limits, λ the sum of its multipliers at the collocation points. `used` is that of `utilisation`.
+    pub fn losses(&self, rows: &Constraints, x: &[f64], dual: &[Lanes], used: &[[f64; 3]]) -> Vec<f64> {
+        dispatch!(Level::new(), simd => self.losses_on(simd, rows, x, dual, used))
+    }
+
+    #[inline(always)]
+    fn losses_on<S: Simd>(
+        &self,
+        simd: S,
+        rows: &Constraints,
+        x: &[f64],
+        dual: &[Lanes],
+        used: &[[f64; 3]],
+    ) -> Vec<f64> {
+        let (x, layout) = (Columns::new(x), rows.layout());
+        let zero = Register::all(simd, 0.0);
+        let mut multipliers = vec![zero; layout.positive()];
+        let mut out = Vec::with_capacity(rows.blocks.len() * LANES);
+        for (b, (block, used)) in self.blocks.iter().zip(used.chunks(LANES)).enumerate() {
+            let h = rows.blocks[b].h.load(simd);
+            let (u, per_h) = (x.local(b, h, rows.blocks[b].live), h.inverse());
+            let motion = motions(&u, per_h);
+            let greatest = |limit: usize| {
+                Lanes::new(std::array::from_fn(|lane| {
+                    used.get(lane).map_or(1.0, |used| used[limit].max(1.0))
+                }))
+            };
+            let [speed, acceleration, jerk] = [0, 1, 2].map(greatest);
+            let (speed, acceleration, jerk) = (speed.load(simd), acceleration.load(simd), jerk.load(simd));
+            let jerk_factor = block.jerk_factor.load(simd);
+            let mut caps = [zero; SAMPLES];
+            for (cap, own) in caps.iter_mut().zip(&block.caps) {
+                *cap = own.load(simd);
+            }
+            multipliers.fill(zero);
+            for (p, value) in VALUE.iter().enumerate() {
+                let pace = combine(value, &u).sqrt().inverse();
+                for (k, (sum, own)) in multipliers.iter_mut().zip(layout.of(dual, b, p)).enumerate() {
+                    let own = own.load(simd);
+                    // Those of jerk are of the jerk over √w.
+                    *sum += if k < layout.speed() && k % RowLayout::OF_AXIS >= 2 { own * pace } else { own };
+                }
+            }
+            let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
+            let mut loss = zero;
+            for ((axis, q), own) in axes.zip(multipliers.chunks_exact(RowLayout::OF_AXIS)) {
+                let Axis { velocity, acceleration: most, per_jerk } = axis;
+                let [mut a, mut j] = [zero; 2];
+                for i in 0..SAMPLES {
+                    let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
+                    a += (q2 * w + q1 * half) * MEAN[i];
+                    j += (q3 * w + q2 * half * 3.0 + q1 * bend) * v * MEAN[i];
+                    let first = q1.load(simd) * velocity.per_mean;
+                    let first = (first * velocity.per_most[0]).max(-first * velocity.per_most[1]);
+                    caps[i] = caps[i].max(first * first);
+                }
+                let (a, j) = (a * most.per_mean, j * jerk_factor * *per_jerk);
+                loss += (acceleration * most.most[0] - a).max(zero) * own[0];
+                loss += (acceleration * most.most[1] + a).max(zero) * own[1];
+                loss += (jerk - j).max(zero) * own[2] + (jerk + j).max(zero) * own[3];
+            }
+            let mut mean = zero;
+            for (i, cap) in caps.iter().enumerate() {
+                mean += motion[i][0] * *cap * MEAN[i];
+            }
+            loss += (speed * speed - mean).max(zero) * multipliers[layout.speed()];
+            out.extend_from_slice(&loss.values());
+        }
+        out.truncate(rows.count());
+        out
+    }
+}
+
+/// w, w'/2, w''/2 and √w at each sample.
+#[inline(always)]
+fn motions<S: Simd>(u: &[Register<S>; 4], per_h: Register<S>) -> [[Register<S>; 4]; SAMPLES] {
+    let zero = Register::all(per_h.simd(), 0.0);
+    let mut out = [[zero; 4]; SAMPLES];
+    for (motion, basis) in out.iter_mut().zip(&BASES) {
+        let w = combine(&basis[0], u);
+        let half = combine(&basis[1], u) * per_h * 0.5;
+        let bend = combine(&basis[2], u) * (per_h * per_h) * 0.5;
+        *motion = [w, half, bend, w.max(zero).sqrt()];
+    }
+    out
 }
 
 /// Number of samples in each polynomial that interpolates half-way between samples.
@@ -221,7 +311,11 @@ fn peak<S: Simd>(f: &[Register<S>; SAMPLES], [per_high, per_low]: [f64; 2]) -> R
 
 #[cfg(test)]
 mod tests {
+    use super::super::prepare::Prepared;
+    use super::super::profiles::{random, Winding};
+    use super::super::window::Window;
     use super::*;
+    use crate::path_problem::{Effort, End, Problem};
 
     /// The greatest use by eight functions; each is alone in the others' place, too.
     fn peaks(functions: [&dyn Fn(f64) -> f64; LANES], per_most: [f64; 2]) -> [f64; LANES] {
@@ -244,6 +338,69 @@ mod tests {
             assert!((low - 0.5).abs() < 3e-6 && (straight - 0.98).abs() < 1e-15, "{low} and {straight}");
             let [twice, half, ..] = peaks(all, [2.0, 0.5]);
             assert_eq!((twice, half), (2.0 * one, 0.5 * one));
+        }
+    }
+
+    /// The loss of interval n by the definition, without vectors.
+    fn loss(window: &Window, x: &[f64], dual: &[Lanes], used: &[f64; 3], n: usize) -> f64 {
+        let Window { rows, check } = window;
+        let (b, lane, layout, h) = (n / LANES, n % LANES, rows.layout(), rows.h(n));
+        let u = hermite::local(x, n, h);
+        let most = used.map(|used| used.max(1.0));
+        let multiplier = |k: usize, p: usize| layout.of(dual, b, p)[k].values()[lane];
+        let over = |k: usize, of: &dyn Fn(f64) -> f64| -> f64 {
+            (0..4).map(|p| multiplier(k, p) * of(combine(&VALUE[p], &u))).sum()
+        };
+        let mut caps = std::array::from_fn::<_, SAMPLES, _>(|i| check.blocks[b].caps[i].values()[lane]);
+        let mut sum = 0.0;
+        for (k, axis) in check.axes.iter().enumerate() {
+            let (mut a, mut j) = (0.0, 0.0);
+            for i in 0..SAMPLES {
+                let [w, slope, bend]: [f64; 3] = BASES[i].map(|basis| combine(&basis, &u));
+                let (slope, bend) = (slope / h, bend / (h * h));
+                let q = check.q[b * check.axes.len() + k][i].map(|q| q.values()[lane]);
+                a += MEAN[i] * (q[1] * w + 0.5 * q[0] * slope) * axis.acceleration.per_mean;
+                let jerk = q[2] * w + 1.5 * q[1] * slope + 0.5 * q[0] * bend;
+                j += MEAN[i] * jerk * w.sqrt() * axis.per_jerk * rows.jerk(n);
+                let sign = usize::from(q[0] < 0.0);
+                caps[i] = caps[i].max((q[0] * axis.velocity.per_mean * axis.velocity.per_most[sign]).powi(2));
+            }
+            let [up, down] = axis.acceleration.most;
+            let one = |_: f64| 1.0;
+            sum += over(4 * k, &one) * (up * most[1] - a).max(0.0);
+            sum += over(4 * k + 1, &one) * (down * most[1] + a).max(0.0);
+            let pace = |w: f64| 1.0 / w.sqrt();
+            sum += over(4 * k + 2, &pace) * (most[2] - j).max(0.0);
+            sum += over(4 * k + 3, &pace) * (most[2] + j).max(0.0);
+        }
+        let speed: f64 = (0..SAMPLES).map(|i| MEAN[i] * caps[i] * combine(&BASES[i][0], &u)).sum();
+        sum + over(layout.speed(), &|_| 1.0) * (most[0].powi(2) - speed).max(0.0)
+    }
+
+    #[test]
+    fn losses_are_those_of_their_definition() {
+        let (up, down) = ([250.0, 300.0], [250.0, 200.0]);
+        let limits = Limits {
+            velocity: [up, down],
+            acceleration: [[3000.0, 2000.0], [2500.0; 2]],
+            jerk: [50_000.0; 2],
+        };
+        let problem = Problem { geometry: &Winding::new(1.0), limits, caps: &[], ends: [End::Rest; 2] };
+        let prepared = Prepared::new(&problem, &Effort::default()).expect("a first plan");
+        let mut window = Window::new(&limits);
+        // One interval alone is in the last block.
+        prepared.fill(0..LANES * 6 + 1, &mut window);
+        let (rows, check) = (&window.rows, &window.check);
+        let x: Vec<f64> = prepared.x[..2 * rows.count() + 2].iter().map(|x| 1.9 * x).collect();
+        let mut random = random();
+        let mut some = || Lanes::new(std::array::from_fn(|_| 1.0 + random()));
+        let dual: Vec<Lanes> = (0..rows.blocks.len() * rows.layout().all()).map(|_| some()).collect();
+        let used = check.utilisation(rows, &x);
+        let losses = check.losses(rows, &x, &dual, &used);
+        assert_eq!(losses.len(), rows.count());
+        for (n, (found, used)) in losses.into_iter().zip(&used).enumerate() {
+            let known = loss(&window, &x, &dual, used, n);
+            assert!((found / known - 1.0).abs() < 1e-12, "{found} and {known} on {n}");
         }
     }
 

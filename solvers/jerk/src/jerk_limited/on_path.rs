@@ -32,6 +32,10 @@ const ROUNDS: usize = 4;
 /// least `LEAST`: the error grows by about `FINER` over that of a subrun that is planned as a whole.
 const FINER: f64 = 0.05;
 const LEAST: f64 = 6.0;
+/// A stretch shorter than this part of its path has lengths of few digits.
+const FEW_DIGITS: f64 = 1e-7;
+/// It is planned with so many times the resolution.
+const FINER_THERE: f64 = 3.0;
 /// Bisection steps for the greatest speed that an end can have.
 const TRIALS: u32 = 12;
 
@@ -277,7 +281,10 @@ impl<const M: usize> Task<'_, M> {
         let problem =
             path_problem::Problem { geometry: &own, limits: self.limits, caps: &caps, ends: states };
         let moves = moving(self.problem, path, ends);
-        let plan = moving_axes::plan(&problem, &moves, &Effort { watch, ..*effort });
+        // Short intervals leave room below the limits for the rounding of such lengths.
+        let few_digits = ends[1] - ends[0] < FEW_DIGITS * path.total();
+        let resolution = if few_digits { FINER_THERE } else { 1.0 } * effort.resolution;
+        let plan = moving_axes::plan(&problem, &moves, &Effort { resolution, watch, ..*effort });
         let plan = plan.map_err(|fault| match fault {
             path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
             fault => fault,

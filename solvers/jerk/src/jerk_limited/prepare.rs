@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::constraints::Constraints;
 use super::grid::Grid;
+use super::hermite;
 use super::initial_plan;
 use super::rest_ramp::{self, Ramp};
 use super::speed_envelope::{sample_envelope, Slopes};
@@ -31,7 +32,7 @@ pub struct Prepared<'a, G, const M: usize> {
     pub bound_ends: [WindowEnd; 2],
     /// The constraints on all intervals, where one window takes them all.
     rows: Option<Constraints>,
-    /// A valid plan (w_0, w'_0, w_1, …).
+    /// A valid plan (w_0, w'_0, w_1, …); empty where none was found.
     pub x: Vec<f64>,
     /// The greatest speed that the envelope allows on each interval, in mm/s.
     pub speeds: Vec<f64>,
@@ -59,13 +60,46 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         )?;
         let grid = Grid::new(&samples, slopes, problem.caps, &ends, effort.resolution);
         watch.check();
+        let mut prepared = Self::on(problem, grid, [ends, bound_ends], slopes, effort);
+        prepared.begin();
+        Ok(prepared)
+    }
+
+    /// The same problem with each interval in a number of equal parts; with the same first plan, where that is valid.
+    pub fn refined(&self, parts: &[u32], effort: &Effort<'a>) -> Self {
+        let grid = self.grid.refined(parts);
+        let mut fine = Self::on(self.problem, grid, [self.ends, self.bound_ends], self.slopes, effort);
+        if !self.x.is_empty() {
+            let mut first = 0;
+            let lengths: Vec<f64> = fine.grid.stations.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let groups = parts.iter().map(|&parts| {
+                first += parts as usize;
+                &lengths[first - parts as usize..first]
+            });
+            fine.x = hermite::prolong(&self.x, groups);
+            fine.used =
+                fine.each(|rows, x| rows.utilisation(x).into_iter().map(initial_plan::kept).collect());
+        }
+        if fine.x.is_empty() || fine.used.iter().any(|&used| used > 1.0) {
+            fine.begin();
+        }
+        fine
+    }
+
+    fn on(
+        problem: &'a Problem<'a, G, M>,
+        grid: Grid,
+        [ends, bound_ends]: [[WindowEnd; 2]; 2],
+        slopes: Slopes,
+        effort: &Effort<'a>,
+    ) -> Self {
         let whole = || {
-            let mut rows = Constraints::new(limits);
+            let mut rows = Constraints::new(&problem.limits);
             grid.sample(problem, 0..grid.pieces.len(), &mut rows);
             rows
         };
         let rows = (grid.pieces.len() <= effort.window).then(whole);
-        let mut prepared = Self {
+        Self {
             problem,
             grid,
             ends,
@@ -75,14 +109,12 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
             speeds: vec![],
             used: vec![],
             slopes,
-            watch,
-        };
-        prepared.begin()?;
-        Ok(prepared)
+            watch: effort.watch.part(PREPARING),
+        }
     }
 
-    /// The first plan.
-    fn begin(&mut self) -> Result<(), Fault> {
+    /// Makes the first plan.
+    fn begin(&mut self) {
         let (limits, slopes) = (&self.problem.limits, self.slopes);
         let mut caps =
             self.each(|rows, _| (0..rows.count()).map(|n| rows.envelope_cap(n, limits, slopes.k)).collect());
@@ -95,7 +127,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
                 self.each(|rows, x| rows.utilisation(x).into_iter().map(initial_plan::used).collect());
             worst = self.used.iter().copied().fold(0.0, f64::max);
             if worst <= 1.0 {
-                return Ok(());
+                return;
             }
             for (n, &used) in self.used.iter().enumerate() {
                 if used > 1.0 {
@@ -106,10 +138,9 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         }
         let scale = 1.0 / worst;
         if scale == 0.0 || self.ends.iter().any(|kind| matches!(kind, WindowEnd::Fixed { .. })) {
-            return Err(Fault::NoPlan { s: self.grid.stations[0] });
+            self.x.clear();
         }
         self.x.iter_mut().for_each(|x| *x *= scale);
-        Ok(())
     }
 
     /// f(constraints of some intervals, x at their stations) for all intervals.

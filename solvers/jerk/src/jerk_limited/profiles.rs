@@ -120,7 +120,7 @@ pub fn planned(geometry: &impl Geometry<2>, work: impl Fn(&Planned, &Effort)) {
     let (tolerance, max_iterations, barrier) = (1e-7, 400, 1.0);
     let effort = Effort { tolerance, max_iterations, deadline: None, barrier, warm: false, watch };
     let mut exact = InteriorPoint::default();
-    window.improve(prepared.ends, &mut x, &effort, &mut exact);
+    window.improve(prepared.ends, &mut x, None, &effort, &mut exact);
     let (tight, ends, at_ends) = (&window.rows, prepared.ends, [true; 2]);
     work(&Planned { rows: &rows, tight, ends, at_ends, x: &x, solved: &exact }, &effort);
 }

@@ -24,7 +24,7 @@ const USED: f64 = 0.75;
 const OCTAVES: i32 = 12;
 /// Points between the neighbours of the worst point, and rounds of this refinement.
 const SAMPLES: usize = 16;
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 4;
 
 /// The length of a ramp, and the power of s to which w is proportional on it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,12 +7,13 @@ use super::exact::Exact;
 use super::hermite::{blend, duration};
 use super::interior_point::{Effort, Outcome, Report};
 use super::intersample_check::IntersampleCheck;
+use super::refinement::{self, RoughPlan};
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use crate::path_problem::Limits;
 
 /// Greatest use of a limit that counts as kept: rounding, and the error of peaks between samples.
-pub const HELD: f64 = 1.0 + 4e-7;
+pub const HELD: f64 = 1.0 + 2e-7;
 /// Limits are tightened by the excess plus a margin: this part of the excess, and at least this part of the limit.
 /// Greater margins would make kinks beside intervals that are not tightened.
 const MARGIN: [f64; 2] = [0.1, 1e-6];
@@ -20,19 +21,17 @@ const MARGIN: [f64; 2] = [0.1, 1e-6];
 const RISE: f64 = 4.0;
 /// Rounds of tightening.
 const ROUNDS: usize = 10;
-/// Complementarity gap at which the first round ends. Where an interval then uses more than the second number of a
-/// limit at its collocation points, peaks exceed these points by about as much as in the final plan.
-const ROUGH: (f64, f64) = (1e-4, 0.97);
-/// Peaks that exceed the collocation points by more than this factor still move.
-const FIRM: f64 = 1.05;
 /// Iterations start from this multiple of the first plan, which may be on a limit.
 const INSIDE: f64 = 0.8;
 /// Parts of the way back to the first plan that are tried in order to be inside tightened limits …
 const BACK: [f64; 13] = [3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
 /// … and the factor by which the start is farther back, so that it is not on a limit.
-const FURTHER: f64 = 2.0;
+const FURTHER: f64 = 1.5;
 /// The first barrier there, as a part of the way back.
-const BARRIER: f64 = 0.03;
+const BARRIER: f64 = 0.1;
+/// Parts of the way from a rough plan to the first plan that are tried, and the first barrier there.
+const NEAR: [f64; 3] = [0.05, 0.15, 0.4];
+const NEAR_BARRIER: f64 = 0.1;
 /// Parts of the way back to the former plan that are tried where the new plan breaks a limit.
 const RETREATS: [f64; 11] = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.15, 0.4, 0.7, 0.9];
 /// A retreat that costs at most this multiple of the tolerance is as good as the plan.
@@ -60,27 +59,35 @@ impl Window {
         Self { rows: Constraints::new(limits), check: IntersampleCheck::new(limits) }
     }
 
-    /// Improves the valid plan x in place. The limits at given ends have been dropped.
+    /// Improves the valid plan x in place, from a rough plan if one is known. The limits at given ends have been dropped.
     pub fn improve(
         &mut self,
         ends: [WindowEnd; 2],
         x: &mut [f64],
+        rough: Option<&RoughPlan>,
         effort: &Effort,
         space: &mut InteriorPoint<Exact>,
     ) -> WindowReport {
         let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
-        let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
-        let (mut attempts, spent) = coarse::starts(&self.rows, ends, inside(x), &rough, space);
-        verdict.iterations = spent;
+        let far = inside(x);
+        let mut attempts = vec![];
+        if let Some(RoughPlan { x: near, peaks, .. }) = rough {
+            for (n, &peaks) in peaks.iter().enumerate().filter(|(_, peaks)| **peaks != [1.0; 3]) {
+                self.rows.tighten(n, peaks.map(f64::from));
+            }
+            let own = Effort { barrier: NEAR_BARRIER, ..*effort };
+            attempts.extend(NEAR.map(|part| (blend(&far, near, part), own)));
+        }
+        attempts.push((far, *effort));
         let mut times = vec![0; self.rows.count()];
-        for round in 0..ROUNDS {
+        for _ in 0..ROUNDS {
             let Some((y, report)) = self.attempt(ends, attempts, space, &mut verdict.iterations) else {
                 break;
             };
-            let holds = self.tighten(&y, &mut times, round == 0);
+            let holds = self.tighten(&y, &mut times);
             let stopped = report.outcome == Outcome::Stopped;
-            if holds && (round > 0 || stopped) {
+            if holds {
                 if report.time < best {
                     improved = y;
                     verdict.excess = report.excess;
@@ -95,8 +102,7 @@ impl Window {
                     improved.copy_from_slice(&z);
                     verdict.excess = report.excess + (time - report.time);
                 }
-                verdict.converged =
-                    !stopped && round > 0 && time <= report.time * (1.0 + CHEAP * effort.tolerance);
+                verdict.converged = !stopped && time <= report.time * (1.0 + CHEAP * effort.tolerance);
             }
             if stopped || verdict.converged {
                 break;
@@ -105,6 +111,23 @@ impl Window {
         }
         x.copy_from_slice(&improved);
         verdict
+    }
+
+    /// The optimum at the collocation points, roughly, from a valid plan; None where it is not found. `resolution` is that of an
+    /// even grid which would lose about as much as the one that follows.
+    pub fn rough(
+        &self,
+        ends: [WindowEnd; 2],
+        x: &[f64],
+        resolution: f64,
+        effort: &Effort,
+        space: &mut InteriorPoint<Exact>,
+    ) -> Option<RoughPlan> {
+        let effort = Effort { tolerance: refinement::tolerance(resolution), ..*effort };
+        let (starts, mut spent) = coarse::starts(&self.rows, ends, inside(x), &effort, space);
+        let (y, report) = self.attempt(ends, starts, space, &mut spent)?;
+        let found = report.outcome != Outcome::Stopped;
+        found.then(|| RoughPlan::new(&self.rows, &self.check, y, &space.state.dual, resolution))
     }
 
     /// Solves from the first start that leads to a plan; `spent` counts the iterations of all.
@@ -168,30 +191,20 @@ impl Window {
     }
 
     /// Tightens the limits where x exceeds them between the collocation points, and counts how often; false if x
-    /// exceeds any. A rough x stays inside its limits; there they are tightened by the ratio of the peak to the
-    /// collocation points.
-    fn tighten(&mut self, x: &[f64], times: &mut [i32], rough: bool) -> bool {
+    /// exceeds any.
+    fn tighten(&mut self, x: &[f64], times: &mut [i32]) -> bool {
         let mut holds = true;
-        let at = if rough { self.rows.utilisation(x) } else { vec![] };
         let all = self.check.utilisation(&self.rows, x);
-        for (n, (times, mut used)) in times.iter_mut().zip(all).enumerate() {
+        for (n, (times, used)) in times.iter_mut().zip(all).enumerate() {
+            if used.iter().all(|&used| used <= HELD) {
+                continue;
+            }
+            holds = false;
             let margin = MARGIN.map(|least| least * RISE.powi(*times));
-            holds &= used.iter().all(|&used| used <= HELD);
-            if rough {
-                for (used, at) in used.iter_mut().zip(at[n]) {
-                    if at > ROUGH.1 && *used < FIRM * at {
-                        *used /= at;
-                    }
-                }
-            }
-            let factors =
-                used.map(
-                    |used| if used > HELD { used + (margin[0] * (used - 1.0)).max(margin[1]) } else { 1.0 },
-                );
-            if factors != [1.0; 3] {
-                *times += 1;
-                self.rows.tighten(n, factors);
-            }
+            let factor =
+                |used: f64| if used > HELD { used + (margin[0] * (used - 1.0)).max(margin[1]) } else { 1.0 };
+            *times += 1;
+            self.rows.tighten(n, used.map(factor));
         }
         holds
     }

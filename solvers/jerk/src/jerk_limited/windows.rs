@@ -4,6 +4,9 @@
 //! its limits and leave almost no interior to start from. The effect of an end decays with the travel time from
 //! it: two windows agree to 1e-8 within two or three stop times inside their overlap, and are blended there. Where no
 //! blend keeps the limits, both windows are solved as one. Only a few windows at a time are in memory.
+//!
+//! All windows are planned twice: roughly on a coarse grid, which shows where the grid needs short intervals, and on that
+//! grid.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -18,11 +21,14 @@ use super::interior_point;
 use super::lower_bound::{self, Part, Planned};
 use super::prepare::{Prepared, PREPARING};
 use super::profile::{Plan, Profile};
+use super::refinement::RoughPlan;
 use super::relaxed::Relaxed;
+use super::rest_ramp;
 use super::window::{ramps, Window, WindowReport};
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use crate::path_problem::{Effort, Fault, Geometry, Limits, Problem};
+use feedplan_geometry::watch::Watch;
 
 /// Windows reach this many stop times and intervals beyond their cuts: the time of the first plan on the way there (the optimum
 /// takes a third of it or more) over the time to stop from the greatest speed that the envelope allows on that way.
@@ -32,6 +38,12 @@ const REACH: (f64, usize) = (11.0, 80);
 const EASE: usize = 20;
 /// Least travel time from cut to cut, in the same stop times.
 const LONG: f64 = 36.0;
+/// Intervals of an even grid in one of the grid of rough plans.
+const COARSE: u32 = 3;
+/// No part of an interval is shorter than this part of the path: arc lengths have no digits for less.
+const SHORTEST: f64 = rest_ramp::SHORTEST / 16.0;
+/// The share of the rough plans in the work.
+const ROUGH: f64 = 0.3;
 /// Windows that are solved before their plans are joined, for each thread.
 const BATCH: usize = 8;
 /// Windows are blended over that part of their overlap where they agree best, of this many parts, else of fewer.
@@ -41,69 +53,61 @@ const BLENDED: f64 = 1.0 + 5e-7;
 
 /// The plan of least time.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
-    let prepared = Prepared::new(problem, effort)?;
-    let mut x = prepared.x.clone();
-    let run = Run { prepared: &prepared, effort, stations: &prepared.grid.stations, idle: Mutex::default() };
-    let cuts = run.cuts();
-    let windows = run.windows(&cuts);
-    let mut parts = vec![];
-    let watch = effort.watch.part(1.0 - PREPARING).each(windows.iter().map(Range::len).sum());
-    let mut counts = Counts { converged: true, steps: 0.0, excess: 0.0 };
-    for first in (0..windows.len()).step_by(BATCH * rayon::current_num_threads()) {
-        if effort.expired() {
-            counts.converged = false;
-            break;
-        }
-        let batch = first..windows.len().min(first + BATCH * rayon::current_num_threads());
-        let solved: Vec<_> = windows[batch.clone()]
-            .par_iter()
-            .zip(cuts[batch.start..].par_windows(2))
-            .map(|(range, core)| {
-                let solved = run.solve(range, core[0]..core[1]);
-                watch.advance(range.len());
-                solved
-            })
-            .collect();
-        for (at, (y, verdict, part)) in batch.clone().zip(solved) {
-            parts.extend(part);
-            counts.add(&verdict, windows[at].len());
-            let reached = if at == 0 { 0 } else { windows[at - 1].end };
-            let joined = run.join(&mut x, reached, windows[at].start, &y).or_else(|| {
-                let both = windows[at - 1].start..windows[at].end;
-                let (y, verdict, _) = run.solve(&both, both.start..both.start);
-                counts.add(&verdict, both.len());
-                run.join(&mut x, reached, both.start, &y)
-            });
-            match joined {
-                Some(loss) => counts.excess += loss,
-                None => {
-                    // The window starts again from the first plan, where the last one ends.
-                    let rest = reached..windows[at].end;
-                    let (y, verdict, _) = run.solve(&rest, rest.start..rest.start);
-                    counts.add(&verdict, rest.len());
-                    counts.converged = false;
-                    x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
+    let coarse = Effort {
+        resolution: effort.resolution / f64::from(COARSE),
+        window: effort.window / 2,
+        watch: effort.watch.part(ROUGH),
+        ..*effort
+    };
+    let effort = &Effort { watch: effort.watch.part(1.0 - ROUGH), ..*effort };
+    let rough = Prepared::new(problem, &coarse)?;
+    let shortest = SHORTEST * problem.geometry.knots().last().copied().unwrap_or(0.0);
+    let (mut sections, mut parts) = (vec![], vec![COARSE; rough.grid.pieces.len()]);
+    if !rough.x.is_empty() {
+        let run = Run::new(&rough, &coarse);
+        sections = run.sections();
+        run.roughly(&mut sections, effort.resolution);
+        for Section { range, core, rough } in &sections {
+            match rough {
+                Some(rough) => {
+                    let own = core.start - range.start..core.end - range.start;
+                    parts[core.clone()].copy_from_slice(&rough.parts[own]);
                 }
+                None if effort.expired() => parts[core.clone()].fill(1),
+                None => {}
             }
         }
     }
-    for (kind, station) in prepared.ends.iter().zip([0, run.stations.len() - 1]) {
-        if !kind.is_met(x[2 * station], x[2 * station + 1]) {
-            return Err(Fault::NoPlan { s: run.stations[station] });
-        }
+    for (parts, h) in parts.iter_mut().zip(rough.grid.stations.windows(2).map(|pair| pair[1] - pair[0])) {
+        *parts = (*parts).min((h / shortest) as u32).max(1);
     }
-    let count = run.stations.len() - 1;
-    let time: f64 = (0..count).map(|n| duration(&x, n, run.stations[n + 1] - run.stations[n])).sum();
-    let time = time + ramps(&prepared.ends, &x);
-    let lower_bound = if parts.len() == windows.len() { time * lower_bound::join(&parts) } else { f64::NAN };
-    Ok(Plan {
-        time,
-        lower_bound,
-        converged: counts.converged,
-        excess: counts.excess,
-        iterations: counts.steps / count as f64,
-        profile: run.profile(&x),
-    })
+    let prepared = rough.refined(&parts, effort);
+    drop(rough);
+    if prepared.x.is_empty() {
+        return Err(Fault::NoPlan { s: prepared.grid.stations[0] });
+    }
+    let run = Run::new(&prepared, effort);
+    if sections.is_empty() {
+        sections = run.sections();
+    } else {
+        run.refine(&mut sections, &parts);
+    }
+    run.plan(&sections)
+}
+
+/// Some neighbouring intervals that are solved as one window.
+struct Section {
+    /// With the overlaps.
+    range: Range<usize>,
+    core: Range<usize>,
+    rough: Option<RoughPlan>,
+}
+
+impl Section {
+    /// Without a core.
+    fn alone(range: Range<usize>) -> Self {
+        Self { core: range.start..range.start, range, rough: None }
+    }
 }
 
 struct Counts {
@@ -157,7 +161,133 @@ struct Drive {
     speed: f64,
 }
 
-impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
+impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
+    fn new(prepared: &'a Prepared<'a, G, M>, effort: &'a Effort<'a>) -> Self {
+        Self { prepared, effort, stations: &prepared.grid.stations, idle: Mutex::default() }
+    }
+
+    /// The plan of all sections.
+    fn plan(&self, sections: &[Section]) -> Result<Plan, Fault> {
+        let mut x = self.prepared.x.clone();
+        let mut parts = vec![];
+        let watch = self.watch(sections);
+        let mut counts = Counts { converged: true, steps: 0.0, excess: 0.0 };
+        for (first, batch) in (0..).step_by(self.batch()).zip(sections.chunks(self.batch())) {
+            if self.effort.expired() {
+                counts.converged = false;
+                break;
+            }
+            let solved: Vec<_> = batch
+                .par_iter()
+                .map(|section| {
+                    let solved = self.solve(section);
+                    watch.advance(section.range.len());
+                    solved
+                })
+                .collect();
+            for (at, (y, verdict, part)) in (first..).zip(solved) {
+                parts.extend(part);
+                let range = &sections[at].range;
+                counts.add(&verdict, range.len());
+                let before = if at == 0 { 0..0 } else { sections[at - 1].range.clone() };
+                let joined = self.join(&mut x, before.end, range.start, &y).or_else(|| {
+                    let both = Section::alone(before.start..range.end);
+                    let (y, verdict, _) = self.solve(&both);
+                    counts.add(&verdict, both.range.len());
+                    self.join(&mut x, before.end, before.start, &y)
+                });
+                match joined {
+                    Some(loss) => counts.excess += loss,
+                    None => {
+                        // The window starts again from the first plan, where the last one ends.
+                        let rest = Section::alone(before.end..range.end);
+                        let (y, verdict, _) = self.solve(&rest);
+                        counts.add(&verdict, rest.range.len());
+                        counts.converged = false;
+                        x[2 * before.end..2 * range.end + 2].copy_from_slice(&y);
+                    }
+                }
+            }
+        }
+        for (kind, station) in self.prepared.ends.iter().zip([0, self.stations.len() - 1]) {
+            if !kind.is_met(x[2 * station], x[2 * station + 1]) {
+                return Err(Fault::NoPlan { s: self.stations[station] });
+            }
+        }
+        let count = self.stations.len() - 1;
+        let time: f64 = (0..count).map(|n| duration(&x, n, self.length(n))).sum();
+        let time = time + ramps(&self.prepared.ends, &x);
+        let lower_bound =
+            if parts.len() == sections.len() { time * lower_bound::join(&parts) } else { f64::NAN };
+        Ok(Plan {
+            time,
+            lower_bound,
+            converged: counts.converged,
+            excess: counts.excess,
+            iterations: counts.steps / count as f64,
+            profile: self.profile(&x),
+        })
+    }
+
+    /// Adds rough plans where they are found.
+    fn roughly(&self, sections: &mut [Section], resolution: f64) {
+        let watch = self.watch(sections);
+        sections.par_iter_mut().for_each(|Section { range, rough, .. }| {
+            if self.effort.expired() {
+                return;
+            }
+            let x = &self.prepared.x[2 * range.start..2 * range.end + 2];
+            let ends = self.ends(range, self.prepared.ends, x);
+            *rough = self.in_space(|Space { window, exact, .. }| {
+                self.prepared.fill(range.clone(), window);
+                window.rows.drop_at_ends(&ends);
+                window.rough(ends, x, resolution, &self.solver(), exact)
+            });
+            watch.advance(range.len());
+        });
+    }
+
+    /// Takes sections of a coarse grid whose intervals were split into these numbers of parts.
+    fn refine(&self, sections: &mut [Section], parts: &[u32]) {
+        let mut starts = vec![0];
+        starts.extend(parts.iter().scan(0, |end, &parts| {
+            *end += parts as usize;
+            Some(*end)
+        }));
+        let fine = |range: &Range<usize>| starts[range.start]..starts[range.end];
+        for Section { range, core, rough } in sections {
+            let own = fine(range);
+            if let Some(rough) = rough {
+                let lengths: Vec<f64> = own.clone().map(|n| self.length(n)).collect();
+                rough.refine(&parts[range.clone()], &lengths);
+            }
+            (*range, *core) = (own, fine(core));
+        }
+    }
+
+    /// Sections that are solved before their plans are joined.
+    fn batch(&self) -> usize {
+        BATCH * rayon::current_num_threads()
+    }
+
+    /// Counts intervals of sections, overlaps included.
+    fn watch(&self, sections: &[Section]) -> Watch<'_> {
+        let intervals = sections.iter().map(|section| section.range.len()).sum();
+        self.effort.watch.part(1.0 - PREPARING).each(intervals)
+    }
+
+    /// The length of an interval in mm.
+    fn length(&self, n: usize) -> f64 {
+        self.stations[n + 1] - self.stations[n]
+    }
+
+    /// The path in sections, without rough plans.
+    fn sections(&self) -> Vec<Section> {
+        let cuts = self.cuts();
+        let section = |(range, core): (_, &[usize])| Section { range, core: core[0]..core[1], rough: None };
+        self.windows(&cuts).into_iter().zip(cuts.windows(2)).map(section).collect()
+    }
+
     /// The windows, each with its overlaps.
     fn windows(&self, cuts: &[usize]) -> Vec<Range<usize>> {
         let reach = |from: usize, to: usize| {
@@ -210,7 +340,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     /// The drive that goes on over interval n.
     fn onward(&self, drive: &Drive, n: usize) -> Drive {
         let x = &self.prepared.x;
-        let time = drive.time + duration(x, n, self.stations[n + 1] - self.stations[n]);
+        let time = drive.time + duration(x, n, self.length(n));
         Drive { time, speed: drive.speed.max(self.prepared.speeds[n]) }
     }
 
@@ -228,39 +358,48 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         done
     }
 
-    /// Solves a window between states of the first plan; with the lower bound of the intervals `core` in it.
-    fn solve(&self, range: &Range<usize>, core: Range<usize>) -> (Vec<f64>, WindowReport, Option<Part>) {
-        self.in_space(|space| self.solve_in(space, range, core))
-    }
-
-    fn solve_in(
-        &self,
-        space: &mut Space,
-        range: &Range<usize>,
-        core: Range<usize>,
-    ) -> (Vec<f64>, WindowReport, Option<Part>) {
-        let Space { window, loose, exact, relaxed } = space;
-        let mut y = self.prepared.x[2 * range.start..2 * range.end + 2].to_vec();
-        let at_ends = [range.start == 0, range.end + 1 == self.stations.len()];
-        let ends_of = |known: [WindowEnd; 2]| {
-            [0, 1].map(|end| {
-                let at = end * (y.len() - 2);
-                if at_ends[end] {
-                    known[end]
-                } else {
-                    WindowEnd::Fixed { w: y[at], slope: y[at + 1] }
-                }
-            })
-        };
-        let [ends, bound_ends] = [self.prepared.ends, self.prepared.bound_ends].map(ends_of);
-        let effort = interior_point::Effort {
+    /// The effort for each window.
+    fn solver(&self) -> interior_point::Effort<'_> {
+        interior_point::Effort {
             tolerance: self.effort.tolerance,
             max_iterations: self.effort.max_iterations,
             deadline: self.effort.deadline,
             barrier: 1.0,
             warm: false,
             watch: self.effort.watch,
-        };
+        }
+    }
+
+    /// Whether the window of these intervals ends where the path does.
+    fn at_ends(&self, range: &Range<usize>) -> [bool; 2] {
+        [range.start == 0, range.end + 1 == self.stations.len()]
+    }
+
+    /// The ends of a window: states of x, and those of the path where it ends there.
+    fn ends(&self, range: &Range<usize>, of_path: [WindowEnd; 2], x: &[f64]) -> [WindowEnd; 2] {
+        let at_ends = self.at_ends(range);
+        [0, 1].map(|end| {
+            let at = end * (x.len() - 2);
+            if at_ends[end] {
+                of_path[end]
+            } else {
+                WindowEnd::Fixed { w: x[at], slope: x[at + 1] }
+            }
+        })
+    }
+
+    /// Solves a window between states of the first plan; with the lower bound of its core.
+    fn solve(&self, section: &Section) -> (Vec<f64>, WindowReport, Option<Part>) {
+        self.in_space(|space| self.solve_in(space, section))
+    }
+
+    fn solve_in(&self, space: &mut Space, section: &Section) -> (Vec<f64>, WindowReport, Option<Part>) {
+        let Section { range, core, rough } = section;
+        let Space { window, loose, exact, relaxed } = space;
+        let mut y = self.prepared.x[2 * range.start..2 * range.end + 2].to_vec();
+        let [ends, bound_ends] =
+            [self.prepared.ends, self.prepared.bound_ends].map(|of_path| self.ends(range, of_path, &y));
+        let (at_ends, effort) = (self.at_ends(range), self.solver());
         self.prepared.fill(range.clone(), window);
         let proves = self.effort.proves && !core.is_empty();
         if proves {
@@ -268,7 +407,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             loose.drop_at_ends(&bound_ends);
         }
         window.rows.drop_at_ends(&ends);
-        let verdict = window.improve(ends, &mut y, &effort, exact);
+        let verdict = window.improve(ends, &mut y, rough.as_ref(), &effort, exact);
         let part = (proves && !self.effort.expired()).then(|| {
             let planned =
                 Planned { rows: loose, tight: &window.rows, ends: bound_ends, at_ends, x: &y, solved: exact };
@@ -281,7 +420,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     /// Continues x, planned up to the station `reached`, by the plan y from the station `start` on. Returns by how many
     /// seconds the overlap takes longer than with the quicker of both at each interval; None if no blend keeps the limits.
     fn join(&self, x: &mut [f64], reached: usize, start: usize, y: &[f64]) -> Option<f64> {
-        let step = |n: usize| self.stations[n + 1] - self.stations[n];
+        let step = |n: usize| self.length(n);
         let least: f64 =
             (start..reached).map(|n| duration(x, n, step(n)).min(duration(y, n - start, step(n)))).sum();
         let (stations, blend) = self.blend(x, reached, start, y)?;

@@ -1,0 +1,142 @@
+//! Where the grid of a window needs short intervals, as a rough plan on a coarse grid shows.
+//!
+//! The optimum uses some limit fully at each place. A cubic spline cannot: within an interval the use of that limit varies,
+//! and the interval loses about Σ λ (greatest use − mean use) of time (`IntersampleCheck::losses`). The loss falls with the
+//! square of its length h, also where the jerk changes from one limit to another, as λ is small there. For the least
+//! number of intervals with a given loss in all, each is split into parts of the same loss: their number goes with the cube
+//! root of its loss.
+
+use super::constraints::Constraints;
+use super::hermite::{self, duration};
+use super::intersample_check::IntersampleCheck;
+use feedplan_geometry::lanes::eight::Lanes;
+
+/// The loss of a part, over the mean time of the intervals and the square of the resolution.
+const LOSS: f64 = 0.055;
+/// The most parts of an interval.
+const MOST: f64 = 8.0;
+/// Complementarity gap of the rough plan, as a part of the same.
+const GAP: f64 = 0.4;
+/// A limit counts as used where the rough plan uses more than this part of it.
+const USED: f64 = 0.97;
+/// Peaks that exceed the collocation points by more than this factor still move.
+const FIRM: f64 = 1.05;
+/// Peaks exceed the collocation points of parts by their share, and by this part of it for safety.
+const MARGIN: f64 = 1.1;
+
+/// The optimum of a window on the coarse grid, roughly.
+#[derive(Clone, Debug)]
+pub struct RoughPlan {
+    /// (w_0, w'_0, w_1, …)
+    pub x: Vec<f64>,
+    /// The number of parts in which each interval is to be split.
+    pub parts: Vec<u32>,
+    /// By what factors the uses of the limits of speed, acceleration and jerk between the collocation points exceed those at
+    /// them; 1 where such a peak would move on a finer grid.
+    pub peaks: Vec<[f32; 3]>,
+}
+
+/// The complementarity gap of a rough plan: a part of what its grid may lose.
+pub fn tolerance(resolution: f64) -> f64 {
+    GAP * LOSS / (resolution * resolution)
+}
+
+impl RoughPlan {
+    /// From the optimum x on the coarse grid and its multipliers. `resolution` is that of an even grid which would lose about as
+    /// much.
+    pub fn new(
+        rows: &Constraints,
+        check: &IntersampleCheck,
+        x: Vec<f64>,
+        dual: &[Lanes],
+        resolution: f64,
+    ) -> Self {
+        let used = check.utilisation(rows, &x);
+        let losses = check.losses(rows, &x, dual, &used);
+        let time: f64 = (0..rows.count()).map(|n| duration(&x, n, rows.h(n))).sum();
+        let most = LOSS / (resolution * resolution) * time / rows.count() as f64;
+        let parts = losses.iter().map(|loss| ((loss / most).cbrt().min(MOST).ceil() as u32).max(1)).collect();
+        let peak =
+            |used: f64, at: f64| if at > USED && used < FIRM * at { (used / at).max(1.0) } else { 1.0 };
+        let peaks = used
+            .iter()
+            .zip(rows.utilisation(&x))
+            .map(|(used, at)| std::array::from_fn(|i| peak(used[i], at[i]) as f32))
+            .collect();
+        Self { x, parts, peaks }
+    }
+
+    /// The same on intervals that were split into numbers of parts with these lengths. Between collocation points that are
+    /// closer together by a factor, peaks exceed them by its square less.
+    pub fn refine(&mut self, splits: &[u32], mut lengths: &[f64]) {
+        let groups = splits.iter().map(|&parts| {
+            let (own, rest) = lengths.split_at(parts as usize);
+            lengths = rest;
+            own
+        });
+        self.x = hermite::prolong(&self.x, groups);
+        let lower = |(&parts, peak): (&u32, &[f32; 3])| {
+            let share = MARGIN as f32 / (parts * parts) as f32;
+            std::iter::repeat_n(peak.map(|peak| 1.0 + (peak - 1.0) * share), parts as usize)
+        };
+        self.peaks = splits.iter().zip(&self.peaks).flat_map(lower).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::interior_point::Effort;
+    use super::super::prepare::Prepared;
+    use super::super::profiles::Winding;
+    use super::super::window::Window;
+    use super::super::working_space::InteriorPoint;
+    use super::*;
+    use crate::path_problem::{self, End, Limits, Problem};
+    use feedplan_geometry::watch::Watch;
+
+    /// The rough plan of a path on an even grid of this resolution.
+    fn planned(turn: f64, even: f64, resolution: f64) -> RoughPlan {
+        let limits =
+            Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
+        let problem = Problem { geometry: &Winding::new(turn), limits, caps: &[], ends: [End::Rest; 2] };
+        let effort = path_problem::Effort { resolution: even, ..Default::default() };
+        let prepared = Prepared::new(&problem, &effort).expect("a first plan");
+        let mut window = Window::new(&limits);
+        prepared.fill(0..prepared.grid.pieces.len(), &mut window);
+        window.rows.drop_at_ends(&prepared.ends);
+        let (barrier, watch) = (1.0, Watch::default());
+        let effort =
+            Effort { tolerance: 1e-6, max_iterations: 400, deadline: None, barrier, warm: false, watch };
+        let mut space = InteriorPoint::default();
+        window.rough(prepared.ends, &prepared.x, resolution, &effort, &mut space).expect("a plan")
+    }
+
+    #[test]
+    fn short_intervals_are_few_and_more_of_them_for_a_finer_resolution() {
+        for turn in [0.2, 1.0, 2.0] {
+            let counts = [16.0, 48.0, 144.0].map(|resolution| {
+                let parts = planned(turn, 16.0 / 3.0, resolution).parts;
+                parts.iter().sum::<u32>() as f64 / parts.len() as f64
+            });
+            assert!((1.0..2.5).contains(&counts[0]), "{counts:?}");
+            // The number goes with the power 2/3 of the resolution, where not with 0: 3^(2/3) = 2.1.
+            assert!(counts[1] > 1.4 * counts[0] && counts[2] > 1.4 * counts[1], "{counts:?}");
+        }
+    }
+
+    #[test]
+    fn a_refined_plan_is_the_same_spline_with_lower_peaks() {
+        let parts = vec![1, 3, 2];
+        let mut plan = RoughPlan {
+            x: vec![1.0, 0.0, 2.0, 0.5, 3.0, 0.0, 3.0, 0.0],
+            parts: parts.clone(),
+            peaks: vec![[1.0, 1.25, 1.5], [1.0, 1.0, 1.9], [1.0; 3]],
+        };
+        plan.refine(&parts, &[0.6, 0.1, 0.1, 0.1, 0.2, 0.2]);
+        assert_eq!((plan.x.len(), plan.x[2], plan.x[8], plan.x[13]), (14, 2.0, 3.0, 0.0));
+        let margin = MARGIN as f32;
+        let lower = [1.0 + 0.25 * margin, 1.0 + 0.9 * margin / 9.0];
+        assert!((plan.peaks[0][1] - lower[0]).abs() < 1e-6 && (plan.peaks[3][2] - lower[1]).abs() < 1e-6);
+        assert_eq!((plan.peaks.len(), plan.peaks[5]), (6, [1.0; 3]));
+    }
+}
