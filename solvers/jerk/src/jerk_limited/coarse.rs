@@ -107,7 +107,7 @@ fn restrict(x: &[f64]) -> Vec<f64> {
 /// A spline on the coarse grid at the stations of the fine grid.
 fn prolong(x: &[f64], rows: &Constraints) -> Vec<f64> {
     let lengths: Vec<f64> = (0..rows.count()).map(|n| rows.h(n)).collect();
-    hermite::prolong(x, lengths.chunks(GROUP))
+    hermite::prolong(x, lengths.chunks(GROUP).map(<[f64]>::len), &lengths)
 }
 
 #[cfg(test)]

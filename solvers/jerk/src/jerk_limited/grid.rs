@@ -71,6 +71,11 @@ impl Grid {
         grid
     }
 
+    /// The length of each interval, in mm.
+    pub fn lengths(&self) -> Vec<f64> {
+        self.stations.windows(2).map(|pair| pair[1] - pair[0]).collect()
+    }
+
     /// The grid with each interval in a number of equal parts.
     pub fn refined(&self, parts: &[u32]) -> Self {
         let mut grid = Self { stations: vec![self.stations[0]], ..Self::default() };

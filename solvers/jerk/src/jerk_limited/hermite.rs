@@ -68,10 +68,12 @@ pub fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
     x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
 }
 
-/// The spline x at the stations of a finer grid, from the lengths of the parts of each interval.
-pub fn prolong<'a>(x: &[f64], intervals: impl Iterator<Item = &'a [f64]>) -> Vec<f64> {
-    let mut out = Vec::with_capacity(2 * x.len());
-    for (n, parts) in intervals.enumerate() {
+/// The spline x at the stations of a finer grid, from the number of parts of each interval and the lengths of all parts.
+pub fn prolong(x: &[f64], counts: impl Iterator<Item = usize>, mut lengths: &[f64]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(2 * lengths.len() + 2);
+    for (n, count) in counts.enumerate() {
+        let (parts, rest) = lengths.split_at(count);
+        lengths = rest;
         let h: f64 = parts.iter().sum();
         let u = local(x, n, h);
         let mut s = 0.0;

@@ -20,7 +20,7 @@ const STEEPEST: f64 = 0.9;
 /// between. The limit of speed is used fully, but for rounding.
 pub const USE: f64 = 0.9;
 const FULL: f64 = 1.0 + 1e-9;
-/// The same as `USE` where the grid was refined.
+/// The greatest such use on a refined grid, for a plan that was made with `USE` on the coarse one.
 const KEPT: f64 = 0.96;
 /// Relative rounding of w.
 const ROUNDING: f64 = 1e-12;
@@ -155,8 +155,8 @@ pub fn used([v, a, j]: [f64; 3]) -> f64 {
     (v * v / FULL).max(a.max(j.cbrt().powi(2)) / USE)
 }
 
-/// The same over what is left of the limits on a finer grid, where fewer points are between the collocation points; infinite
-/// above the limit of speed.
+/// The use of the limits of acceleration and jerk by a first plan that was made on a coarser grid, in terms of w, over `KEPT`;
+/// infinite where it exceeds the limit of speed.
 pub fn kept([v, a, j]: [f64; 3]) -> f64 {
     if v * v > FULL {
         f64::INFINITY

@@ -70,13 +70,8 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let grid = self.grid.refined(parts);
         let mut fine = Self::on(self.problem, grid, [self.ends, self.bound_ends], self.slopes, effort);
         if !self.x.is_empty() {
-            let mut first = 0;
-            let lengths: Vec<f64> = fine.grid.stations.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            let groups = parts.iter().map(|&parts| {
-                first += parts as usize;
-                &lengths[first - parts as usize..first]
-            });
-            fine.x = hermite::prolong(&self.x, groups);
+            let counts = parts.iter().map(|&parts| parts as usize);
+            fine.x = hermite::prolong(&self.x, counts, &fine.grid.lengths());
             fine.used =
                 fine.each(|rows, x| rows.utilisation(x).into_iter().map(initial_plan::kept).collect());
         }

@@ -15,13 +15,13 @@ use feedplan_geometry::lanes::eight::Lanes;
 const LOSS: f64 = 0.055;
 /// The most parts of an interval.
 const MOST: f64 = 8.0;
-/// Complementarity gap of the rough plan, as a part of the same.
+/// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
 const GAP: f64 = 0.4;
 /// A limit counts as used where the rough plan uses more than this part of it.
 const USED: f64 = 0.97;
 /// Peaks that exceed the collocation points by more than this factor still move.
 const FIRM: f64 = 1.05;
-/// Peaks exceed the collocation points of parts by their share, and by this part of it for safety.
+/// Peaks are taken to exceed the collocation points of parts by this multiple of what is expected.
 const MARGIN: f64 = 1.1;
 
 /// The optimum of a window on the coarse grid, roughly.
@@ -68,13 +68,8 @@ impl RoughPlan {
 
     /// The same on intervals that were split into numbers of parts with these lengths. Between collocation points that are
     /// closer together by a factor, peaks exceed them by its square less.
-    pub fn refine(&mut self, splits: &[u32], mut lengths: &[f64]) {
-        let groups = splits.iter().map(|&parts| {
-            let (own, rest) = lengths.split_at(parts as usize);
-            lengths = rest;
-            own
-        });
-        self.x = hermite::prolong(&self.x, groups);
+    pub fn refine(&mut self, splits: &[u32], lengths: &[f64]) {
+        self.x = hermite::prolong(&self.x, splits.iter().map(|&parts| parts as usize), lengths);
         let lower = |(&parts, peak): (&u32, &[f32; 3])| {
             let share = MARGIN as f32 / (parts * parts) as f32;
             std::iter::repeat_n(peak.map(|peak| 1.0 + (peak - 1.0) * share), parts as usize)

@@ -55,6 +55,7 @@ const BLENDED: f64 = 1.0 + 5e-7;
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let coarse = Effort {
         resolution: effort.resolution / f64::from(COARSE),
+        // A window has more intervals on the grid that follows.
         window: effort.window / 2,
         watch: effort.watch.part(ROUGH),
         ..*effort
@@ -78,7 +79,7 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
             }
         }
     }
-    for (parts, h) in parts.iter_mut().zip(rough.grid.stations.windows(2).map(|pair| pair[1] - pair[0])) {
+    for (parts, h) in parts.iter_mut().zip(rough.grid.lengths()) {
         *parts = (*parts).min((h / shortest) as u32).max(1);
     }
     let prepared = rough.refined(&parts, effort);
