@@ -24,6 +24,8 @@ FOLDER = Path(__file__).parent
 PINS = "fffbbbs"
 # The key of sampler's shared memory.
 SAMPLER = 0x48534130
+# A stream is played once HAL's memory has this number of its rows.
+READY = 8000
 # Longest time until the machine is on, and until a program begins [s].
 PATIENCE = 30.0
 
@@ -110,19 +112,23 @@ class Simulator:
         self.wait(done, seconds)
 
     def run_stream(self, file: str, seconds: float) -> None:
+        with open(file, "rb") as rows:
+            ready = min(READY, sum(not row.startswith(b"#") for row in rows))
         feeder = subprocess.Popen(["halstreamer", file])
-        # Waits until the stream is in HAL's memory, or the memory is full.
-        level = -1
-        while feeder.poll() is None and hal.get_value("streamer.0.curr-depth") != level:
-            level = hal.get_value("streamer.0.curr-depth")
-            time.sleep(0.2)
-        self.pins["play"] = True
         end = time.monotonic() + seconds
-        while feeder.poll() is None or hal.get_value("streamer.0.curr-depth") > 0:
-            if time.monotonic() > end:
-                feeder.kill()
-                raise TimeoutError(f"the stream did not end in {seconds:g} s")
-            time.sleep(0.02)
+
+        def wait(done) -> None:
+            while not done(hal.get_value("streamer.0.curr-depth")):
+                if time.monotonic() > end:
+                    feeder.kill()
+                    raise TimeoutError(f"the stream did not end in {seconds:g} s")
+                time.sleep(0.02)
+
+        # HAL tells the rows in its memory once in a period, which may come late: the end of the feeder tells
+        # nothing of them.
+        wait(lambda depth: depth >= ready)
+        self.pins["play"] = True
+        wait(lambda depth: feeder.poll() is not None and depth == 0)
         time.sleep(0.05)
         self.pins["play"] = False
 

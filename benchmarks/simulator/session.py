@@ -153,16 +153,14 @@ class Recorded:
 
     @property
     def played(self) -> Array:
-        """The positions from the first to the last row of a stream (n, 3), including periods in which a row
-        was late."""
-        rows = np.flatnonzero(self.playing)
-        return self.position[rows[:1].sum() : rows[-1:].sum() + 1]
+        """The positions from the first to the last row of a stream (n, 3)."""
+        return self.position[self.playing]
 
 
 def recorded(machine: Machine, runs: Sequence[Run], tolerance: float) -> list[Recorded]:
     """The recorded joints of each run; each run starts at the origin.
 
-    Raises SimulatorError if LinuxCNC does not start or does not end.
+    Raises SimulatorError if LinuxCNC does not start, does not end, or misses periods.
     """
     if machine.axis_names != NAMES:
         raise SimulatorError(f"the machine {machine.name} has other axes than X, Y, Z: take one with these")
@@ -197,7 +195,11 @@ def recorded(machine: Machine, runs: Sequence[Run], tolerance: float) -> list[Re
     for number, messages in enumerate(told["runs"], start=1):
         own = rows[rows[:, 6] == number]
         moving, playing, done = (own[:, 3:6] > 0.0).T
-        results.append(Recorded(machine.period, own[:, :3], moving, playing & ~done, tuple(messages)))
+        result = Recorded(machine.period, own[:, :3], moving, playing & ~done, tuple(messages))
+        late = (np.diff(np.flatnonzero(result.playing)) > 1).sum()
+        if late:
+            raise SimulatorError(f"{late} rows of stream {number} were late: the computer is too busy")
+        results.append(result)
     return results
 
 
