@@ -34,7 +34,6 @@ from feedplan.cli.options import (
 )
 from feedplan.cli.reading_options import reading_options
 from feedplan.errors import InputError
-from feedplan.geometry.corners import FollowedPath
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading, checked_reading
 from feedplan.program.tools import read_tools
@@ -122,13 +121,6 @@ def batch(
     machines: tuple[str, ...],
     tolerances: tuple[float, ...],
     methods: tuple[planners.MethodName, ...],
-    accuracy: float | None,
-    time_limit: float | None,
-    path: FollowedPath,
-    feed: float | None,
-    feed_override: float,
-    period: float | None,
-    max_setpoints: int,
     output: str,
     formats: tuple[Any, ...],
     jobs: int | None,
@@ -138,6 +130,7 @@ def batch(
     as_json: bool,
     quiet: bool,
     reading: Reading,
+    **options: Any,
 ) -> int:
     """Plan every PROGRAM on every machine, at every tolerance, by every method.
 
@@ -165,12 +158,7 @@ def batch(
         [machine_text(name) for name in dict.fromkeys(machines)],
         tuple(dict.fromkeys(tolerances)) or (None,),
         tuple(dict.fromkeys(methods)),
-        {
-            "path": path,
-            "feed_override": feed_override,
-            "max_setpoints": max_setpoints,
-            **given_only(feed=feed, period=period, accuracy=accuracy, time_limit=time_limit),
-        },
+        given_only(**options),
         checked_reading(reading),
         () if NO_SETPOINTS in formats else formats or ("npz",),
         None if table is None else FilePath(table).absolute(),

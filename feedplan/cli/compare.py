@@ -28,7 +28,6 @@ from feedplan.cli.options import (
 )
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.comparison import TIME_LIMIT
-from feedplan.geometry.corners import FollowedPath
 from feedplan.program.read import Reading
 from feedplan.units import duration_text
 
@@ -54,17 +53,12 @@ def compare(
     program: str | IO[bytes],
     machine: str,
     methods: str | None,
-    accuracy: float | None,
-    time_limit: float,
-    tolerance: float | None,
-    path: FollowedPath,
-    feed: float | None,
-    period: float | None,
     output: str | None,
     as_json: bool,
     quiet: bool,
     controller: Choice,
     reading: Reading,
+    **options: Any,
 ) -> int:
     """Plan PROGRAM by several methods: time, proven gap, computing time and audit of each.
 
@@ -81,20 +75,15 @@ def compare(
         require_folder(FilePath(output))
     names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
     with terminal.progress_bar(quiet) as progress, terminal.silenced():
-        known, source = machine_for(machine, program, reading, feed)
+        known, source = machine_for(machine, program, reading, options["feed"])
         rows = make_comparison(
             source,
             known,
             names,
-            time_limit=time_limit,
             reading=reading,
             controller=controller(known),
             progress=progress,
-            tolerance=tolerance,
-            path=path,
-            feed=feed,
-            period=period,
-            **given_only(accuracy=accuracy),
+            **given_only(**options),
         )
         today = next((row.plan.today for row in rows if row.plan and row.plan.today), None)
         summary = {

@@ -2,46 +2,18 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
-from feedplan.cli.options import with_options
+from feedplan.cli.options import as_one
 from feedplan.errors import MachineError
 from feedplan.machine.controller import MODELS, Controller
 from feedplan.machine.machine import Machine
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 # Makes the controller that the command line names, for a machine; None without a controller.
 Choice = Callable[[Machine], Controller | None]
-
-_OPTIONS = (
-    click.option(
-        "--controller",
-        type=click.Choice(tuple(MODELS)),
-        help="Tell the time that this controller takes today.  [default: the machine file's, if any]",
-    ),
-    click.option(
-        "--controller-option",
-        "controller_options",
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="A parameter of the controller, such as junction_deviation=0.02; may be given several times.",
-    ),
-)
-
-
-def controller_options(command: Command) -> Command:
-    """Adds the options; the command gets them as one argument, `controller`, a `Choice`."""
-
-    @functools.wraps(command)
-    def packed(*args: Any, controller: str | None, controller_options: tuple[str, ...], **others: Any) -> Any:
-        given = dict(map(_pair, controller_options))
-        return command(*args, controller=lambda machine: chosen(machine, controller, given), **others)
-
-    return with_options(packed, _OPTIONS)  # type: ignore[no-any-return]
 
 
 def chosen(machine: Machine, name: str | None, parameters: dict[str, Any]) -> Controller | None:
@@ -69,3 +41,30 @@ def _pair(text: str) -> tuple[str, float | list[float]]:
         remedy = "give NAME=VALUE, such as junction_deviation=0.02"
         raise click.UsageError(f"--controller-option {text} is no number by name: {remedy}") from None
     return name.strip(), numbers[0] if len(numbers) == 1 else numbers
+
+
+def _choice(controller: str | None, controller_options: tuple[str, ...]) -> Choice:
+    given = dict(map(_pair, controller_options))
+    return lambda machine: chosen(machine, controller, given)
+
+
+# The command gets them as one argument, `controller`, a `Choice`.
+controller_options = as_one(
+    "controller",
+    _choice,
+    (
+        click.option(
+            "--controller",
+            type=click.Choice(tuple(MODELS)),
+            help="Tell the time that this controller takes today.  [default: the machine file's, if any]",
+        ),
+        click.option(
+            "--controller-option",
+            "controller_options",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="A parameter of the controller, such as junction_deviation=0.02; may be given several "
+            "times.",
+        ),
+    ),
+)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import sys
 from collections.abc import Callable, Sequence
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     NumberType = click.ParamType[float]
 else:
     NumberType = click.ParamType  # generic only in the newest click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Number(NumberType):
@@ -107,11 +111,24 @@ def _source(given: str) -> str | IO[bytes]:
     return sys.stdin.buffer
 
 
-def with_options(command: Callable[..., Any], options: Sequence[Callable[..., Any]]) -> Any:
-    """Adds the options to a command; its help lists them in this order."""
-    for option in reversed(options):
-        command = option(command)
-    return command
+def as_one(
+    name: str, make: Callable[..., Any], options: Sequence[Callable[..., Any]]
+) -> Callable[[Command], Command]:
+    """Adds options to a command; its help lists them in this order.
+
+    The command gets what `make` makes of them, by their names, as one argument of this `name`.
+    """
+    taken = tuple(inspect.signature(make).parameters)
+
+    def add(command: Command) -> Command:
+        @functools.wraps(command)
+        def packed(*args: Any, **given: Any) -> Any:
+            made = make(**{own: given.pop(own) for own in taken})
+            return command(*args, **{name: made}, **given)
+
+        return functools.reduce(lambda made, option: option(made), reversed(options), packed)  # type: ignore[return-value]
+
+    return add
 
 
 def require_one_or_formats(formats: Sequence[str]) -> None:

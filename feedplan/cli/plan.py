@@ -11,7 +11,7 @@ from typing import IO, Any
 
 import click
 
-from feedplan import outputs, planners
+from feedplan import outputs
 from feedplan.cli import terminal
 from feedplan.cli.cluster_options import cluster_options
 from feedplan.cli.controller_options import Choice, controller_options
@@ -40,10 +40,9 @@ from feedplan.cli.options import (
 from feedplan.cli.program_options import ProgramWanted, program_options
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.cli.serve import TOKEN_FILE
-from feedplan.geometry.corners import FollowedPath
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading
-from feedplan.setpoints import INTERPOLATORS, Interpolator
+from feedplan.setpoints import INTERPOLATORS
 
 
 @click.command()
@@ -83,19 +82,6 @@ from feedplan.setpoints import INTERPOLATORS, Interpolator
 def plan(
     program: str | IO[bytes],
     machine: str,
-    method: planners.MethodName,
-    accuracy: float | None,
-    time_limit: float | None,
-    tolerance: float | None,
-    path: FollowedPath,
-    path_rounds: int,
-    feed: float | None,
-    feed_override: float,
-    period: float | None,
-    interpolator: Interpolator,
-    max_setpoints: int,
-    start_speed: float,
-    end_speed: float,
     one_step_more: bool,
     output: str | None,
     formats: tuple[Any, ...],
@@ -108,6 +94,7 @@ def plan(
     controller: Choice,
     reading: Reading,
     wanted: ProgramWanted,
+    **options: Any,
 ) -> int:
     """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
 
@@ -123,6 +110,8 @@ def plan(
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
     require_one_or_formats(formats)
+    if wanted.in_folder and not output:
+        raise click.UsageError("--program needs a folder to write to: give -o DIR, or --program-out FILE")
     if server and (one_step_more or step is not None or wanted.file is not None or wanted.in_folder):
         raise click.UsageError(
             "a service gives no program with planned feeds, no pvt table and nothing of --one-step-more: "
@@ -139,26 +128,15 @@ def plan(
         terminal.progress_bar(quiet) as progress,
         terminal.silenced(),
     ):
-        known, source = machine_for(machine, program, reading, feed)
+        known, source = machine_for(machine, program, reading, options["feed"])
         make_plan, write = _place(server, token_file)
         result = make_plan(
             source,
             known,
-            method=method,
-            tolerance=tolerance,
-            path=path,
-            path_rounds=path_rounds,
-            feed=feed,
-            feed_override=feed_override,
-            period=period,
-            start_speed=start_speed,
-            end_speed=end_speed,
-            interpolator=interpolator,
-            max_setpoints=max_setpoints,
             reading=reading,
             controller=controller(known),
             progress=progress,
-            **given_only(accuracy=accuracy, time_limit=time_limit, elsewhere=elsewhere),
+            **given_only(**options, elsewhere=elsewhere),
         )
         planned = wanted.make(result)
         steps = _steps(result) if one_step_more else ()

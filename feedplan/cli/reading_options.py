@@ -2,58 +2,44 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
-from typing import IO, Any, TypeVar
+from typing import IO
 
 import click
 
-from feedplan.cli.options import with_options
+from feedplan.cli.options import as_one, given_only
 from feedplan.machine.machine import Machine
 from feedplan.program.machine_for import AUTO, smallest_machine
 from feedplan.program.program import Program
 from feedplan.program.read import Reading, read_program
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 
-_OPTIONS = (
-    click.option("--tool-table", metavar="FILE", help="LinuxCNC's tool table (.tbl), for G43, G41 and G42."),
-    click.option(
-        "--subprograms",
-        multiple=True,
-        metavar="DIR",
-        help="Folder of files that the program calls, after its own; may be given several times.",
-    ),
-    click.option(
-        "--whole-step",
-        type=float,
-        metavar="UNITS",
-        help="Unit of lengths without a decimal point, such as 0.001.  [default: 1]",
+def _reading(tool_table: str | None, subprograms: tuple[str, ...], whole_step: float | None) -> Reading:
+    given = given_only(tool_table=tool_table, subprograms=subprograms or None, whole_step=whole_step)
+    return Reading(**given)  # type: ignore[no-any-return,typeddict-item]
+
+
+# The command gets them as one argument, `reading`.
+reading_options = as_one(
+    "reading",
+    _reading,
+    (
+        click.option(
+            "--tool-table", metavar="FILE", help="LinuxCNC's tool table (.tbl), for G43, G41 and G42."
+        ),
+        click.option(
+            "--subprograms",
+            multiple=True,
+            metavar="DIR",
+            help="Folder of files that the program calls, after its own; may be given several times.",
+        ),
+        click.option(
+            "--whole-step",
+            type=float,
+            metavar="UNITS",
+            help="Unit of lengths without a decimal point, such as 0.001.  [default: 1]",
+        ),
     ),
 )
-
-
-def reading_options(command: Command) -> Command:
-    """Adds the options; the command gets them as one argument, `reading`."""
-
-    @functools.wraps(command)
-    def packed(
-        *args: Any,
-        tool_table: str | None,
-        subprograms: tuple[str, ...],
-        whole_step: float | None,
-        **others: Any,
-    ) -> Any:
-        reading = Reading()
-        if tool_table is not None:
-            reading["tool_table"] = tool_table
-        if subprograms:
-            reading["subprograms"] = subprograms
-        if whole_step is not None:
-            reading["whole_step"] = whole_step
-        return command(*args, reading=reading, **others)
-
-    return with_options(packed, _OPTIONS)  # type: ignore[no-any-return]
 
 
 def machine_for(

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import Field, fields
 from pathlib import Path as FilePath
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
 from feedplan.cli.cluster_options import cluster_options
+from feedplan.cli.options import as_one
 from feedplan.errors import MissingPackageError
 from feedplan.jobs.address import ClusterAddress
 from feedplan.service.limits import Limits
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 TOKEN_FILE = click.option(
     "--token-file",
@@ -25,26 +24,20 @@ TOKEN_FILE = click.option(
 )
 
 
-def limit_options(command: Command) -> Command:
-    """Adds the options; the command gets them as one argument, `limits`."""
-    names = [own.name for own in fields(Limits)]
+def _limit_option(own: Field[Any]) -> Callable[..., Any]:
+    kind = click.IntRange if isinstance(own.default, int) else click.FloatRange
+    return click.option(
+        f"--{own.name.replace('_', '-')}",
+        type=kind(min=own.metadata["least"]),
+        default=own.default,
+        show_default=True,
+        metavar=own.metadata["unit"].upper(),
+        help=own.metadata["help"],
+    )
 
-    @functools.wraps(command)
-    def packed(*args: Any, **given: Any) -> Any:
-        limits = Limits(**{name: given.pop(name) for name in names})
-        return command(*args, limits=limits, **given)
 
-    for own in reversed(fields(Limits)):
-        kind = click.IntRange if isinstance(own.default, int) else click.FloatRange
-        packed = click.option(
-            f"--{own.name.replace('_', '-')}",
-            type=kind(min=own.metadata["least"]),
-            default=own.default,
-            show_default=True,
-            metavar=own.metadata["unit"].upper(),
-            help=own.metadata["help"],
-        )(packed)
-    return packed  # type: ignore[return-value]
+# The command gets them as one argument, `limits`.
+limit_options = as_one("limits", Limits, [_limit_option(own) for own in fields(Limits)])
 
 
 @click.command()

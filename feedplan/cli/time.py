@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import IO
+from typing import IO, Any
 
 import click
 
-from feedplan import planners
 from feedplan.cli import terminal
 from feedplan.cli.controller_options import Choice, controller_options
 from feedplan.cli.options import (
@@ -27,7 +26,6 @@ from feedplan.cli.options import (
 )
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.errors import InfeasibleError
-from feedplan.geometry.corners import FollowedPath
 from feedplan.program.read import Reading
 from feedplan.report.operations import PARTS, OperationTime, by_tool
 from feedplan.units import duration_text
@@ -60,17 +58,11 @@ _SHOWN = 60
 def time(
     program: str | IO[bytes],
     machine: str,
-    method: planners.MethodName,
-    accuracy: float | None,
-    time_limit: float | None,
-    tolerance: float | None,
-    path: FollowedPath,
-    feed: float | None,
-    feed_override: float,
     tool_change: float,
     as_json: bool,
     reading: Reading,
     controller: Choice,
+    **options: Any,
 ) -> None:
     """Machining time of PROGRAM per tool and operation, by the machine's limits.
 
@@ -82,19 +74,14 @@ def time(
     from feedplan.planning import plan
 
     with terminal.progress_bar(quiet=False) as progress, terminal.silenced():
-        known, source = machine_for(machine, program, reading, feed)
+        known, source = machine_for(machine, program, reading, options["feed"])
         result = plan(
             source,
             known,
-            method=method,
-            tolerance=tolerance,
-            path=path,
-            feed=feed,
-            feed_override=feed_override,
             reading=reading,
             controller=controller(known),
             progress=progress,
-            **given_only(accuracy=accuracy, time_limit=time_limit),
+            **given_only(**options),
         )
         audit = result.audit(progress)
         operations = result.operations(tool_change)
@@ -106,7 +93,7 @@ def time(
         summary = {
             "program": name_of(program),
             "machine": known.name,
-            "method": method,
+            "method": result.method,
             "time": whole,
             "audit": audit.ok,
             "today": result.today and result.today.to_json(),
