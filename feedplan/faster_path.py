@@ -23,7 +23,7 @@ from feedplan.errors import InfeasibleError, SolverError
 from feedplan.geometry.path import Path
 from feedplan.geometry.rules import Motion
 from feedplan.path_gradient import path_gradient
-from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
+from feedplan.profile import SpeedProfile, joined_runs
 from feedplan.refit import FitLimits, along_gradient, at_speed_of, promise
 
 # The most rounds: later ones hardly gain.
@@ -246,22 +246,11 @@ def _joined_path(taken: list[tuple[Path, slice]], both: tuple[Path, Path]) -> Pa
 
 
 def _joined_profile(taken: list[tuple[Path, SpeedProfile, slice]]) -> SpeedProfile:
-    columns: dict[str, list[Any]] = {name: [] for name in (*OF_PHASES, *OF_PIECES)}
-    runs, pieces = [np.zeros(1, dtype=np.int64)], 0
-    for path, profile, own in taken:
-        first, last = int(path.runs[own.start]), int(path.runs[own.stop])
-        phases = slice(int(profile.runs[own.start]), int(profile.runs[own.stop]))
-        for name in OF_PHASES:
-            columns[name].append(getattr(profile, name)[phases])
-        columns["piece"][-1] = columns["piece"][-1].astype(np.int64) + (pieces - first)
-        for name in OF_PIECES:
-            listed = getattr(profile, name).astype(np.int64)
-            columns[name].append(listed[(listed >= first) & (listed < last)] + (pieces - first))
-        runs.append(runs[-1][-1] + profile.runs[own.start + 1 : own.stop + 1] - phases.start)
-        pieces += last - first
-    joined: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}
-    excess = [profile.excess for _, profile, _ in taken]
-    bounds = [profile.run_bounds[own] for _, profile, own in taken]
-    return SpeedProfile(
-        **joined, runs=np.concatenate(runs), excess=max(excess), run_bounds=np.concatenate(bounds)
+    firsts = np.cumsum([0, *(_pieces(path, own) for path, _, own in taken)])
+    moved = (
+        (profile, own, int(first - path.runs[own.start]))
+        for (path, profile, own), first in zip(taken, firsts, strict=False)
     )
+    bounds = [profile.run_bounds[own] for _, profile, own in taken]
+    excess = max(profile.excess for _, profile, _ in taken)
+    return joined_runs(moved, excess=excess, run_bounds=np.concatenate(bounds))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -131,3 +133,25 @@ class SpeedProfile(OfNative[Profile]):
             self._samplers[problem] = Sampler(problem, self, problem.period, progress)
         tell(progress, 1.0)
         return self._samplers[problem]
+
+
+def joined_runs(taken: Iterable[tuple[SpeedProfile, slice, int]], **others: Any) -> SpeedProfile:
+    """Runs of profiles one after the other.
+
+    `taken` are profiles, each with a slice of its runs and what is added to the numbers of its pieces;
+    `others` are the fields of the result that do not follow from these columns.
+    """
+    columns: dict[str, list[NDArray[Any]]] = {name: [] for name in (*OF_PHASES, *OF_PIECES)}
+    runs = [np.zeros(1, dtype=np.int64)]
+    for profile, own, more in taken:
+        offsets = profile.runs[own.start : own.stop + 1]
+        for name in OF_PHASES:
+            columns[name].append(getattr(profile, name)[offsets[0] : offsets[-1]])
+        pieces = columns["piece"][-1]
+        columns["piece"][-1] = pieces.astype(np.int64) + more
+        for name in OF_PIECES:
+            listed = getattr(profile, name)
+            columns[name].append(listed[np.isin(listed, pieces)].astype(np.int64) + more)
+        runs.append(runs[-1][-1] + offsets[1:] - offsets[0])
+    joined: dict[str, Any] = {name: np.concatenate(parts) for name, parts in columns.items()}
+    return SpeedProfile(**joined, runs=np.concatenate(runs), **others)

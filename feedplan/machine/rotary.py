@@ -103,6 +103,8 @@ class ToolVector(Kinematics):
     chain: RotaryChain
     side: float = 1.0
     always: bool = False
+    # Both angles come from the direction.
+    turning = (False, False, False, True, True)
 
     @property
     def tip_names(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -113,11 +115,6 @@ class ToolVector(Kinematics):
     def joint_names(self) -> tuple[str, ...]:  # type: ignore[override]
         """As the chain's."""
         return self.chain.joint_names
-
-    @property
-    def turning(self) -> tuple[bool, ...]:
-        """Both angles come from the direction."""
-        return (False, False, False, True, True)
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
         """The chain's joints with the angles that point the tool."""

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
-from typing import Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast
 
 from feedplan.arguments import callback, file_path, one_of, shown
 from feedplan.errors import InputError
@@ -51,6 +51,10 @@ class Header:
     units: tuple[str, ...]
     period: float
     events: TimedEvents = field(default_factory=TimedEvents.none)
+
+    def about(self) -> dict[str, Any]:
+        """Version, period, axes and units by name."""
+        return {"format": FORMAT, "period": self.period, "axes": self.axes, "units": self.units}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,10 @@ from feedplan._solvers import csv_rows
 from feedplan.arguments import shown
 from feedplan.errors import InputError
 from feedplan.events import TimedEvents, to_json
-from feedplan.outputs import FORMAT, Header
+from feedplan.outputs import Add, Header
 from feedplan.outputs._events import from_objects
 from feedplan.progress import Listener, tell
+from feedplan.setpoints import SetpointChunk
 
 HEADER, EVENT, _MORE = "feedplan", "event", "#+"
 # Most bytes of a line; LinuxCNC's halstreamer reads lines of 4000 bytes.
@@ -40,48 +42,44 @@ def _comment(name: str, data: object) -> bytes:
     return "".join(f"{line}\n" for line in (first, *parts)).encode()
 
 
-class RowWriter:
-    """Writes rows of numbers, each with an integer at its end, and the events between them."""
+@contextmanager
+def row_writer(
+    file: FilePath,
+    kind: str,
+    header: Header,
+    values_of: Callable[[SetpointChunk], NDArray[np.float64]],
+    names: str = "",
+    separator: bytes = b",",
+    extra: dict[str, Any] | None = None,
+) -> Iterator[Add]:
+    """Writes a row for every setpoint: what `values_of` makes of a chunk (n, k), then the source line.
 
-    def __init__(
-        self,
-        stream: BinaryIO,
-        kind: str,
-        header: Header,
-        names: str = "",
-        separator: bytes = b",",
-        extra: dict[str, Any] | None = None,
-    ) -> None:
-        self._stream, self._separator = stream, separator
-        self._events, self._time, self._done = iter(header.events), header.events.time, 0
-        common = {"kind": kind, "format": FORMAT, "period": header.period}
-        common |= {"axes": header.axes, "units": header.units}
-        stream.write(_comment(HEADER, common | (extra or {})))
+    Events are between the rows; `extra` is added to the header.
+    """
+    events, times, done = iter(header.events), header.events.time, 0
+    with file.open("wb") as stream:
+        stream.write(_comment(HEADER, {"kind": kind, **header.about(), **(extra or {})}))
         stream.write(names.encode())
 
-    def add(self, t: NDArray[np.float64], values: NDArray[np.float64], last: NDArray[np.int32]) -> None:
-        """Writes rows (n, k) at the times `t` (n,) with their integers (n,)."""
-        due = int(np.searchsorted(self._time, t[-1], side="right")) if len(t) else self._done
-        first = 0
-        for row in np.searchsorted(t, self._time[self._done : due], side="left").tolist():
-            self._rows(values[first:row], last[first:row])
-            self._event()
-            first = row
-        self._rows(values[first:], last[first:])
-        self._done = max(due, self._done)
+        def write(values: NDArray[np.float64], lines: NDArray[np.int32]) -> None:
+            if len(lines):
+                rows = np.ascontiguousarray(values, np.float64), np.ascontiguousarray(lines, np.int32)
+                stream.write(csv_rows(*rows).replace(b",", separator))
 
-    def close(self) -> None:
-        """Writes the events that are after the last row by rounding."""
-        for _ in range(self._done, len(self._time)):
-            self._event()
+        def add(chunk: SetpointChunk) -> None:
+            nonlocal done
+            values, first = values_of(chunk), 0
+            due = max(int(np.searchsorted(times, chunk.t[-1], side="right")), done) if len(chunk) else done
+            for row in np.searchsorted(chunk.t, times[done:due], side="left").tolist():
+                write(values[first:row], chunk.line[first:row])
+                stream.write(_comment(EVENT, to_json(next(events))))
+                first = row
+            write(values[first:], chunk.line[first:])
+            done = due
 
-    def _event(self) -> None:
-        self._stream.write(_comment(EVENT, to_json(next(self._events))))
-
-    def _rows(self, values: NDArray[np.float64], last: NDArray[np.int32]) -> None:
-        if len(last):
-            rows = np.ascontiguousarray(values, np.float64), np.ascontiguousarray(last, np.int32)
-            self._stream.write(csv_rows(*rows).replace(b",", self._separator))
+        yield add
+        # By rounding, events may be after the last row.
+        stream.writelines(_comment(EVENT, to_json(event)) for event in events)
 
 
 @dataclass

@@ -7,16 +7,17 @@ number is the shortest text that reads back unchanged, so a check of the text ch
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedplan.outputs import QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.outputs._text import RowWriter, read_columns
+from feedplan.outputs._text import read_columns, row_writer
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
@@ -34,18 +35,14 @@ def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
     return ",".join(["t [s]", *columns, "line"])
 
 
-@contextmanager
-def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
+def values(chunk: SetpointChunk) -> NDArray[np.float64]:
+    """The columns of a chunk without the source line (n, k)."""
+    return np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
+
+
+def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]:
     """Writes the header, then a line for every setpoint."""
-    with file.open("wb") as stream:
-        rows = RowWriter(stream, SETPOINTS, header, f"{column_names(header.axes, header.units)}\n")
-
-        def add(chunk: SetpointChunk) -> None:
-            values = np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
-            rows.add(chunk.t, values, chunk.line)
-
-        yield add
-        rows.close()
+    return row_writer(file, SETPOINTS, header, values, f"{column_names(header.axes, header.units)}\n")
 
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:

@@ -10,16 +10,16 @@ unchanged.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path as FilePath
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedplan.errors import InputError
 from feedplan.outputs import SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.outputs._text import Rows, RowWriter, read_rows
+from feedplan.outputs._text import Rows, read_rows, row_writer
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
@@ -34,23 +34,21 @@ def pins(axes: tuple[str, ...]) -> str:
     return "f" * len(axes) + "s"
 
 
-@contextmanager
-def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
+def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]:
     """Writes the header, then a line for every setpoint. Raises InputError if the last setpoint is early."""
-    with file.open("wb") as stream:
-        rows = RowWriter(stream, "halstreamer", header, separator=b" ", extra={"pins": pins(header.axes)})
 
-        def add(chunk: SetpointChunk) -> None:
-            periods = chunk.t[-1:] / header.period
-            if (np.abs(periods - np.round(periods)) > _ROUNDING).any():
-                raise InputError(
-                    f"halstreamer has a line every {header.period:g} s, and the plan ends in motion "
-                    f"at {chunk.t[-1]:.9g} s: plan with end speed 0"
-                )
-            rows.add(chunk.t, chunk.position, chunk.line)
+    def positions(chunk: SetpointChunk) -> NDArray[np.float64]:
+        periods = chunk.t[-1:] / header.period
+        if (np.abs(periods - np.round(periods)) > _ROUNDING).any():
+            raise InputError(
+                f"halstreamer has a line every {header.period:g} s, and the plan ends in motion "
+                f"at {chunk.t[-1]:.9g} s: plan with end speed 0"
+            )
+        return chunk.position
 
-        yield add
-        rows.close()
+    return row_writer(
+        file, "halstreamer", header, positions, separator=b" ", extra={"pins": pins(header.axes)}
+    )
 
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from feedplan.errors import InputError
 from feedplan.events import to_json
-from feedplan.outputs import FORMAT, QUANTITIES, SETPOINTS, Add, Header, SetpointFile
+from feedplan.outputs import QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.outputs._events import from_objects
 from feedplan.progress import Listener, tell
@@ -50,8 +50,7 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
 
         yield add
         stream = stack.enter_context(file.open("w", encoding="utf-8"))
-        head = {"format": FORMAT, "period": header.period, "axes": header.axes, "units": header.units}
-        stream.write(json.dumps(head)[:-1])
+        stream.write(json.dumps(header.about())[:-1])
         for name, part in parts.items():
             stream.write(f',\n"{name}":[')
             part.seek(0)

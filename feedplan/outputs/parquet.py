@@ -16,10 +16,10 @@ import numpy as np
 
 from feedplan.errors import InputError, MissingPackageError
 from feedplan.events import to_json
-from feedplan.outputs import FORMAT, QUANTITIES, SETPOINTS, Add, Header, SetpointFile
+from feedplan.outputs import QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.outputs._events import from_objects
-from feedplan.outputs.csv import column_names
+from feedplan.outputs.csv import column_names, values
 from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
@@ -45,13 +45,7 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
     """Writes row groups. Raises MissingPackageError."""
     arrow = _package()
     names = column_names(header.axes, header.units).split(",")
-    about = {
-        "format": FORMAT,
-        "period": header.period,
-        "axes": header.axes,
-        "units": header.units,
-        "events": [to_json(event) for event in header.events],
-    }
+    about = {**header.about(), "events": [to_json(event) for event in header.events]}
     types = [*(arrow.float64() for _ in names[:-1]), arrow.int32()]
     schema = arrow.schema(list(zip(names, types, strict=True)), {_KEY: json.dumps(about)})
     with arrow.parquet.ParquetWriter(file, schema) as table:
@@ -65,8 +59,7 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
 
         def add(chunk: SetpointChunk) -> None:
             nonlocal waiting
-            values = np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
-            columns = [*np.ascontiguousarray(values.T), np.ascontiguousarray(chunk.line, np.int32)]
+            columns = [*np.ascontiguousarray(values(chunk).T), np.ascontiguousarray(chunk.line, np.int32)]
             waiting = arrow.concat_tables([waiting, arrow.table(columns, schema=schema)])
             write(_GROUP)
 

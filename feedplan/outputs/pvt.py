@@ -13,16 +13,17 @@ with limited jerk suit such drives, and `feedplan check` measures the greatest a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path as FilePath
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.outputs._text import RowWriter, read_columns
+from feedplan.outputs._text import read_columns, row_writer
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
@@ -41,24 +42,18 @@ def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
     return ",".join(["time [s]", "step [s]", *pairs, "line"])
 
 
-@contextmanager
-def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
+def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]:
     """Writes the header, then a line for every knot."""
     before = 0.0
-    with file.open("wb") as stream:
-        rows = RowWriter(stream, "pvt", header, f"{column_names(header.axes, header.units)}\n")
 
-        def add(chunk: SetpointChunk) -> None:
-            nonlocal before
-            steps = np.diff(chunk.t, prepend=before)
-            pairs = np.stack([chunk.position, chunk.velocity], axis=2).reshape(
-                len(chunk), 2 * len(chunk.axes)
-            )
-            rows.add(chunk.t, np.column_stack([chunk.t, steps, pairs]), chunk.line)
-            before = chunk.t[-1] if len(chunk) else before
+    def values(chunk: SetpointChunk) -> NDArray[np.float64]:
+        nonlocal before
+        steps = np.diff(chunk.t, prepend=before)
+        before = chunk.t[-1] if len(chunk) else before
+        pairs = np.stack([chunk.position, chunk.velocity], axis=2).reshape(len(chunk), 2 * len(chunk.axes))
+        return np.column_stack([chunk.t, steps, pairs])
 
-        yield add
-        rows.close()
+    return row_writer(file, "pvt", header, values, f"{column_names(header.axes, header.units)}\n")
 
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:

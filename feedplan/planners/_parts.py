@@ -19,7 +19,7 @@ from feedplan._solvers import PlanError
 from feedplan._solvers import Problem as NativeProblem
 from feedplan.constraints.problem import Problem
 from feedplan.lazy import cached_property
-from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
+from feedplan.profile import SpeedProfile, joined_runs
 from feedplan.progress import Listener
 
 Floats = NDArray[np.float64]
@@ -98,16 +98,11 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
 def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, Floats]]) -> SpeedProfile:
     """The profile of the whole from those of the parts, and the excess of their runs."""
     profiles, excess = zip(*planned, strict=True)
-    names = (*OF_PHASES, *OF_PIECES, "run_bounds")
-    columns: dict[str, list[Any]] = {name: [getattr(each, name) for each in profiles] for name in names}
-    for name in ("piece", *OF_PIECES):
-        columns[name] = [column + part.first for part, column in zip(own, columns[name], strict=True)]
-    arcs = np.cumsum([0, *map(len, profiles)])
-    runs = [profile.runs[1:] + before for profile, before in zip(profiles, arcs[:-1], strict=True)]
-    return SpeedProfile(
-        **{name: np.concatenate(column) for name, column in columns.items()},  # type: ignore[arg-type]
-        runs=np.concatenate(([0], *runs)),
+    whole = [slice(0, len(profile.runs) - 1) for profile in profiles]
+    return joined_runs(
+        zip(profiles, whole, (part.first for part in own), strict=True),
         excess=math.fsum(np.concatenate(excess)),
+        run_bounds=np.concatenate([profile.run_bounds for profile in profiles]),
     )
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError
-from feedplan.profile import OF_PHASES, OF_PIECES, SpeedProfile
+from feedplan.profile import SpeedProfile, joined_runs
 from feedplan.progress import Listener, part
 
 
@@ -43,19 +40,4 @@ def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:
     times = np.stack([profile.run_times for profile in profiles])
     planned = np.stack([np.diff(profile.runs) > 0 for profile in profiles])
     best = np.argmin(np.where(planned, times, np.inf), axis=0)
-    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in (*OF_PHASES, *OF_PIECES)}
-    runs = [0]
-    for run, chosen in enumerate(best):
-        profile = profiles[chosen]
-        arcs = slice(int(profile.runs[run]), int(profile.runs[run + 1]))
-        for name in OF_PHASES:
-            columns[name].append(getattr(profile, name)[arcs])
-        own = profile.piece[arcs]
-        for name in OF_PIECES:
-            pieces = getattr(profile, name)
-            columns[name].append(pieces[np.isin(pieces, own)])
-        runs.append(runs[-1] + len(own))
-    joined = {name: np.concatenate(parts) for name, parts in columns.items()}
-    return replace(
-        profiles[0], **joined, runs=np.array(runs), stopped=False, excess=math.nan, run_bounds=np.empty(0)
-    )
+    return joined_runs((profiles[chosen], slice(run, run + 1), 0) for run, chosen in enumerate(best))

@@ -24,16 +24,8 @@ class Cylindrical(Kinematics):
     joint_names: tuple[str, ...]
     centre: tuple[float, float] = (0.0, 0.0)
     tip_names: tuple[str, ...] = ("X", "Y", "Z")
-
-    @property
-    def rotary(self) -> tuple[bool, ...]:
-        """The column turns."""
-        return (True, False, False)
-
-    @property
-    def turning(self) -> tuple[bool, ...]:
-        """The column's angle is known up to whole turns."""
-        return (True, False, False)
+    # The column turns, and its angle is known up to whole turns.
+    rotary = turning = (True, False, False)
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
         """Angle [deg], radius and height [mm]."""

@@ -28,16 +28,8 @@ class Polar(Kinematics):
     side: float = 1.0
     sense: float = 1.0
     tip_names: tuple[str, ...] = ("X", "Y", "Z")
-
-    @property
-    def rotary(self) -> tuple[bool, ...]:
-        """The table turns."""
-        return (False, False, True)
-
-    @property
-    def turning(self) -> tuple[bool, ...]:
-        """The table's angle is known up to whole turns."""
-        return (False, False, True)
+    # The table turns, and its angle is known up to whole turns.
+    rotary = turning = (False, False, True)
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
         """Slide and height [mm], table [deg]."""
