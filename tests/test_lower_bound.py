@@ -12,7 +12,6 @@ import pytest
 from benchmarks.named import butterfly, lemniscate, part, path_of, trefoil
 from feedplan import _solvers
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
@@ -24,6 +23,7 @@ from tests.campaign import seeds
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
 from tests.planners.test_curves import Planned, random_curve
+from tests.turns import circle
 
 plan = planner("bang-bang")
 

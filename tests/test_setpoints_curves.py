@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from feedplan.constraints.problem import Problem
-from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
@@ -26,6 +25,7 @@ from feedplan.planners.bang_bang import plan
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, Setpoints
 from tests.along import path_along, problem_along, profile_of
+from tests.turns import circle
 
 Array = NDArray[np.float64]
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)

@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.curves.speed_polynomial import SpeedPolynomial
@@ -19,6 +18,7 @@ from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, Setpoints
 from tests.along import path_along, problem_along
 from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
+from tests.turns import circle
 
 Array = NDArray[np.float64]
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)

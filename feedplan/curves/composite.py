@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Curve
-from feedplan.arguments import flag, instance, is_number, is_whole, not_negative, number, positive, shown
+from feedplan.arguments import flag, instance, is_number, is_whole, number, positive, shown
 from feedplan.arguments import refuse as refusal
 from feedplan.curves._arrays import floats, places, points, refuse, whole_numbers
 from feedplan.errors import InputError
@@ -20,46 +19,6 @@ from feedplan.native import OfNative
 from feedplan.units import counted
 
 MAX_DEGREE = 9
-
-
-class JointKind(IntEnum):
-    """The continuity where two pieces meet; each kind implies those before it."""
-
-    GAP = 0
-    """The ends are apart."""
-    CORNER = 1
-    """The ends meet and the direction of motion breaks (C0)."""
-    TANGENT = 2
-    """The direction agrees and the derivative jumps (G1)."""
-    C1 = 3
-    C2 = 4
-    C3 = 5
-
-
-@dataclass(frozen=True, eq=False)
-class Joints:
-    """The joints (j,) of a curve: `piece` before each, `kind` (a `JointKind`), `gap` between the ends [mm],
-    `turn` of the direction of motion [rad], `speed` (j, 2) = |C'| before and after, 0 at a cusp."""
-
-    piece: NDArray[np.uint32]
-    kind: NDArray[np.uint8]
-    gap: NDArray[np.float64]
-    turn: NDArray[np.float64]
-    speed: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.piece)
-
-
-@dataclass(frozen=True, eq=False)
-class Cusps:
-    """Places (c,) where the derivative vanishes: `piece` and local `u`."""
-
-    piece: NDArray[np.uint32]
-    u: NDArray[np.float64]
-
-    def __len__(self) -> int:
-        return len(self.piece)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,33 +214,11 @@ class CompositeCurve(OfNative[Curve]):
         """Their weights (n, d + 1), or None where all pieces are polynomial."""
         return None if self.weights is None else self.weights.reshape(self.by_piece.shape[:2])
 
-    @property
-    def breakpoints(self) -> NDArray[np.float64]:
-        """The parameter from the start of the curve to each joint (n + 1,)."""
-        return np.concatenate([[0.0], np.cumsum(self.width)])
-
-    @property
-    def closed(self) -> bool:
-        """Whether the curve ends where it starts, to rounding."""
-        ends = self.control_points[[0, -1]]
-        return bool(np.abs(ends[1] - ends[0]).max() <= 1e-12 * np.abs(self.control_points).max())
-
     def evaluate(self, piece: ArrayLike, u: ArrayLike, order: int = 0) -> NDArray[np.float64]:
         """C and its derivatives by u to `order` ≤ 3 at places (m,): (order + 1, m, axes)."""
         if not is_whole(order, 0, 3):
             raise InputError(f"derivatives to order {shown(order)}: orders 0 to 3 are supported")
         return self.native.evaluate(*places(piece, u), int(order))
-
-    def at(self, parameter: ArrayLike, order: int = 0) -> NDArray[np.float64]:
-        """The same at parameters (m,) from the start of the curve, 0 to breakpoints[-1]; at a joint, of the
-        piece that starts there."""
-        breaks, x = self.breakpoints, floats(parameter, "parameters", 1)
-        refuse(
-            ~((x >= 0) & (x <= breaks[-1])),
-            lambda i: f"parameter {i} is {x[i]}: the curve goes from 0 to {breaks[-1]}; stay within",
-        )
-        piece = np.searchsorted(breaks[1:-1], x, side="right")
-        return self.evaluate(piece, np.minimum(x - breaks[piece], self.width[piece]), order)
 
     def reversed(self) -> CompositeCurve:
         """The curve traversed backwards."""
@@ -310,29 +247,6 @@ class CompositeCurve(OfNative[Curve]):
         return CompositeCurve(
             self.control_points, self.weights, self.offsets, np.broadcast_to(array, self.width.shape)
         )
-
-    def joints(
-        self, gap: float = 1e-6, angle: float = 1e-6, derivative: float = 1e-9, closed: bool | None = None
-    ) -> Joints:
-        """How neighbouring pieces meet, and in a closed curve the last and the first one.
-
-        Points are equal within `gap` [mm], directions within `angle` [rad], and derivatives within the share
-        `derivative` of their expected size, by the size of the pieces. `closed` includes the joint from the
-        end to the start, by default if the curve is closed.
-        """
-        around = self.closed if closed is None else flag(closed, "closed")
-        for name, value in (("gap", gap), ("angle", angle), ("derivative", derivative)):
-            number(value, f"the {name}", "a number of 0 or more", not_negative)
-        return Joints(*self.native.joints(around, gap, angle, derivative))
-
-    def cusps(self, tolerance: float = 1e-9) -> Cusps:
-        """Every place where |C'| is at most `tolerance` of the greatest on the piece, ends included.
-
-        The list is proven to be complete. On rational pieces ω²C' takes the place of C'. Of neighbouring
-        places it has the one of the least |C'|. A piece of length zero has one cusp, at u = 0.
-        """
-        number(tolerance, "the tolerance of cusps", "a part from 1e-12 to 1", lambda part: 1e-12 <= part < 1)
-        return Cusps(*self.native.cusps(tolerance))
 
     @property
     def zero_length(self) -> NDArray[np.int64]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from feedplan.audit import audit
 from feedplan.constraints.problem import Problem
-from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis
@@ -25,6 +24,7 @@ from feedplan.program.program import MoveKind, Program
 from tests.along import FREE, path_along, problem_along
 from tests.audit.curves import machine_of, sampled
 from tests.audit.faults import STRANGE, broken, changed, faster, rubbish
+from tests.turns import circle
 
 Array = NDArray[np.float64]
 SPEED_LINE = PhaseLaw.SPEED_LINE

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.machine.coordinate_mode import CoordinateMode
@@ -24,6 +23,7 @@ from tests.audit.curves import machine_of
 from tests.audit.test_joints import past_the_column, wavy, wide
 from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
 from tests.test_setpoints_jerk import profiles, random_curve
+from tests.turns import arc
 
 Array = NDArray[np.float64]
 FREE = 1e6

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis
@@ -18,6 +17,7 @@ from feedplan.planners import planner
 from tests.along import path_along
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess
+from tests.turns import circle
 
 plan = planner("bang-bang")
 NOT_PLAIN = [name for name in bundled_machines() if not Machine.load(name).is_plain]

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from feedplan.constraints.junction import junction_limit
-from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.joints import end_edges, tangent_jumps
 from tests.along import path_along
+from tests.turns import arc
 
 
 def bezier(*points: list[float]) -> CompositeCurve:

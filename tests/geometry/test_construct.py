@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from feedplan.curves.arc import arc, circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
+from tests.continuity import at
+from tests.turns import arc, circle
 
 HALF = math.sqrt(0.5)
 
@@ -41,7 +42,7 @@ def test_a_bspline_of_scipy_is_followed_in_its_own_parameter_but_for_a_factor() 
     np.testing.assert_array_equal(path.runs, [0, len(path)])
     total = path.width.sum()
     share = np.linspace(0, 1, 30)
-    np.testing.assert_allclose(path.curve.at(np.minimum(share * total, total))[0], spline(share), atol=1e-11)
+    np.testing.assert_allclose(at(path.curve, np.minimum(share * total, total))[0], spline(share), atol=1e-11)
     # The parameter is a length, that of the control polygons.
     own = [path.curve[i : i + 1].control_points for i in range(len(path))]
     edges = sum(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in own)
@@ -57,7 +58,7 @@ def test_a_nurbs_circle_is_one_run() -> None:
     knots = [0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
     path = Path.from_nurbs(control, knots, 2, weights)
     np.testing.assert_array_equal(path.runs, [0, 4])
-    point = path.curve.at(np.linspace(0, path.width.sum() * (1 - 1e-12), 50))[0]
+    point = at(path.curve, np.linspace(0, path.width.sum() * (1 - 1e-12), 50))[0]
     np.testing.assert_allclose(np.linalg.norm(point, axis=1), 1.0, rtol=1e-14)
 
 
@@ -112,7 +113,7 @@ def test_straight_curves_are_lines_from_turn_to_turn() -> None:
     # 3/(1 + 3) of the way to the middle point; at the ends of pieces the parameter is that of the curve.
     np.testing.assert_allclose(path.curve.control_points[3], [3.5, 3.5], rtol=1e-15)
     np.testing.assert_array_equal(path.width, [1.0, 2.0, 2.0])
-    np.testing.assert_allclose(spline.at([3.0])[0, 0], [3.5, 3.5], rtol=1e-15)
+    np.testing.assert_allclose(at(spline, [3.0])[0, 0], [3.5, 3.5], rtol=1e-15)
 
 
 def test_pieces_without_length_are_left_out_and_gaps_refused() -> None:

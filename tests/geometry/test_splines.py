@@ -19,6 +19,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, PathControl, Program
+from tests.continuity import Joint, joints
 
 MILL = Machine.load("mill")
 # From (10, 0) to (14, 4): along X at its start, along Y at its end.
@@ -76,7 +77,7 @@ def test_tangent_joints_pass_between_lines_arcs_and_splines(make_program: Any) -
     assert path.curve.degree.tolist() == [2, 3, 2, 2]
     np.testing.assert_array_equal(path.feed, [10, 20, 30, 40])
     np.testing.assert_array_equal(piece(path, 1)[0], CUBIC)
-    assert path.curve.joints().kind.min() >= 2
+    assert min(joints(path.curve)) >= Joint.TANGENT
     # About its length, by its control polygon.
     assert path.width[1] == 2 + 2 * math.sqrt(2) + 2
 
@@ -88,7 +89,7 @@ def test_a_corner_beside_a_spline_is_rounded_within_the_tolerance(make_program: 
     np.testing.assert_array_equal(path.runs, [0, len(path)])
     # What is left of the spline, its end, the line's start in two pieces, then a parabola for two lines.
     assert path.curve.degree.tolist() == [3, 3, 2, 2, 2, 2]
-    assert path.curve.joints().kind.min() >= 2
+    assert min(joints(path.curve)) >= Joint.TANGENT
     assert 0.045 < path.fit.deviation <= 0.05 * (1 + 1e-9)
     # The corner at (14, 4) moves to where both bent sides meet, as far as they say.
     meeting = piece(path, 1)[0][-1]
@@ -129,9 +130,9 @@ def test_random_chains_of_splines_arcs_and_lines_are_smooth_and_within_the_toler
         points.append(control[-1])
     program = with_splines(make_program(points, blend_tolerance=tolerance), curves)
     path = build_path(program, MILL)
-    joints = path.curve.joints()
+    met = np.array(joints(path.curve))
     within = np.setdiff1d(np.arange(1, len(path)), path.runs)
-    assert joints.kind[within - 1].min() >= 1
+    assert met[within - 1].min() >= Joint.CORNER
     assert tangent_jumps(path.curve)[within - 1].max() < 1e-9
     assert len(path.runs) - 2 <= 1
     assert path.fit.deviation <= tolerance * (1 + 1e-9)
@@ -148,7 +149,7 @@ def test_pieces_of_a_spline_keep_their_continuity_and_lose_those_without_length(
     path = build_path(with_splines(make_program(control[[0, -1]]), {0: curve}), MILL)
     np.testing.assert_array_equal(path.runs, [0, 2])
     # C2 stays C2: one factor for all widths.
-    assert path.curve.joints().kind.tolist() == [4]
+    assert joints(path.curve) == [Joint.C2]
     assert path.width[1] / path.width[0] == pytest.approx(2.0)
     with pytest.raises(ProgramError, match="line 10: the move has no length"):
         build_path(with_splines(make_program(control[[0, 0]]), {0: still}), MILL)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from feedplan import Axis, InputError, Machine, plan
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.curves.arc import arc
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
@@ -24,6 +23,7 @@ from feedplan.planners.junction_deviation import corner_speed
 from feedplan.program.read import read_program
 from feedplan.today import time_by
 from tests.planners import controller_programs
+from tests.turns import arc
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,6 @@ from feedplan import Axis, InfeasibleError, InputError, Machine, Plan, SolverErr
 from feedplan.audit import audit
 from feedplan.cli import main
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import Corners
@@ -28,6 +27,7 @@ from feedplan.planners.junction_deviation import corner_speed
 from feedplan.profile import PhaseLaw
 from feedplan.program.read import read_program
 from feedplan.setpoints import Setpoints
+from tests.turns import arc
 
 Array = NDArray[np.float64]
 

@@ -12,16 +12,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use super::arrays::{row, rows, to_array2};
+use super::arrays::rows;
 use super::views::view;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
-use feedplan_geometry::spline::circle::Turn;
-use feedplan_geometry::spline::cusps::cusps;
 use feedplan_geometry::spline::error::SplineError;
 use feedplan_geometry::spline::extract::extract;
-use feedplan_geometry::spline::joints::{joints, JointTolerance};
 use feedplan_geometry::spline::knots::{check_points, Spline};
 use feedplan_geometry::spline::regular::regular;
 use feedplan_geometry::spline::{CompositeCurve, MAX_DEGREE};
@@ -41,14 +38,6 @@ const LEAST_WIDTH: f64 = 1e-60;
 type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
 type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
-/// Piece, kind, gap, turn, and speed before and after.
-type JointColumns<'py> = (
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<u8>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-);
 
 /// Pieces in 3, 6 or 9 axes, those beyond the curve's own at rest.
 #[derive(Clone)]
@@ -238,33 +227,6 @@ impl Curve {
         })
     }
 
-    /// An arc, or with `travel` a helix of this degree within a tolerance; and the bound of its error.
-    #[staticmethod]
-    fn of_turn(
-        start: Array1<'_>,
-        plane: [usize; 2],
-        centre: [f64; 2],
-        sweep: f64,
-        travel: Option<Array1<'_>>,
-        degree: usize,
-        tolerance: f64,
-    ) -> PyResult<(Self, f64)> {
-        let axes = start.len();
-        if plane.iter().any(|&axis| axis >= axes) {
-            return Err(PyValueError::new_err("the plane is not one of these axes"));
-        }
-        with_padded_axes!(axes, M, {
-            let turn = Turn { start: row::<M>(&start, 0.0)?, plane, centre, sweep };
-            let (pieces, bound) = match travel {
-                None => (turn.arc(), 0.0),
-                Some(travel) => {
-                    turn.helix(&row::<M>(&travel, 0.0)?, degree, tolerance).map_err(input_error)?
-                }
-            };
-            Ok((Self::checked(pieces, axes)?, bound))
-        })
-    }
-
     /// Views of `control_points` (total, axes), `weights` (total,), None where all pieces are polynomial, `offsets`
     /// (n + 1,) and `width` (n,).
     fn fields<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
@@ -365,28 +327,6 @@ impl Curve {
         })
     }
 
-    /// The joints of neighbouring pieces.
-    fn joints<'py>(
-        &self,
-        py: Python<'py>,
-        closed: bool,
-        gap: f64,
-        angle: f64,
-        derivative: f64,
-    ) -> PyResult<JointColumns<'py>> {
-        let tolerance = JointTolerance { gap, angle, derivative };
-        let found = with_pieces!(self, M, pieces, {
-            run(py, None, |watch| joints(pieces, closed, &tolerance, watch))?
-        });
-        Ok((
-            PyArray1::from_iter(py, found.iter().map(|joint| joint.piece as u32)),
-            PyArray1::from_iter(py, found.iter().map(|joint| joint.kind as u8)),
-            PyArray1::from_iter(py, found.iter().map(|joint| joint.gap)),
-            PyArray1::from_iter(py, found.iter().map(|joint| joint.turn)),
-            to_array2(py, found.iter().map(|joint| joint.speed).collect(), 2),
-        ))
-    }
-
     /// The curve as lines and as curved pieces without a cusp inside; the first and the last piece of the old curve
     /// that each one follows (n, 2), and whether it rests at its start and at its end (n, 2).
     #[allow(clippy::type_complexity)]
@@ -405,20 +345,6 @@ impl Curve {
                 PyArray1::from_iter(py, made.rests.iter().flatten().copied()).reshape(shape)?,
             ))
         })
-    }
-
-    /// Pieces and parameters of the cusps.
-    #[allow(clippy::type_complexity)]
-    fn cusps<'py>(
-        &self,
-        py: Python<'py>,
-        tolerance: f64,
-    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
-        let found = with_pieces!(self, M, pieces, run(py, None, |watch| cusps(pieces, tolerance, watch))?);
-        Ok((
-            PyArray1::from_iter(py, found.iter().map(|cusp| cusp.piece as u32)),
-            PyArray1::from_iter(py, found.iter().map(|cusp| cusp.u)),
-        ))
     }
 }
 
