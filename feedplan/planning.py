@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import count
 from typing import Any
@@ -269,7 +269,7 @@ class Plan:
 
         `setpoints` are those of the machine's period. Hashes tell whether a text was changed.
         """
-        fit, program, verdict = self.path.fit, self.program, self.audit()
+        program, verdict = self.program, self.audit()
         points = self.setpoints()
         machine_file = self.machine.to_toml()
         return {
@@ -304,15 +304,7 @@ class Plan:
             "pieces": len(self.path),
             "runs": len(self.path.runs) - 1,
             "stops": len(self.path.runs) - 2,
-            "fit": {
-                "points": fit.points,
-                "splines": fit.splines,
-                "polynomials": fit.polynomials,
-                "deviation": fit.deviation,
-                "mean_offset": fit.mean_offset,
-                "inside": fit.inside,
-                "outside": fit.outside,
-            },
+            "fit": asdict(self.path.fit),
             "gain": None if self.gain is None else self.gain.to_json(),
             "compute": dict(self.compute),
             "audit": verdict.to_json(),
@@ -412,16 +404,15 @@ def plan(
     compute: dict[str, float] = {}
     program: Program | None = None
     gain: Gain | None = None
+    speeds: dict[str, Any] = {
+        "feed": feed,
+        "feed_override": feed_override,
+        "start_speed": start_speed,
+        "end_speed": end_speed,
+    }
 
     def stated(path: Path) -> Problem:
-        return build_problem(
-            path,
-            machine,
-            feed=feed,
-            feed_override=feed_override,
-            start_speed=start_speed,
-            end_speed=end_speed,
-        )
+        return build_problem(path, machine, **speeds)
 
     if isinstance(source, Path):
         if tolerance is not None:
@@ -512,13 +503,7 @@ def plan(
     beside: Today | None = None
     unknown: tuple[str, ...] = ()
     if rival is not None:
-        settings_of_all = {
-            "tolerance": tolerance,
-            "feed": feed,
-            "feed_override": feed_override,
-            "start_speed": start_speed,
-            "end_speed": end_speed,
-        }
+        settings_of_all = {"tolerance": tolerance, **speeds}
         with _timed(compute, "today"):
             beside, unknown = beside_plan(
                 rival, profile.time + followed.pauses, program or followed, machine, settings_of_all

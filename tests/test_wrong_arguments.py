@@ -255,15 +255,9 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         ),
         "CompositeCurve.joined": (CompositeCurve.joined, {"curves": [curve], "gap": 1e-6}),
         "CompositeCurve.evaluate": (curve.evaluate, {"piece": 0, "u": 0.5, "order": 1}),
-        "CompositeCurve.at": (curve.at, {"parameter": [0.5], "order": 1}),
         "CompositeCurve.elevated": (curve.elevated, {"degree": 3}),
         "CompositeCurve.split": (curve.split, {"piece": [0], "u": [0.5]}),
         "CompositeCurve.with_width": (curve.with_width, {"width": 2.0}),
-        "CompositeCurve.joints": (
-            curve.joints,
-            {"gap": 1e-6, "angle": 1e-6, "derivative": 1e-9, "closed": False},
-        ),
-        "CompositeCurve.cusps": (curve.cusps, {"tolerance": 1e-9}),
         "CompositeCurve[]": (curve.__getitem__, {"pieces": slice(0, 1)}),
     }
     for method in feedplan.methods():

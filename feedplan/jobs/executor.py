@@ -8,7 +8,7 @@ from threading import Event
 from typing import Protocol
 
 from feedplan.jobs.order import Job
-from feedplan.jobs.outcome import Failure, Outcome
+from feedplan.jobs.outcome import Outcome
 
 MB = 1_000_000
 # Called with the index of a job in its sequence, a stage, and the part of the stage that is done (0 to 1).
@@ -24,18 +24,17 @@ class JobLimits:
 
     def over_time(self) -> Outcome:
         """The outcome of a job that takes longer than `max_time`."""
-        return _over(f"the job has run for {self.max_time:g} s, all of max_time: choose a quicker method")
+        return Outcome.failed(
+            "limit", f"the job has run for {self.max_time:g} s, all of max_time: choose a quicker method"
+        )
 
     def over_memory(self, used: int) -> Outcome:
         """The outcome of a job that has `used` more than `max_memory` [bytes]."""
-        return _over(
+        return Outcome.failed(
+            "limit",
             f"the job takes {used / MB:.6g} MB of memory, more than the {self.max_memory:g} of max_memory: "
-            "split the program"
+            "split the program",
         )
-
-
-def _over(sentence: str) -> Outcome:
-    return Outcome("failed", failure=Failure("limit", sentence))
 
 
 class Executor(Protocol):

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 
-from fastapi import FastAPI, Header, Query
+from fastapi import APIRouter, FastAPI, Header, Query
 from fastapi.responses import (
     FileResponse,
     HTMLResponse,
@@ -107,13 +107,12 @@ def _file(file: FilePath, **more: Any) -> FileResponse:
 
 def _add_jobs(app: FastAPI, service: Service) -> None:
     store, runner, limits = service.store, service.runner, service.limits
-    tags: Any = ["jobs"]
+    router = APIRouter(tags=["jobs"])
 
-    @app.post(
+    @router.post(
         "/v1/jobs",
         status_code=202,
         response_model=answers.Job,
-        tags=tags,
         summary="Submit a program to be planned",
         responses={
             200: {"model": answers.Job, "description": "The job of an earlier, equal request"},
@@ -152,10 +151,9 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         headers = {"Location": job["links"]["self"]}
         return JSONResponse(job, 202 if is_new else 200, headers)
 
-    @app.get(
+    @router.get(
         "/v1/jobs",
         response_model=answers.Jobs,
-        tags=tags,
         summary="List jobs, the newest first",
         responses=openapi.problems(422),
     )
@@ -168,20 +166,18 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         more = records[-1]["number"] if len(records) == count else None
         return {"jobs": [views.job(record) for record in records], "before": more}
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}",
         response_model=answers.Job,
-        tags=tags,
         summary="Progress and result of a job",
         responses=openapi.problems(404),
     )
     def one(job: str) -> dict[str, Any]:
         return views.job(store.job(job))
 
-    @app.delete(
+    @router.delete(
         "/v1/jobs/{job}",
         status_code=204,
-        tags=tags,
         summary="Forget a job and its files; it is stopped if it runs",
         responses=openapi.problems(404),
     )
@@ -189,11 +185,10 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         runner.delete(job)
         return Response(status_code=204)
 
-    @app.post(
+    @router.post(
         "/v1/jobs/{job}/cancel",
         status_code=202,
         response_model=answers.Job,
-        tags=tags,
         summary="Stop a job that waits or runs",
         responses=openapi.problems(404),
     )
@@ -202,9 +197,8 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         runner.cancel(job)
         return views.job(store.job(job))
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}/events",
-        tags=tags,
         summary="Progress as server-sent events",
         response_class=StreamingResponse,
         responses={
@@ -223,15 +217,16 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
             return Response(status_code=204)
         return StreamingResponse(events.stream(store, service.bell, job, after), media_type=events.MEDIA_TYPE)
 
+    app.include_router(router)
+
 
 def _add_results(app: FastAPI, service: Service) -> None:
     store = service.store
-    tags: Any = ["results"]
+    router = APIRouter(tags=["results"])
     missing = openapi.problems(404, 409)
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}/result",
-        tags=tags,
         summary="All of plan.json",
         response_class=FileResponse,
         responses={200: openapi.content("application/json", {"type": "object"}, "plan.json"), **missing},
@@ -239,14 +234,13 @@ def _add_results(app: FastAPI, service: Service) -> None:
     def result(job: str) -> Response:
         return _file(views.done(store, job) / SUMMARY_FILE, media_type="application/json")
 
-    @app.get("/v1/jobs/{job}/audit", tags=tags, summary="The audit of the plan", responses=missing)
+    @router.get("/v1/jobs/{job}/audit", summary="The audit of the plan", responses=missing)
     def audit(job: str) -> dict[str, Any]:
         verdict: dict[str, Any] = views.summary(views.done(store, job))["audit"]
         return verdict
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}/setpoints",
-        tags=tags,
         summary="Setpoints, by time and axis",
         response_class=FileResponse,
         responses={
@@ -266,9 +260,8 @@ def _add_results(app: FastAPI, service: Service) -> None:
         after = BackgroundTask(shutil.rmtree, file.parent, ignore_errors=True) if is_new else None
         return _file(file, media_type=exports.media_type(format), filename=file.name, background=after)
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}/program",
-        tags=tags,
         summary="The program as it was sent",
         response_class=FileResponse,
         responses={
@@ -282,9 +275,8 @@ def _add_results(app: FastAPI, service: Service) -> None:
             store.folder(record) / "program", media_type="application/octet-stream", filename=record["name"]
         )
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}/report",
-        tags=tags,
         summary="The report, one page that needs no network",
         response_class=HTMLResponse,
         responses=missing,
@@ -293,9 +285,8 @@ def _add_results(app: FastAPI, service: Service) -> None:
         headers = {"Content-Security-Policy": _REPORT_POLICY}
         return _file(views.done(store, job) / REPORT_FILE, media_type="text/html", headers=headers)
 
-    @app.get(
+    @router.get(
         "/v1/jobs/{job}/drawing",
-        tags=tags,
         summary="The data that the page draws: tool path, speed and axes, as arrays",
         response_class=FileResponse,
         responses={
@@ -313,10 +304,9 @@ def _add_results(app: FastAPI, service: Service) -> None:
         i4 or u1) from byte `at` after the JSON."""
         return _file(views.done(store, job) / DRAWING_FILE, media_type="application/octet-stream")
 
-    @app.get(
+    @router.get(
         "/v1/compare",
         response_model=answers.Comparison,
-        tags=tags,
         summary="Compare jobs in one table",
         responses=openapi.problems(404, 422),
     )
@@ -326,18 +316,19 @@ def _add_results(app: FastAPI, service: Service) -> None:
         """One row for each job, in the order of the request: `?job=ID&job=ID`."""
         return {"rows": views.compared(store, job)}
 
+    app.include_router(router)
+
 
 def _add_knowledge(app: FastAPI, service: Service) -> None:
-    tags: Any = ["knowledge"]
+    router = APIRouter(tags=["knowledge"])
 
-    @app.get("/v1/machines", response_model=answers.Machines, tags=tags, summary="The bundled machines")
+    @router.get("/v1/machines", response_model=answers.Machines, summary="The bundled machines")
     def machines() -> dict[str, Any]:
         return {"machines": [views.machine(Machine.load(name)) for name in bundled_machines()]}
 
-    @app.post(
+    @router.post(
         "/v1/machines",
         response_model=answers.MachineInfo,
-        tags=tags,
         summary="Read a machine file, and change limits in it",
         responses=openapi.problems(400, 422),
         openapi_extra=openapi.MACHINE,
@@ -346,10 +337,9 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
         """The service keeps nothing; plan with `file` of the answer."""
         return views.machine(machine_of(asked))
 
-    @app.get(
+    @router.get(
         "/v1/machines/{name}",
         response_model=answers.MachineInfo,
-        tags=tags,
         summary="One bundled machine",
         responses=openapi.problems(404),
     )
@@ -358,21 +348,20 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
             raise Refusal(UNKNOWN, f"there is no such machine: use one of {', '.join(bundled_machines())}")
         return views.machine(Machine.load(name))
 
-    @app.get(
+    @router.get(
         "/v1/controllers",
         response_model=answers.Controllers,
-        tags=tags,
         summary="The controllers of today that are modelled",
     )
     def controllers() -> dict[str, Any]:
         return {"controllers": [views.controller(name, model) for name, model in MODELS.items()]}
 
-    @app.get("/v1/methods", response_model=answers.Methods, tags=tags, summary="The planning methods")
+    @router.get("/v1/methods", response_model=answers.Methods, summary="The planning methods")
     def methods() -> dict[str, Any]:
         known = planners.methods()
         return {"methods": [{"name": name, "options": planners.options_of(name)} for name in known]}
 
-    @app.get("/v1/health", response_model=answers.Health, tags=tags, summary="Whether the service works")
+    @router.get("/v1/health", response_model=answers.Health, summary="Whether the service works")
     def health() -> dict[str, Any]:
         counts = service.store.counts()
         return {
@@ -381,6 +370,8 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
             **{state: counts.get(state, 0) for state in ("queued", "running")},
             "limits": service.limits.to_json(),
         }
+
+    app.include_router(router)
 
     @app.get("/docs", include_in_schema=False)
     def docs() -> Response:

@@ -14,10 +14,10 @@ import asyncio
 import base64
 import binascii
 import hmac
-import ipaddress
 from collections.abc import Awaitable, Callable, Collection, MutableMapping
 from typing import Any
 
+from feedplan.jobs.address import is_address
 from feedplan.service import front
 from feedplan.service.limits import MB, Limits
 from feedplan.service.refusals import FOREIGN, MEDIA_TYPE, TOKEN, TOO_LARGE, TOO_SLOW, Refusal
@@ -78,7 +78,7 @@ class Guard:
     def _require_place(self, scope: Message, headers: dict[bytes, bytes]) -> None:
         host = headers.get(b"host", b"").decode("latin-1")
         name = _without_port(host)
-        if not (_is_address(name) or name.lower() in self._hosts):
+        if not (is_address(name) or name.lower() in self._hosts):
             known = ", ".join(sorted(self._hosts))
             raise Refusal(
                 FOREIGN,
@@ -157,14 +157,6 @@ def _without_port(host: str) -> str:
     if host.startswith("["):
         return host[1:].partition("]")[0]
     return host.partition(":")[0]
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
 
 
 async def _refuse(refusal: Refusal, send: Send) -> None:

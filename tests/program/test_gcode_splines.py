@@ -15,6 +15,7 @@ from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import MoveKind, Program
 from tests.campaign import examples
+from tests.continuity import at
 
 
 def read(text: str, machine: Machine | None = None) -> Program:
@@ -87,7 +88,7 @@ def test_a_nurbs_block_has_clamped_uniform_knots() -> None:
     t = np.linspace(0, 3, 31)
     above = BSpline(knots, points * weights[:, None], 2)(t)
     expected = above / BSpline(knots, weights, 2)(t)[:, None]
-    assert curve.at(t)[0][:, :2] == pytest.approx(expected, abs=1e-12)
+    assert at(curve, t)[0][:, :2] == pytest.approx(expected, abs=1e-12)
     assert curve.width.tolist() == [1, 1, 1]
 
 
@@ -99,7 +100,7 @@ def test_the_order_of_a_nurbs_block_is_l(order: int) -> None:
     knots = np.concatenate([np.zeros(order), np.arange(1, 13 - order), np.full(order, 13 - order)])
     t = np.linspace(0, 13 - order, 50)
     expected = BSpline(knots.astype(float), np.array([(0.0, 0.0), *places]), order - 1)(t)
-    assert curve.at(t)[0][:, :2] == pytest.approx(expected, abs=1e-9)
+    assert at(curve, t)[0][:, :2] == pytest.approx(expected, abs=1e-9)
     assert curve.weights is None
 
 
@@ -130,7 +131,7 @@ def test_fanuc_nurbs_agree_with_scipy(order: int) -> None:
     expected = BSpline(knots, points * weights[:, None], order - 1)(t) / BSpline(knots, weights, order - 1)(
         t
     ).reshape(-1, 1)
-    assert curve.at(t)[0] == pytest.approx(expected, abs=1e-10)
+    assert at(curve, t)[0] == pytest.approx(expected, abs=1e-10)
     assert program.line.tolist() == [2, 2 + len(knots)]
 
 

@@ -16,6 +16,7 @@ from feedplan.program.moves import NO_FEED
 from feedplan.program.path_file import read_path_file
 from feedplan.program.program import MoveKind, Program
 from feedplan.program.read import read_program
+from tests.continuity import at
 
 LINE = {"degree": 1, "control_points": [[0, 0, 0], [10, 0, 0]]}
 AFTER = {"degree": 1, "control_points": [[10, 0, 0], [10, 5, 0]], "feed": 2}
@@ -50,7 +51,7 @@ def test_knots_are_clamped_and_uniform_unless_given() -> None:
         curve = {"degree": 2, "control_points": points, "knots": given_knots, "weights": weights}
         program = read({"curves": [curve]})
         assert program.splines is not None
-        assert program.splines.at(t)[0][:, :2] == pytest.approx(expected, abs=1e-12)
+        assert at(program.splines, t)[0][:, :2] == pytest.approx(expected, abs=1e-12)
         assert program.target.tolist() == [[7, 0, 0]]
 
 

@@ -236,7 +236,7 @@ impl LimitArrays {
 /// Audits path and profile, and the path against the program.
 #[pyfunction]
 #[pyo3(signature = (problem, limits, feed, profile=None, program=None, progress=None))]
-fn audit_plan(
+pub fn audit_plan(
     py: Python<'_>,
     problem: ProblemArrays<'_>,
     limits: LimitArrays,
@@ -269,8 +269,4 @@ fn audit_plan(
             findings(&tally, path.axes)
         })
     })
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(audit_plan, module)?)
 }

@@ -10,7 +10,7 @@ use feedplan_setpoints::csv;
 
 /// Rows of comma-separated text: `values` (n, k) and the integers `last` (n,) that close them.
 #[pyfunction]
-fn csv_rows<'py>(
+pub fn csv_rows<'py>(
     py: Python<'py>,
     values: PyReadonlyArray2<'py, f64>,
     last: PyReadonlyArray1<'py, i32>,
@@ -22,8 +22,4 @@ fn csv_rows<'py>(
     let (values, last) = (values.as_slice()?, last.as_slice()?);
     let text = run(py, None, |_| csv::rows(values, width, last))?;
     Ok(PyBytes::new(py, &text))
-}
-
-pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(csv_rows, module)?)
 }

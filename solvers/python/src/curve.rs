@@ -25,10 +25,6 @@ use feedplan_geometry::spline::{CompositeCurve, MAX_DEGREE};
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
-pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
-    module.add_class::<Curve>()
-}
-
 /// Number of places that one thread evaluates at a time.
 const BLOCK: usize = 4096;
 /// Least width of a piece; the greatest one is one over it.

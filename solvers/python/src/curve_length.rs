@@ -19,10 +19,6 @@ pub struct CurveLength {
     width: Vec<f64>,
 }
 
-pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
-    module.add_class::<CurveLength>()
-}
-
 #[pymethods]
 impl CurveLength {
     /// Of a curve, which has at least one piece.

@@ -82,7 +82,7 @@ fn names_of(names: &Py<PyAny>, letter: char) -> String {
 
 /// `feedplan.program.gcode.Options`.
 #[derive(FromPyObject)]
-struct PyOptions<'py> {
+pub struct PyOptions<'py> {
     places: PyReadonlyArray2<'py, f64>,
     machine_axes: String,
     machines_with: Option<Py<PyAny>>,
@@ -99,7 +99,7 @@ struct PyOptions<'py> {
 /// `splines`, and `event_columns` in place of `events`.
 #[pyfunction]
 #[pyo3(signature = (source, name, options, progress=None))]
-fn read_gcode<'py>(
+pub fn read_gcode<'py>(
     py: Python<'py>,
     source: &[u8],
     name: &str,
@@ -184,23 +184,25 @@ fn read_gcode<'py>(
     );
     let fields = PyDict::new(py);
     fields.set_item("splines", moves.splines.as_ref().map(|curve| curve.clone_ref(py)))?;
-    fields.set_item("feed", PyArray1::from_vec(py, columns.feed))?;
-    fields.set_item("control", PyArray1::from_vec(py, columns.control))?;
-    fields.set_item("blend_tolerance", PyArray1::from_vec(py, columns.blend_tolerance))?;
-    fields.set_item("fit_tolerance", PyArray1::from_vec(py, columns.fit_tolerance))?;
-    fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
-    fields.set_item("stop_cause", PyArray1::from_vec(py, columns.stop_cause))?;
-    fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
-    fields.set_item("coordinate_mode", PyArray1::from_vec(py, columns.coordinate_mode))?;
-    fields.set_item("tool_length", PyArray1::from_vec(py, columns.tool_length))?;
+    macro_rules! set {
+        ($($name:ident),+) => {
+            $(fields.set_item(stringify!($name), PyArray1::from_vec(py, columns.$name))?;)+
+        };
+    }
+    set!(
+        feed,
+        control,
+        blend_tolerance,
+        fit_tolerance,
+        stop,
+        stop_cause,
+        dwell,
+        coordinate_mode,
+        tool_length
+    );
     fields.set_item("event_columns", event_columns)?;
     fields.set_item("start_dwell", columns.start_dwell)?;
     fields.set_item("warnings", PyTuple::new(py, columns.warnings)?)?;
     fields.set_item("axes", PyTuple::new(py, axes)?)?;
     Ok((moves, fields))
-}
-
-/// Adds the functions of this file to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(read_gcode, module)?)
 }

@@ -9,17 +9,13 @@ use pyo3::prelude::*;
 use super::arrays::{indices, row, rows, to_array2};
 use super::memory;
 use super::native::Of;
-use super::plan::to_exception;
 use super::problem::Problem;
 use super::profile::Profile;
 use super::with_padded_axes;
-use super::work::run;
-use feedplan_geometry::watch::Watch;
 use feedplan_jerk::jerk_limited::Effort;
 use feedplan_jerk::s_curve::on_path::Cutting;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::problem;
 
 /// How long a planner may take.
 fn deadline(time_limit: Option<f64>) -> Option<Instant> {
@@ -36,7 +32,7 @@ type Planned<'py> = (Profile, bool, Bound<'py, PyArray1<f64>>, Bound<'py, PyArra
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, resolution, tolerance, proves, time_limit=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
-fn plan_jerk_limited<'py>(
+pub fn plan_jerk_limited<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
@@ -49,9 +45,8 @@ fn plan_jerk_limited<'py>(
     let effort =
         Effort { resolution, tolerance, proves, deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.axes(), M, {
-        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
-        let plan = |watch: Watch| problem::Problem { watch, ..problem }.jerk_limited(&jerk, &effort);
-        let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
+        let jerk = row::<M>(&jerk, 1.0)?;
+        let arcs = problem.solved(py, progress.as_ref(), |problem| problem.jerk_limited(&jerk, &effort))?;
         let [excess, bounds] = [&arcs.excess, &arcs.lower_bound].map(|part| PyArray1::from_slice(py, part));
         let stopped = arcs.stopped;
         py.detach(memory::give_back);
@@ -63,7 +58,7 @@ fn plan_jerk_limited<'py>(
 /// alike). The time limit is that of subruns left to the jerk-limited planner; see there.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None, progress=None))]
-fn plan_s_curve<'py>(
+pub fn plan_s_curve<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
@@ -75,11 +70,10 @@ fn plan_s_curve<'py>(
     let cuttings = to_cuttings(&cuttings);
     let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.axes(), M, {
-        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
-        let plan = |watch: Watch| {
-            problem::Problem { watch, ..problem }.s_curve(&jerk, &cuttings, look_ahead, &effort)
-        };
-        let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
+        let jerk = row::<M>(&jerk, 1.0)?;
+        let arcs = problem.solved(py, progress.as_ref(), |problem| {
+            problem.s_curve(&jerk, &cuttings, look_ahead, &effort)
+        })?;
         Ok(arcs.into())
     })
 }
@@ -87,7 +81,7 @@ fn plan_s_curve<'py>(
 /// The segments of each subrun that `plan_s_curve` plans on, (n, 5) rows of length, speed, acceleration, jerk and the speed
 /// limit at the junction with the next. A subrun without any is not for it.
 #[pyfunction]
-fn path_segments<'py>(
+pub fn path_segments<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
@@ -96,9 +90,8 @@ fn path_segments<'py>(
 ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
     let cuttings = to_cuttings(&cuttings);
     with_padded_axes!(problem.axes(), M, {
-        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
-        let cut = |watch: Watch| problem::Problem { watch, ..problem }.segments(&jerk, &cuttings, look_ahead);
-        let subruns = run(py, None, cut)?.map_err(|fault| to_exception(&fault))?;
+        let jerk = row::<M>(&jerk, 1.0)?;
+        let subruns = problem.solved(py, None, |problem| problem.segments(&jerk, &cuttings, look_ahead))?;
         let row =
             |own: &Segment| [own.length, own.speed(), own.limits.acceleration, own.limits.jerk, own.junction];
         Ok(subruns.iter().map(|own| to_array2(py, own.iter().map(row).collect(), 5)).collect())
@@ -109,7 +102,7 @@ fn path_segments<'py>(
 /// acceleration, jerk at their starts; those of subrun i from `offsets[i]` on. A subrun without any is planned by the
 /// jerk-limited planner.
 #[pyfunction]
-fn profile_of_sections<'py>(
+pub fn profile_of_sections<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
@@ -130,22 +123,12 @@ fn profile_of_sections<'py>(
         .collect();
     let offsets = indices(&offsets);
     with_padded_axes!(problem.axes(), M, {
-        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
-        let follow =
-            |watch: Watch| problem::Problem { watch, ..problem }.of_sections(&jerk, &offsets, &sections);
-        let arcs = run(py, None, follow)?.map_err(|fault| to_exception(&fault))?;
+        let jerk = row::<M>(&jerk, 1.0)?;
+        let arcs = problem.solved(py, None, |problem| problem.of_sections(&jerk, &offsets, &sections))?;
         Ok(arcs.into())
     })
 }
 
 fn to_cuttings(pairs: &[(f64, f64)]) -> Vec<Cutting> {
     pairs.iter().map(|&(lengths, alike)| Cutting { lengths, alike }).collect()
-}
-
-/// Adds the functions to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(plan_jerk_limited, module)?)?;
-    module.add_function(wrap_pyfunction!(plan_s_curve, module)?)?;
-    module.add_function(wrap_pyfunction!(path_segments, module)?)?;
-    module.add_function(wrap_pyfunction!(profile_of_sections, module)?)
 }

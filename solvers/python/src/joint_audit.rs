@@ -135,7 +135,7 @@ impl JointWords {
 /// Audits a profile whose limits belong to joints that are not the path's axes.
 #[pyfunction]
 #[pyo3(signature = (problem, limits, profile, progress=None))]
-fn audit_joints(
+pub fn audit_joints(
     problem: Bound<'_, PyAny>,
     limits: LimitArrays,
     profile: Of<Profile>,
@@ -154,8 +154,4 @@ fn audit_joints(
             })
         })
     })
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(audit_joints, module)?)
 }

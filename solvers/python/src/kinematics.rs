@@ -43,7 +43,7 @@ impl ExpressionArrays<'_> {
 
 /// `feedplan.machine.path_derivatives.TipPieces`.
 #[derive(FromPyObject)]
-struct TipArrays<'py> {
+pub struct TipArrays<'py> {
     control_points: PyReadonlyArray3<'py, f64>,
     width: PyReadonlyArray1<'py, f64>,
     weights: Option<PyReadonlyArray2<'py, f64>>,
@@ -123,7 +123,7 @@ fn parts_of<'a>(
 
 /// Joint positions (n, joints) for tips (n, axes).
 #[pyfunction]
-fn joint_positions<'py>(
+pub fn joint_positions<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: PyReadonlyArray2<'py, f64>,
@@ -137,7 +137,7 @@ fn joint_positions<'py>(
 
 /// q, q', …, q^(order) (n, order + 1, joints) at fractions (n,) of pieces (n,).
 #[pyfunction]
-fn joint_derivatives<'py>(
+pub fn joint_derivatives<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
@@ -157,7 +157,7 @@ type Bounds<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
 /// Least and greatest q^(k)/k! (n, order + 1, joints) over pieces, or parts (n, 2) of them.
 #[pyfunction]
 #[pyo3(signature = (expression, tips, order, parts=None))]
-fn joint_enclosures<'py>(
+pub fn joint_enclosures<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
@@ -193,7 +193,7 @@ fn numbers<'py>(py: Python<'py>, values: Vec<usize>) -> Bound<'py, PyArray1<i64>
 /// The joints along pieces joined end to end.
 #[pyfunction]
 #[pyo3(signature = (expression, tips, travel=None, start=None))]
-fn joint_path<'py>(
+pub fn joint_path<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
@@ -221,7 +221,7 @@ fn joint_path<'py>(
 
 /// `feedplan.machine.joint_interpolants.SquareOfSpeed`.
 #[derive(FromPyObject)]
-struct SquareArrays<'py> {
+pub struct SquareArrays<'py> {
     control_points: PyReadonlyArray3<'py, f64>,
     turning: bool,
     pieces: PyReadonlyArray1<'py, bool>,
@@ -229,7 +229,7 @@ struct SquareArrays<'py> {
 
 /// `feedplan.machine.joint_interpolants.Accuracy`.
 #[derive(FromPyObject)]
-struct AccuracyArrays<'py> {
+pub struct AccuracyArrays<'py> {
     acceleration: PyReadonlyArray1<'py, f64>,
     least_velocity: PyReadonlyArray1<'py, f64>,
     greatest_velocity: PyReadonlyArray1<'py, f64>,
@@ -283,7 +283,7 @@ impl AccuracyArrays<'_> {
 
 /// The allowed error of each joint, or the accuracy that the limits of the machine require.
 #[derive(FromPyObject)]
-enum ToleranceArrays<'py> {
+pub enum ToleranceArrays<'py> {
     Given(PyReadonlyArray1<'py, f64>),
     Limited(AccuracyArrays<'py>),
 }
@@ -298,7 +298,7 @@ type InterpolantArrays<'py> = (
 
 /// Polynomials that interpolate q' on parts of pieces.
 #[pyfunction]
-fn joint_interpolants<'py>(
+pub fn joint_interpolants<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
@@ -329,12 +329,4 @@ fn joint_interpolants<'py>(
         cube(py, found.slope, [parts, count + 1, outputs])?,
         table(py, found.curvature_error, outputs)?,
     ))
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(joint_positions, module)?)?;
-    module.add_function(wrap_pyfunction!(joint_derivatives, module)?)?;
-    module.add_function(wrap_pyfunction!(joint_enclosures, module)?)?;
-    module.add_function(wrap_pyfunction!(joint_path, module)?)?;
-    module.add_function(wrap_pyfunction!(joint_interpolants, module)?)
 }

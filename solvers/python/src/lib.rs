@@ -51,24 +51,45 @@ pub(crate) use with_padded_axes;
 
 /// The native module of feedplan.
 #[pymodule]
-fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    feedplan_planner::lower_bound::prepare();
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    moves::register(module)?;
-    path::register(module)?;
-    csv::register(module)?;
-    audit::register(module)?;
-    sampling::register(module)?;
-    curve::register(module)?;
-    curve_length::register(module)?;
-    problem::register(module)?;
-    profile::register(module)?;
-    plan::register(module)?;
-    jerk::register(module)?;
-    bound::register(module)?;
-    gcode::register(module)?;
-    kinematics::register(module)?;
-    joint_audit::register(module)?;
-    setpoint_audit::register(module)?;
-    Ok(())
+mod _solvers {
+    use super::*;
+
+    #[pymodule_export]
+    use audit::audit_plan;
+    #[pymodule_export]
+    use bound::lower_bound;
+    #[pymodule_export]
+    use csv::csv_rows;
+    #[pymodule_export]
+    use curve::Curve;
+    #[pymodule_export]
+    use curve_length::CurveLength;
+    #[pymodule_export]
+    use gcode::read_gcode;
+    #[pymodule_export]
+    use jerk::{path_segments, plan_jerk_limited, plan_s_curve, profile_of_sections};
+    #[pymodule_export]
+    use joint_audit::audit_joints;
+    #[pymodule_export]
+    use kinematics::{joint_derivatives, joint_enclosures, joint_interpolants, joint_path, joint_positions};
+    #[pymodule_export]
+    use moves::Moves;
+    #[pymodule_export]
+    use path::build_path;
+    #[pymodule_export]
+    use plan::{feed_between, look_ahead, plan_bang_bang, PlanError};
+    #[pymodule_export]
+    use problem::Problem;
+    #[pymodule_export]
+    use profile::Profile;
+    #[pymodule_export]
+    use sampling::PySampler;
+    #[pymodule_export]
+    use setpoint_audit::SetpointAudit;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        feedplan_planner::lower_bound::prepare();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

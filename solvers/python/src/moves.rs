@@ -10,46 +10,57 @@ use super::curve::Curve;
 use super::native::Of;
 use super::views::view;
 
-/// The columns of `feedplan.program.program.Program` that kernels take.
-#[pyclass(frozen, module = "feedplan._solvers")]
-pub struct Moves {
-    /// Where X, Y, Z are among the axes.
-    pub xyz: [Option<usize>; 3],
-    pub start: Vec<f64>,
-    pub kind: Vec<u8>,
-    /// Coordinates of one move after the other.
-    pub target: Vec<f64>,
-    pub line: Vec<i32>,
-    pub arc_move: Vec<i64>,
-    /// X, Y, Z of one arc after the other.
-    pub arc_centre: Vec<f64>,
-    pub arc_normal: Vec<u8>,
-    pub arc_angle: Vec<f64>,
-    pub spline_move: Vec<i64>,
-    pub spline_pieces: Vec<i64>,
-    pub splines: Option<Py<Curve>>,
-    pub change_move: Vec<i64>,
-    /// Coordinates of one change after the other.
-    pub change_start: Vec<f64>,
+macro_rules! moves {
+    (columns: $($column:ident: $type:ty),+; tables: $($table:ident by $width:expr),+) => {
+        /// The columns of `feedplan.program.program.Program` that kernels take.
+        #[pyclass(frozen, module = "feedplan._solvers")]
+        pub struct Moves {
+            /// Where X, Y, Z are among the axes.
+            pub xyz: [Option<usize>; 3],
+            pub splines: Option<Py<Curve>>,
+            $(pub $column: Vec<$type>,)+
+            /// One row after the other.
+            $(pub $table: Vec<f64>,)+
+        }
+
+        /// The same columns as arrays.
+        #[derive(FromPyObject)]
+        struct Columns<'py> {
+            axes: Vec<String>,
+            splines: Option<Of<Curve>>,
+            $($column: PyReadonlyArray1<'py, $type>,)+
+            $($table: PyReadonlyArray2<'py, f64>,)+
+        }
+
+        #[pymethods]
+        impl Moves {
+            /// From the arrays of a `Program`.
+            #[new]
+            fn new(columns: Columns<'_>) -> PyResult<Self> {
+                let made = Self {
+                    xyz: places_of_xyz(&columns.axes),
+                    splines: columns.splines.map(|splines| splines.into_native()),
+                    $($column: columns.$column.as_slice()?.to_vec(),)+
+                    $($table: columns.$table.as_slice()?.to_vec(),)+
+                };
+                made.checked()
+            }
+
+            /// Views of the columns by name.
+            fn fields<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+                let fields = PyDict::new(slf.py());
+                $(fields.set_item(stringify!($column), view(slf, |moves| moves.$column[..].into())?)?;)+
+                $(fields.set_item(stringify!($table), view(slf, |moves| table(&moves.$table, $width(moves)))?)?;)+
+                Ok(fields)
+            }
+        }
+    };
 }
 
-/// The same columns as arrays.
-#[derive(FromPyObject)]
-struct Columns<'py> {
-    axes: Vec<String>,
-    start: PyReadonlyArray1<'py, f64>,
-    kind: PyReadonlyArray1<'py, u8>,
-    target: PyReadonlyArray2<'py, f64>,
-    line: PyReadonlyArray1<'py, i32>,
-    arc_move: PyReadonlyArray1<'py, i64>,
-    arc_centre: PyReadonlyArray2<'py, f64>,
-    arc_normal: PyReadonlyArray1<'py, u8>,
-    arc_angle: PyReadonlyArray1<'py, f64>,
-    spline_move: PyReadonlyArray1<'py, i64>,
-    spline_pieces: PyReadonlyArray1<'py, i64>,
-    splines: Option<Of<Curve>>,
-    change_move: PyReadonlyArray1<'py, i64>,
-    change_start: PyReadonlyArray2<'py, f64>,
+moves! {
+    columns: start: f64, kind: u8, line: i32, arc_move: i64, arc_normal: u8, arc_angle: f64, spline_move: i64,
+        spline_pieces: i64, change_move: i64;
+    tables: target by Moves::axes, change_start by Moves::axes, arc_centre by (|_: &Moves| 3)
 }
 
 /// Where X, Y, Z are among these letters.
@@ -88,53 +99,6 @@ impl Moves {
     }
 }
 
-#[pymethods]
-impl Moves {
-    /// From the arrays of a `Program`.
-    #[new]
-    fn new(columns: Columns<'_>) -> PyResult<Self> {
-        let made = Self {
-            xyz: places_of_xyz(&columns.axes),
-            start: columns.start.as_slice()?.to_vec(),
-            kind: columns.kind.as_slice()?.to_vec(),
-            target: columns.target.as_slice()?.to_vec(),
-            line: columns.line.as_slice()?.to_vec(),
-            arc_move: columns.arc_move.as_slice()?.to_vec(),
-            arc_centre: columns.arc_centre.as_slice()?.to_vec(),
-            arc_normal: columns.arc_normal.as_slice()?.to_vec(),
-            arc_angle: columns.arc_angle.as_slice()?.to_vec(),
-            spline_move: columns.spline_move.as_slice()?.to_vec(),
-            spline_pieces: columns.spline_pieces.as_slice()?.to_vec(),
-            splines: columns.splines.map(|splines| splines.into_native()),
-            change_move: columns.change_move.as_slice()?.to_vec(),
-            change_start: columns.change_start.as_slice()?.to_vec(),
-        };
-        made.checked()
-    }
-
-    /// Views of the columns by name.
-    fn fields<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
-        let fields = PyDict::new(slf.py());
-        macro_rules! columns {
-            ($($name:ident),+) => {
-                $(fields.set_item(stringify!($name), view(slf, |moves| moves.$name[..].into())?)?;)+
-            };
-        }
-        macro_rules! tables {
-            ($($name:ident by $width:expr),+) => {
-                $(fields.set_item(stringify!($name), view(slf, |moves| table(&moves.$name, $width(moves)))?)?;)+
-            };
-        }
-        columns!(start, kind, line, arc_move, arc_normal, arc_angle, spline_move, spline_pieces, change_move);
-        tables!(target by Self::axes, change_start by Self::axes, arc_centre by (|_: &Self| 3));
-        Ok(fields)
-    }
-}
-
 fn table(flat: &[f64], width: usize) -> ArrayView2<'_, f64> {
     ArrayView2::from_shape((flat.len() / width, width), flat).expect("whole rows")
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Moves>()
 }

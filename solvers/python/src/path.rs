@@ -24,10 +24,6 @@ use feedplan_path::PathOfMoves as _;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
 
-pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(build_path, module)?)
-}
-
 /// The travel of an axis that the path does not have.
 const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
@@ -36,7 +32,7 @@ type Rows<'py> = PyReadonlyArray2<'py, f64>;
 
 /// `feedplan.geometry.rules.Rules`.
 #[derive(FromPyObject)]
-struct Rules<'py> {
+pub struct Rules<'py> {
     name: String,
     feed: Floats<'py>,
     tolerance: Floats<'py>,
@@ -58,7 +54,7 @@ struct Rules<'py> {
 
 /// `feedplan.geometry.rules.Motion`.
 #[derive(FromPyObject)]
-struct MotionArrays<'py> {
+pub struct MotionArrays<'py> {
     run: PyReadonlyArray2<'py, i64>,
     start: PyReadonlyArray1<'py, i64>,
     place: Floats<'py>,
@@ -133,7 +129,7 @@ fn arcs(moves: &Moves) -> PyResult<Vec<(usize, ArcShape)>> {
 /// The path of a program.
 #[pyfunction]
 #[pyo3(signature = (program, rules, motion=None, progress=None))]
-fn build_path<'py>(
+pub fn build_path<'py>(
     py: Python<'py>,
     program: Of<Moves>,
     rules: Rules<'py>,

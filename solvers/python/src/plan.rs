@@ -10,9 +10,8 @@ use super::problem::Problem;
 use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_geometry::watch::Watch;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::problem::{self, Fault};
+use feedplan_planner::problem::Fault;
 use feedplan_planner::trapezoid::{Change, Segments};
 use feedplan_planner::Exact as _;
 
@@ -26,15 +25,13 @@ pyo3::create_exception!(
 /// The fastest profile.
 #[pyfunction]
 #[pyo3(signature = (problem, progress=None))]
-fn plan_bang_bang<'py>(
+pub fn plan_bang_bang<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Profile> {
     with_padded_axes!(problem.axes(), M, {
-        let problem = problem.rows::<M>()?.problem();
-        let plan = |watch: Watch| problem::Problem { watch, ..problem }.fastest();
-        let profile = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
+        let profile = problem.solved::<M, _>(py, progress.as_ref(), |problem| problem.fastest())?;
         Ok(profile.into())
     })
 }
@@ -52,7 +49,7 @@ pub fn to_exception(fault: &Fault) -> PyErr {
 
 /// The greatest speed on each part of a piece at which the feed holds everywhere on the part (n,).
 #[pyfunction]
-fn feed_between<'py>(
+pub fn feed_between<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
     piece: PyReadonlyArray1<'py, i64>,
@@ -79,7 +76,7 @@ fn feed_between<'py>(
 /// The greatest speeds at the ends of segments that the segments can reach; `up` and `down` (n, 3) are the gain and the
 /// two holds of speeding up and of slowing down.
 #[pyfunction]
-fn look_ahead<'py>(
+pub fn look_ahead<'py>(
     py: Python<'py>,
     speed: PyReadonlyArray1<'py, f64>,
     up: PyReadonlyArray2<'py, f64>,
@@ -96,12 +93,4 @@ fn look_ahead<'py>(
     }
     py.detach(|| Segments { up: &up, down: &down }.lower(&mut speed));
     Ok(PyArray1::from_vec(py, speed))
-}
-
-/// Adds the function and its exception to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("PlanError", module.py().get_type::<PlanError>())?;
-    module.add_function(wrap_pyfunction!(feed_between, module)?)?;
-    module.add_function(wrap_pyfunction!(look_ahead, module)?)?;
-    module.add_function(wrap_pyfunction!(plan_bang_bang, module)?)
 }

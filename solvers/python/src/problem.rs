@@ -8,10 +8,12 @@ use pyo3::prelude::*;
 use super::arrays::{indices, row, rows_with};
 use super::curve::Curve;
 use super::native::{InAxes, Of};
+use super::plan::to_exception;
 use super::with_padded_axes;
+use super::work::run;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::problem::{self, Both, SpeedSquare, Tip, TIP_AXES};
+use feedplan_planner::problem::{self, Both, Fault, SpeedSquare, Tip, TIP_AXES};
 use feedplan_setpoints::sampling::PathData;
 
 /// `feedplan.curves.speed_polynomial.SpeedPolynomial`.
@@ -156,6 +158,18 @@ impl Problem {
     pub fn rows<const M: usize>(&self) -> PyResult<&Rows<M>> {
         self.rows.get()
     }
+
+    /// What `kernel` finds for the problem in M axes.
+    pub fn solved<const M: usize, T: Send>(
+        &self,
+        py: Python<'_>,
+        progress: Option<&Bound<'_, PyAny>>,
+        kernel: impl FnOnce(problem::Problem<'_, M>) -> Result<T, Fault> + Send,
+    ) -> PyResult<T> {
+        let problem = self.rows()?.problem();
+        let found = run(py, progress, |watch| kernel(problem::Problem { watch, ..problem }))?;
+        found.map_err(|fault| to_exception(&fault))
+    }
 }
 
 #[pymethods]
@@ -166,8 +180,4 @@ impl Problem {
         let axes = problem.curve.axes();
         with_padded_axes!(axes, M, Ok(Self { axes, rows: InAxes::new(Rows::<M>::new(&problem)?) }))
     }
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Problem>()
 }

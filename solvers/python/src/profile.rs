@@ -87,7 +87,3 @@ impl From<JerkProfile> for Profile {
         Self { phases: planned.phases.into(), runs: planned.runs, slowed: vec![], kinked: planned.kinks }
     }
 }
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Profile>()
-}

@@ -49,7 +49,7 @@ fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> Chunk
 
 /// A profile on its path, ready to be read at any setpoint.
 #[pyclass(name = "Sampler", module = "feedplan._solvers", frozen)]
-struct PySampler {
+pub struct PySampler {
     axes: usize,
     /// `Sampler`.
     sampler: InAxes,
@@ -167,8 +167,4 @@ impl PySampler {
 
 fn slice<'a, T: numpy::Element>(array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| PyValueError::new_err("arrays must be C-contiguous"))
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PySampler>()
 }

@@ -81,7 +81,7 @@ impl Compared {
 
 /// Audits setpoints chunk by chunk; with a problem also their places on its path.
 #[pyclass]
-struct SetpointAudit {
+pub struct SetpointAudit {
     axes: usize,
     stream: Option<Box<dyn AnyStream>>,
     compared: Option<Compared>,
@@ -199,8 +199,4 @@ fn compare(
 
 fn finished() -> PyErr {
     PyValueError::new_err("this audit is finished")
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<SetpointAudit>()
 }
