@@ -35,18 +35,19 @@ from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
 from feedplan.planners import (
+    ELSEWHERE,
+    PROGRESS,
+    RESERVE,
     Elsewhere,
     MethodName,
     corners,
     given_options,
-    goes_elsewhere,
     grid_error,
     limits_jerk,
     methods,
     options_of,
     planner,
-    tells_early,
-    tells_progress,
+    takes,
 )
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
@@ -387,7 +388,7 @@ def plan(
     solve: Callable[..., SpeedProfile] = planner(method, **given)
     time_limit = given.get("time_limit")
     # The limit of a method that can tell early what follows its plan is one for all of it.
-    limit = TimeLimit(time_limit) if time_limit is not None and tells_early(method) else None
+    limit = TimeLimit(time_limit) if time_limit is not None and takes(method, RESERVE) else None
     machine = Machine.of(machine)
     rival = machine.controller if controller is None else Controller.of(controller)
     choice = corners(method)
@@ -460,7 +461,7 @@ def plan(
                 own["reserve"] = lambda first: limit.keep_for(
                     Setpoints(problem, first, machine.period, interpolator, max_setpoints)
                 )
-            if tells_progress(method):
+            if takes(method, PROGRESS):
                 turn = next(turns)
                 own["progress"] = part(share, turn * each, (turn + 1) * each)
             profile = solve(problem, **own)
@@ -550,8 +551,8 @@ def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> Non
     """Raises InputError where runs are not planned elsewhere."""
     if not callable(getattr(elsewhere, "map", None)) or not callable(getattr(elsewhere, "count", None)):
         raise refuse("elsewhere", elsewhere, "a feedplan.jobs.cluster_runs.ClusterRuns")
-    if not goes_elsewhere(method):
-        able = ", ".join(own for own in methods() if goes_elsewhere(own))
+    if not takes(method, ELSEWHERE):
+        able = ", ".join(own for own in methods() if takes(own, ELSEWHERE))
         raise InputError(
             f"the method {method} plans in less time than its runs take on the way to a cluster: leave the "
             f"cluster out, or use {able}"

@@ -10,15 +10,17 @@ import re
 import subprocess
 import sys
 from importlib.metadata import version
+from types import ModuleType
 from typing import get_args, get_type_hints
 
 import grimp
 import pytest
 
 import feedplan
+from feedplan import outputs, planners
 from feedplan.machine.axis import Axis, AxisKind
-from feedplan.outputs import FormatName, formats
-from feedplan.planners import MethodName, options_of
+from feedplan.outputs import formats
+from feedplan.planners import options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.setpoints import INTERPOLATORS
 
@@ -96,9 +98,14 @@ def test_machines_and_methods_are_named() -> None:
     assert {"bang-bang", "jerk-limited", "toppra"} <= set(feedplan.methods())
 
 
+def modules_of(package: ModuleType) -> tuple[str, ...]:
+    names = sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(package.__path__))
+    return tuple(name for name in names if not name.startswith("-"))
+
+
 def test_literal_types_list_all_names() -> None:
-    assert get_args(MethodName) == feedplan.methods()
-    assert get_args(FormatName) == formats()
+    assert feedplan.methods() == modules_of(planners)
+    assert formats() == modules_of(outputs)
     assert INTERPOLATORS == ("sarfraz", "newton")
     assert get_args(AxisKind) == ("linear", "rotary")
     for function, argument in ((feedplan.plan, "method"), (Axis, "kind")):

@@ -16,12 +16,11 @@ from __future__ import annotations
 
 import importlib
 import os
-import pkgutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
-from typing import Any, Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast, get_args
 
 from feedplan.arguments import callback, file_path, one_of, shown
 from feedplan.errors import InputError
@@ -87,9 +86,7 @@ class Format(Protocol):
 
 def formats() -> tuple[FormatName, ...]:
     """The names of all formats."""
-    names = (module.name for module in pkgutil.iter_modules(__path__))
-    known = sorted(name.replace("_", "-") for name in names if not name.startswith("_"))
-    return cast("tuple[FormatName, ...]", tuple(known))
+    return get_args(FormatName)
 
 
 def format_named(name: str) -> Format:

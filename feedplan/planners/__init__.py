@@ -17,11 +17,10 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import pkgutil
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import ModuleType
-from typing import Any, Literal, cast
+from typing import Any, Literal, get_args
 
 from feedplan.arguments import one_of
 from feedplan.constraints.problem import Problem
@@ -55,9 +54,7 @@ ELSEWHERE = "elsewhere"
 
 def methods() -> tuple[MethodName, ...]:
     """The names of all planning methods; the documentation of `feedplan.plan` has their options."""
-    names = (module.name for module in pkgutil.iter_modules(__path__))
-    known = sorted(name.replace("_", "-") for name in names if not name.startswith("_"))
-    return cast("tuple[MethodName, ...]", tuple(known))
+    return get_args(MethodName)
 
 
 def planner(method: str, **options: Any) -> Callable[[Problem], SpeedProfile]:
@@ -96,19 +93,9 @@ def options_of(method: str) -> dict[str, Any]:
     return {own.name: own.default for own in parameters if own.name not in others}
 
 
-def tells_early(method: str) -> bool:
-    """Whether a method can announce the work after its plan (`RESERVE`); raises as `planner`."""
-    return RESERVE in inspect.signature(_module(method).plan).parameters
-
-
-def tells_progress(method: str) -> bool:
-    """Whether a method reports its progress (`PROGRESS`); raises as `planner`."""
-    return PROGRESS in inspect.signature(_module(method).plan).parameters
-
-
-def goes_elsewhere(method: str) -> bool:
-    """Whether runs of a method may be planned on other computers (`ELSEWHERE`); raises as `planner`."""
-    return ELSEWHERE in inspect.signature(_module(method).plan).parameters
+def takes(method: str, argument: str) -> bool:
+    """Whether a method takes `RESERVE`, `PROGRESS` or `ELSEWHERE`; raises as `planner`."""
+    return argument in inspect.signature(_module(method).plan).parameters
 
 
 def corners(method: str) -> Corners:

@@ -126,18 +126,7 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         twice."""
 
         def accepted() -> tuple[dict[str, Any], bool]:
-            order = order_of(asked, limits)
-            record, is_new = store.accept(
-                upload,
-                order.fingerprint(upload.sha256),
-                name=order.name or "program",
-                machine=order.machine,
-                machine_name=order.machine_name,
-                method=order.method,
-                options=order.options,
-                tool_table=order.tool_table,
-                key=key,
-            )
+            record, is_new = store.accept(upload, order_of(asked, limits), key)
             return views.job(record), is_new
 
         async with service.receiving:

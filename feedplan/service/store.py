@@ -31,10 +31,13 @@ from feedplan.errors import InputError
 from feedplan.service.database import Database
 from feedplan.service.limits import MB, Limits
 from feedplan.service.refusals import BUSY, CANCELLED, DISK, INPUT, UNKNOWN, Refusal
+from feedplan.service.requests import Order
 
 ENDED = ("done", "failed", "cancelled")
 # Size of a job's record and events, besides its files [bytes].
 RECORD = 16_384
+# What a job has that waits again.
+_WAITS: dict[str, object] = {"state": "queued", "started": None, "stage": None, "done": 0}
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,7 @@ class Store:
         with self._database.change() as db:
             running = [row["id"] for row in db.execute("SELECT id FROM jobs WHERE state = 'running'")]
             for job in running:
-                self._wait_again(db, job)
+                _set(db, job, "running", **_WAITS)
             rows = db.execute("SELECT id, state, attempt FROM jobs").fetchall()
         results = {row["id"]: f"result-{row['attempt']}" if row["state"] == "done" else None for row in rows}
         for folder in self._jobs.iterdir():
@@ -156,24 +159,13 @@ class Store:
 
     # What happens to jobs.
 
-    def accept(
-        self,
-        upload: Upload,
-        fingerprint: str,
-        *,
-        name: str,
-        machine: str,
-        machine_name: str,
-        method: str,
-        options: Mapping[str, Any],
-        tool_table: str | None = None,
-        key: str | None = None,
-    ) -> tuple[Record, bool]:
+    def accept(self, upload: Upload, order: Order, key: str | None = None) -> tuple[Record, bool]:
         """The record of a new job, or of a job with the same fingerprint that has not failed.
 
         The flag is true for a new job. The same `key` always gives the same job. Raises Refusal if the queue
         or the disk is full, or if the key was used for another request.
         """
+        fingerprint = order.fingerprint(upload.sha256)
         if key is None:
             with self._database.read() as db:
                 known = self._known(db, fingerprint, key)
@@ -186,8 +178,8 @@ class Store:
         try:
             sync(upload.file)
             os.replace(upload.file, folder / "program")
-            if tool_table is not None:
-                write_durably(folder / "tools.tbl", tool_table.encode())
+            if order.tool_table is not None:
+                write_durably(folder / "tools.tbl", order.tool_table.encode())
             sync(folder)
             sync(self._jobs)
             with self._database.change() as db:
@@ -201,15 +193,15 @@ class Store:
                         "fingerprint": fingerprint,
                         "state": "queued",
                         "created": time.time(),
-                        "name": name,
+                        "name": order.name or "program",
                         "sha256": upload.sha256,
                         "bytes": upload.bytes,
                         "lines": upload.lines,
-                        "machine_name": machine_name,
-                        "machine": machine,
-                        "method": method,
-                        "options": json.dumps(options),
-                        "has_tools": tool_table is not None,
+                        "machine_name": order.machine_name,
+                        "machine": order.machine,
+                        "method": order.method,
+                        "options": json.dumps(order.options),
+                        "has_tools": order.tool_table is not None,
                         "size": upload.bytes + RECORD,
                     }
                     places = ", ".join("?" * len(columns))
@@ -257,27 +249,20 @@ class Store:
     def claim(self) -> Record | None:
         """Sets the job that has waited longest to running and returns it; None if no job waits."""
         with self._database.change() as db:
-            row = db.execute("SELECT id FROM jobs WHERE state = 'queued' ORDER BY number LIMIT 1").fetchone()
+            query = "SELECT id, attempt FROM jobs WHERE state = 'queued' ORDER BY number LIMIT 1"
+            row = db.execute(query).fetchone()
             if row is None:
                 return None
-            job = str(row["id"])
-            db.execute(
-                "UPDATE jobs SET state = 'running', started = ?, attempt = attempt + 1, stage = 'read', "
-                "done = 0 WHERE id = ?",
-                (time.time(), job),
-            )
-            _add_event(db, job, "state", {"state": "running"})
+            job, attempt = str(row["id"]), row["attempt"] + 1
+            running = {"state": "running", "started": time.time(), "stage": "read", "done": 0}
+            _set(db, job, "queued", attempt=attempt, **running)
         self.changed(job)
         return self.job(job)
 
     def progress(self, record: Record, stage: str, part: float, done: float) -> None:
         """Records the progress of a running job: the part of the stage and of the whole that is done."""
         with self._database.change() as db:
-            changed = db.execute(
-                "UPDATE jobs SET stage = ?, done = ? WHERE id = ? AND state = 'running' AND attempt = ?",
-                (stage, done, record["id"], record["attempt"]),
-            )
-            if changed.rowcount:
+            if _set(db, record["id"], "running", record["attempt"], stage=stage, done=done):
                 told = {"stage": stage, "part": round(part, 4), "done": round(done, 4)}
                 _add_event(db, record["id"], "progress", told)
         self.changed(record["id"])
@@ -290,18 +275,19 @@ class Store:
         if result is None:
             _remove(self.result(record))
         with self._database.change() as db:
-            changed = db.execute(
-                "UPDATE jobs SET state = ?, finished = ?, done = ?, result = ?, problem = ?, size = ? "
-                "WHERE id = ? AND state = 'running' AND attempt = ?",
-                (
-                    *(state, time.time(), 1.0 if state == "done" else record["done"]),
-                    *(None if result is None else json.dumps(result), problem, size + RECORD),
-                    *(record["id"], record["attempt"]),
-                ),
+            known = _set(
+                db,
+                record["id"],
+                "running",
+                record["attempt"],
+                state=state,
+                finished=time.time(),
+                done=1.0 if state == "done" else record["done"],
+                result=None if result is None else json.dumps(result),
+                problem=problem,
+                size=size + RECORD,
             )
-            if changed.rowcount:
-                _add_event(db, record["id"], "state", {"state": state})
-        if not changed.rowcount:  # the job was deleted
+        if not known:  # the job was deleted
             _remove(self.folder(record))
         self.changed(record["id"])
 
@@ -309,36 +295,19 @@ class Store:
         """Sets a running job to waiting: the server ends, or the executor was lost."""
         _remove(self.result(record))
         with self._database.change() as db:
-            known = self._wait_again(db, record["id"])
+            known = _set(db, record["id"], "running", **_WAITS)
         if not known:  # the job was deleted
             _remove(self.folder(record))
         self.changed(record["id"])
-
-    @staticmethod
-    def _wait_again(db: sqlite3.Connection, job: str) -> bool:
-        changed = db.execute(
-            "UPDATE jobs SET state = 'queued', started = NULL, stage = NULL, done = 0 "
-            "WHERE id = ? AND state = 'running'",
-            (job,),
-        )
-        if changed.rowcount:
-            _add_event(db, job, "state", {"state": "queued"})
-        return changed.rowcount > 0
 
     def cancel_waiting(self, job: str) -> bool:
         """Cancels a job if it waits; else returns False. Raises Refusal for an unknown job."""
         self.job(job)
         told = Refusal(CANCELLED, "the job was cancelled before it ran: send it again").text()
         with self._database.change() as db:
-            changed = db.execute(
-                "UPDATE jobs SET state = 'cancelled', finished = ?, problem = ? "
-                "WHERE id = ? AND state = 'queued'",
-                (time.time(), told, job),
-            )
-            if changed.rowcount:
-                _add_event(db, job, "state", {"state": "cancelled"})
+            waited = _set(db, job, "queued", state="cancelled", finished=time.time(), problem=told)
         self.changed(job)
-        return changed.rowcount > 0
+        return waited
 
     def delete(self, job: str) -> None:
         """Deletes a job; the folder of a running job is removed when its process has ended. Raises Refusal
@@ -358,6 +327,19 @@ class Store:
             rows = db.execute("SELECT id FROM jobs WHERE finished < ?", (last,)).fetchall()
         for row in rows:
             self.delete(str(row["id"]))
+
+
+def _set(
+    db: sqlite3.Connection, job: str, was: str, attempt: int | None = None, /, **columns: object
+) -> bool:
+    """Sets columns of a job that is in the state `was`, and in that attempt if one is given; tells of a new
+    state. Returns whether there is such a job."""
+    names = ", ".join(f"{name} = ?" for name in columns)
+    where = "id = ? AND state = ? AND attempt = COALESCE(?, attempt)"
+    changed = db.execute(f"UPDATE jobs SET {names} WHERE {where}", (*columns.values(), job, was, attempt))
+    if changed.rowcount and "state" in columns:
+        _add_event(db, job, "state", {"state": columns["state"]})
+    return changed.rowcount > 0
 
 
 def _add_event(db: sqlite3.Connection, job: str, kind: str, data: Mapping[str, Any]) -> None:

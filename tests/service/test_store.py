@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import sqlite3
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from feedplan.errors import InputError
 from feedplan.service.limits import Limits
 from feedplan.service.refusals import Refusal
+from feedplan.service.requests import Order
 from feedplan.service.store import Store, Upload
 
-FIELDS: dict[str, Any] = {
-    "name": "p",
-    "machine": "auto",
-    "machine_name": "auto",
-    "method": "bang-bang",
-    "options": {},
-}
+
+def order(name: str) -> Order:
+    return Order(name, "auto", "auto", "bang-bang", {}, None)
 
 
 def upload(store: Store, content: bytes = b"G0 X1\n") -> Upload:
@@ -30,7 +26,7 @@ def upload(store: Store, content: bytes = b"G0 X1\n") -> Upload:
 
 def test_a_running_job_of_a_server_that_ended_waits_again(tmp_path: Path) -> None:
     store = Store(tmp_path, Limits())
-    first, second, third = (store.accept(upload(store), name, **FIELDS)[0] for name in "abc")
+    first, second, third = (store.accept(upload(store), order(name))[0] for name in "abc")
     running = store.claim()
     assert running is not None
     assert running["id"] == first["id"]
@@ -69,10 +65,10 @@ def test_a_running_job_of_a_server_that_ended_waits_again(tmp_path: Path) -> Non
 
 def test_a_job_is_accepted_as_a_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = Store(tmp_path, Limits(max_queue=1))
-    store.accept(upload(store), "a", **FIELDS)
+    store.accept(upload(store), order("a"))
     with pytest.raises(Refusal, match="1 jobs wait, as many as max_queue allows"):
-        store.accept(upload(store), "b", **FIELDS)
-    same, is_new = store.accept(upload(store), "a", **FIELDS)
+        store.accept(upload(store), order("b"))
+    same, is_new = store.accept(upload(store), order("a"))
     assert not is_new
     assert [folder.name for folder in (tmp_path / "jobs").iterdir()] == [same["id"]]
     store.close()
@@ -80,7 +76,7 @@ def test_a_job_is_accepted_as_a_whole_or_not_at_all(tmp_path: Path, monkeypatch:
 
 def test_jobs_that_ended_long_ago_are_deleted(tmp_path: Path) -> None:
     store = Store(tmp_path, Limits(keep_days=0.0))
-    waiting, ended = (store.accept(upload(store), name, **FIELDS)[0] for name in "ab")
+    waiting, ended = (store.accept(upload(store), order(name))[0] for name in "ab")
     assert store.cancel_waiting(ended["id"])
     store.delete_old()
     assert [job["id"] for job in store.jobs(None, None, 9)] == [waiting["id"]]
