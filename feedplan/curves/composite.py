@@ -163,13 +163,7 @@ class CompositeCurve(OfNative[Curve]):
         first, last, step = instance(pieces, slice, "pieces", "a slice").indices(len(self))
         if step != 1:
             raise InputError(f"pieces in steps of {step}: take consecutive ones")
-        own = slice(int(self.offsets[first]), int(self.offsets[max(last, first)]))
-        return CompositeCurve(
-            self.control_points[own],
-            None if self.weights is None else self.weights[own],
-            self.offsets[first : max(last, first) + 1] - self.offsets[first],
-            self.width[pieces],
-        )
+        return self.take(np.arange(first, max(last, first)))
 
     def take(self, pieces: NDArray[np.integer]) -> CompositeCurve:
         """These pieces (m,) in this order, whether or not they meet."""

@@ -80,12 +80,9 @@ def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
     code = _COMMENT.sub(lambda found: b" " * len(found[0]), content)
     sentences = []
     for pattern, what in _LACKS[dialect]:
-        first = None
-        count = 0
-        for found in re.finditer(pattern, code):
-            first = first or found
-            count += 1
+        first = re.search(pattern, code)
         if first is not None:
+            count = sum(1 for _ in re.finditer(pattern, code))
             line = _line_of(code, first.start())
             word = " ".join(first[0].decode("ascii", "replace").split())[:20]
             sentences.append(f"line {line}: {_NAMES_OF[dialect]} lacks {what} ({word}, {count} in all)")

@@ -153,6 +153,7 @@ pub fn m_group(code: u16) -> MGroup {
 }
 
 /// The words of a block.
+#[derive(Default)]
 pub struct Block {
     /// Bits of the letters that the block has, other than G, M, N and O.
     pub words: u32,
@@ -171,22 +172,6 @@ pub struct Block {
 }
 
 impl Block {
-    pub fn new() -> Self {
-        Self {
-            words: 0,
-            values: [0.0; 26],
-            groups: 0,
-            codes: [0; GROUPS],
-            m_groups: 0,
-            m_codes: [0; M_GROUPS],
-            others: [0; MOST_OTHERS],
-            other_count: 0,
-            radius: None,
-            angle: None,
-            corner: None,
-        }
-    }
-
     /// Forgets all words; their values stay until they are written over.
     #[inline(always)]
     pub fn clear(&mut self) {
@@ -373,7 +358,7 @@ mod tests {
 
     #[test]
     fn codes_of_one_group_exclude_each_other() {
-        let mut block = Block::new();
+        let mut block = Block::default();
         assert_eq!(block.set_code(10), Ok(()));
         assert_eq!(block.set_code(910), Ok(()));
         assert_eq!(block.set_code(810), Err(Some(10)));
@@ -389,7 +374,7 @@ mod tests {
 
     #[test]
     fn a_letter_stands_once() {
-        let mut block = Block::new();
+        let mut block = Block::default();
         assert!(block.set(b'X', 1.5));
         assert_eq!(block.get(b'X'), Some(1.5));
         assert_eq!(block.get(b'Y'), None);

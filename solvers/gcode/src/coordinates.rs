@@ -11,10 +11,11 @@ pub type Direction = [f64; 3];
 pub const UPRIGHT: Direction = [0.0, 0.0, 1.0];
 
 /// The coordinates that axis words are, with the numbers of the Python package.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum CoordinateMode {
     /// Joint positions.
+    #[default]
     Joints = 0,
     /// The tip and the angles of the rotary axes.
     Tip = 1,

@@ -1,13 +1,14 @@
 //! The state that stays in force from block to block: modes, offsets, feed.
 
 use super::coordinates::{CoordinateMode, Point};
-use super::moves::{Control, Mode};
+use super::moves::Control;
 use super::tolerance::MM_PER_INCH;
 
 /// The unit of an F word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FeedMode {
     /// G94: units of length per minute.
+    #[default]
     PerMinute,
     /// G93: moves per minute.
     Inverse,
@@ -36,7 +37,7 @@ pub struct Sticky {
 }
 
 /// The transformation from coordinates of the program to those of the machine.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Offsets {
     /// The work offset in force, from 0 for G54, with its vector and its rotation about Z in degrees.
     pub system: usize,
@@ -54,9 +55,7 @@ pub struct Offsets {
 
 impl Offsets {
     pub fn new(work: Point) -> Self {
-        let zero = [0.0; 9];
-        let mut offsets =
-            Self { system: 0, work, rotation: 0.0, shift: zero, unturned: None, tool: zero, sum: zero };
+        let mut offsets = Self { work, ..Self::default() };
         offsets.update();
         offsets
     }
@@ -100,7 +99,7 @@ pub fn turn(point: &mut Point, angle: f64) {
 }
 
 /// All modes, with the offsets and the feed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct State {
     pub offsets: Offsets,
     /// The motion code in tenths; 800 (G80) for no motion.
@@ -147,26 +146,8 @@ impl State {
             motion: 800,
             normal: 2,
             absolute: true,
-            absolute_centres: false,
-            inches: false,
-            diameters: false,
-            polar: false,
-            units_given: false,
-            feed_mode: FeedMode::PerMinute,
-            feed: None,
-            control: Control::new(Mode::Tolerance),
-            retract_to_initial: false,
-            retract_given: false,
-            spindle_on: false,
-            spindle_back: false,
-            mist: false,
-            flood: false,
-            spindle_speed: None,
-            constant_surface_speed: false,
-            sticky: Sticky::default(),
-            coordinate_mode: CoordinateMode::Joints,
             tool_length: f64::NAN,
-            entry: [0.0; 9],
+            ..Self::default()
         }
     }
 

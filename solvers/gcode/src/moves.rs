@@ -40,6 +40,12 @@ pub struct Control {
     pub fit: f64,
 }
 
+impl Default for Control {
+    fn default() -> Self {
+        Self::new(Mode::Tolerance)
+    }
+}
+
 impl Control {
     pub fn new(mode: Mode) -> Self {
         Self { mode, blend: f64::NAN, fit: f64::NAN }
@@ -91,6 +97,7 @@ struct Change {
 }
 
 /// The moves so far.
+#[derive(Default)]
 pub struct Moves {
     /// The axes that have columns in `target`, as indices into a `Point`.
     axes: Vec<usize>,
@@ -133,16 +140,7 @@ impl Moves {
             target: Vec::with_capacity(3 * expected),
             feed: Vec::with_capacity(expected),
             line: Vec::with_capacity(expected),
-            control: Vec::new(),
-            stops: Vec::new(),
-            dwells: Vec::new(),
-            start_dwell: 0.0,
-            arcs: Vec::new(),
-            splines: CompositeCurve::default(),
-            spline_rows: Vec::new(),
-            changes: Vec::new(),
-            directions: Vec::new(),
-            events: Events::default(),
+            ..Self::default()
         }
     }
 

@@ -117,7 +117,7 @@ impl<'a> Runner<'a> {
             seen,
             texts: vec![Text::new(String::new(), Cow::Borrowed(source))],
             frames: vec![start],
-            block: Block::new(),
+            block: Block::default(),
             deleted: 0,
             left: lines as u64 + SPARE_LINES + LINES_PER_MOVE * options.max_moves as u64,
             reported: 0,

@@ -1,6 +1,5 @@
 //! `Curve`: the pieces of a composite curve, checked once and held as the kernels take them.
 
-use std::any::Any;
 use std::sync::Arc;
 
 use numpy::ndarray::{s, ArrayView2};
@@ -13,6 +12,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use super::arrays::rows;
+use super::native::InAxes;
 use super::views::view;
 use super::with_padded_axes;
 use super::work::run;
@@ -35,54 +35,28 @@ type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
 type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 
-/// Pieces in 3, 6 or 9 axes, those beyond the curve's own at rest.
-#[derive(Clone)]
-pub enum Padded {
-    Three(Arc<CompositeCurve<3>>),
-    Six(Arc<CompositeCurve<6>>),
-    Nine(Arc<CompositeCurve<9>>),
-}
-
 /// Bézier pieces joined end to end.
 #[pyclass(frozen, module = "feedplan._solvers")]
 pub struct Curve {
-    pub pieces: Padded,
     axes: usize,
+    /// `Arc<CompositeCurve>`.
+    pieces: InAxes,
 }
 
 /// Calls a generic kernel for the pieces of a curve, which have M axes.
 macro_rules! with_pieces {
     ($curve:expr, $m:ident, $pieces:ident, $call:expr) => {
-        match &$curve.pieces {
-            Padded::Three($pieces) => {
-                #[allow(dead_code)]
-                const $m: usize = 3;
+        with_padded_axes!(
+            $curve.axes,
+            $m,
+            {
+                let $pieces = $curve.padded::<$m>().expect("pieces in the axes of the curve");
                 $call
-            }
-            Padded::Six($pieces) => {
-                #[allow(dead_code)]
-                const $m: usize = 6;
-                $call
-            }
-            Padded::Nine($pieces) => {
-                #[allow(dead_code)]
-                const $m: usize = 9;
-                $call
-            }
-        }
+            },
+            |count| unreachable!("a curve in {count} axes")
+        )
     };
 }
-
-macro_rules! padded {
-    ($($count:literal $name:ident),+) => {
-        $(impl From<CompositeCurve<$count>> for Padded {
-            fn from(pieces: CompositeCurve<$count>) -> Self {
-                Self::$name(Arc::new(pieces))
-            }
-        })+
-    };
-}
-padded!(3 Three, 6 Six, 9 Nine);
 
 fn input_error(error: SplineError) -> PyErr {
     InputError::new_err(error.to_string())
@@ -120,10 +94,7 @@ fn checked_offsets(given: &[i64], widths: usize, points: usize) -> PyResult<Vec<
 
 impl Curve {
     /// The curve of these pieces. Raises InputError for coordinates, weights or widths out of range.
-    pub fn checked<const M: usize>(pieces: CompositeCurve<M>, axes: usize) -> PyResult<Self>
-    where
-        Padded: From<CompositeCurve<M>>,
-    {
+    pub fn checked<const M: usize>(pieces: CompositeCurve<M>, axes: usize) -> PyResult<Self> {
         if !pieces.control.is_empty() {
             check_points(1, &pieces.control, &pieces.weights).map_err(input_error)?;
         }
@@ -134,7 +105,7 @@ impl Curve {
                 pieces.width[i]
             )));
         }
-        Ok(Self { pieces: pieces.into(), axes })
+        Ok(Self { axes, pieces: InAxes::new(Arc::new(pieces)) })
     }
 
     pub fn axes(&self) -> usize {
@@ -143,10 +114,9 @@ impl Curve {
 
     /// The pieces in M axes, as `with_padded_axes` counts them.
     pub fn padded<const M: usize>(&self) -> PyResult<&Arc<CompositeCurve<M>>> {
-        let found = with_pieces!(self, N, pieces, (pieces as &dyn Any).downcast_ref());
-        found.ok_or_else(|| {
-            PyValueError::new_err(format!("a curve in {} axes where {M} are meant", self.axes))
-        })
+        self.pieces
+            .get()
+            .map_err(|_| PyValueError::new_err(format!("a curve in {} axes where {M} are meant", self.axes)))
     }
 
     pub fn piece_offsets(&self) -> &[usize] {

@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use super::arrays::{padded, rows};
 use super::curve::Curve;
-use super::moves::{places_of_xyz, Moves};
+use super::moves::Moves;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_gcode::{read, CoordinateMode, Options, Place, Point, TipControl, Tool};
@@ -137,12 +137,13 @@ pub fn read_gcode<'py>(
     };
     let lines = source.iter().filter(|&&byte| byte == b'\n').count();
     let read = |watch: Watch| read(source, &options, &|more| watch.each(lines).advance(more));
-    let columns = run(py, progress.as_ref(), read)?.map_err(|error| {
+    let mut columns = run(py, progress.as_ref(), read)?.map_err(|error| {
         let place = error.line.map_or(name.to_string(), |line| format!("{name} line {line}"));
         ProgramError::new_err((format!("{place}: {}", error.message), error.line))
     })?;
 
     let axes: Vec<String> = columns.axes.iter().map(|&letter| char::from(letter).to_string()).collect();
+    let mut moves = Moves::of(&mut columns, &axes);
     let splines = match columns.spline_width.is_empty() {
         true => None,
         false => Some(with_padded_axes!(axes.len(), M, {
@@ -156,22 +157,7 @@ pub fn read_gcode<'py>(
             Curve::checked(pieces, axes.len())
         })?),
     };
-    let moves = Moves {
-        xyz: places_of_xyz(&axes),
-        start: columns.start,
-        kind: columns.kind,
-        target: columns.target,
-        line: columns.line,
-        arc_move: columns.arc_move,
-        arc_centre: columns.arc_centre.into_flattened(),
-        arc_normal: columns.arc_normal,
-        arc_angle: columns.arc_angle,
-        spline_move: columns.spline_move,
-        spline_pieces: columns.spline_pieces,
-        splines: splines.map(|curve| Py::new(py, curve)).transpose()?,
-        change_move: columns.change_move,
-        change_start: columns.change_start,
-    };
+    moves.splines = splines.map(|curve| Py::new(py, curve)).transpose()?;
     let (moves, events) = (moves.checked()?, columns.events);
     let event_columns = (
         PyArray1::from_vec(py, events.moves),

@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use super::curve::Curve;
 use super::native::Of;
 use super::views::view;
+use feedplan_gcode::Columns as Program;
 
 macro_rules! moves {
     (columns: $($column:ident: $type:ty),+; tables: $($table:ident by $width:expr),+) => {
@@ -30,6 +31,18 @@ macro_rules! moves {
             splines: Option<Of<Curve>>,
             $($column: PyReadonlyArray1<'py, $type>,)+
             $($table: PyReadonlyArray2<'py, f64>,)+
+        }
+
+        impl Moves {
+            /// The columns of a program that was read, which are taken out of it, without its splines.
+            pub fn of(program: &mut Program, axes: &[String]) -> Self {
+                Self {
+                    xyz: places_of_xyz(axes),
+                    splines: None,
+                    $($column: std::mem::take(&mut program.$column),)+
+                    $($table: std::mem::take(&mut program.$table),)+
+                }
+            }
         }
 
         #[pymethods]
@@ -64,7 +77,7 @@ moves! {
 }
 
 /// Where X, Y, Z are among these letters.
-pub fn places_of_xyz<A: PartialEq<str>>(axes: &[A]) -> [Option<usize>; 3] {
+fn places_of_xyz<A: PartialEq<str>>(axes: &[A]) -> [Option<usize>; 3] {
     ["X", "Y", "Z"].map(|letter| axes.iter().position(|axis| axis == letter))
 }
 

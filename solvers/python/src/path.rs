@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{indices, padded, padded_rows, row, rows, to_array2};
-use super::curve::{Curve, Padded};
+use super::curve::Curve;
 use super::memory;
 use super::moves::Moves;
 use super::native::Of;
@@ -280,10 +280,7 @@ fn columns<'py, const M: usize>(
     path: &BuiltPath<M>,
     pieces: PieceColumns<M>,
     axes: usize,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)>
-where
-    Padded: From<CompositeCurve<M>>,
-{
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)> {
     let columns = (
         Curve::checked(pieces.curve, axes)?,
         PyArray1::from_vec(py, pieces.feed),

@@ -26,7 +26,8 @@ pub struct Columns {
     pub stop_cause: Vec<u8>,
     pub dwell: Vec<f64>,
     pub arc_move: Vec<i64>,
-    pub arc_centre: Vec<[f64; 3]>,
+    /// X, Y, Z of one arc after the other.
+    pub arc_centre: Vec<f64>,
     pub arc_normal: Vec<u8>,
     pub arc_angle: Vec<f64>,
     pub spline_move: Vec<i64>,
@@ -125,7 +126,7 @@ impl Moves {
             coordinate_mode,
             tool_length,
             arc_move: self.arcs.iter().map(|&(row, _)| row as i64).collect(),
-            arc_centre: self.arcs.iter().map(|(_, arc)| arc.centre).collect(),
+            arc_centre: self.arcs.iter().flat_map(|(_, arc)| arc.centre).collect(),
             arc_normal: self.arcs.iter().map(|(_, arc)| arc.normal as u8).collect(),
             arc_angle: self.arcs.iter().map(|(_, arc)| arc.angle).collect(),
             events: self.events,
