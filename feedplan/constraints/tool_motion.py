@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
+from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
 from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
 
 Floats = NDArray[np.float64]
 
-# The first group that moves is the one whose length is measured. I, J, K are the tool's direction, a unit
-# vector.
-_GROUPS = (("X", "Y", "Z"), ("U", "V", "W"))
+# I, J, K are the tool's direction, a unit vector.
 _DEGREES = {name: math.degrees(1.0) for name in "IJK"}
 
 # Differences of control points up to this many units in the last place of the greatest are rounding, not
@@ -49,7 +48,7 @@ class ToolMotion:
         """The tool's motion along a path."""
         curve, share = path.curve, None
         turns = np.zeros(len(curve), dtype=bool)
-        if not set(path.axes) <= set(_GROUPS[0]):
+        if not set(path.axes) <= set("XYZ"):
             share, turns = _counted(path)
             weights = np.repeat(share, np.diff(curve.offsets), axis=0)
             curve = replace(curve, control_points=curve.control_points * weights)
@@ -92,9 +91,7 @@ def _counted(path: Path) -> tuple[Floats, NDArray[np.bool_]]:
     axes, points, first = path.axes, path.curve.control_points, path.curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
     rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
-    lead = np.array([[name in group for name in axes] for group in _GROUPS])
-    member = np.vstack([lead, ~lead.any(axis=0)])
-    moves = ((extent > rounding)[:, None, :] & member).any(axis=2)
-    counts = np.where(moves.any(axis=1), moves.argmax(axis=1), len(_GROUPS))
+    # The first group that moves is the one whose length is measured, the last one where none does.
+    group = leading_group(axes, extent > rounding) % GROUPS
     scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
-    return member[counts] * scale, counts == len(_GROUPS)
+    return feed_groups(axes)[group] * scale, group == GROUPS - 1
