@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from feedplan import planners
 from feedplan.accuracy import estimate, shortfalls
 from feedplan.arguments import callback, not_negative, number, one_of, refuse, whole
 from feedplan.audit import CHUNK, Audit, audit
@@ -34,21 +35,7 @@ from feedplan.lower_bound import lower_bound
 from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
-from feedplan.planners import (
-    ELSEWHERE,
-    PROGRESS,
-    RESERVE,
-    Elsewhere,
-    MethodName,
-    corners,
-    given_options,
-    grid_error,
-    limits_jerk,
-    methods,
-    options_of,
-    planner,
-    takes,
-)
+from feedplan.planners import Elsewhere, MethodName
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import Reading, checked_reading, read_program
@@ -201,7 +188,7 @@ class Plan:
         """The `account`, computed once; `progress` is told how far it is."""
         callback(progress, "the part done")
         if not self._account:
-            jerk = limits_jerk(self.method)
+            jerk = planners.limits_jerk(self.method)
             self._account.append(account(self.problem, self.profile, self.program, jerk, progress))
         return self._account[0]
 
@@ -256,7 +243,7 @@ class Plan:
                 self.machine,
                 self.program,
                 passed,
-                jerk=limits_jerk(self.method),
+                jerk=planners.limits_jerk(self.method),
                 progress=rest,
             )
             whole = time.perf_counter() - start
@@ -384,14 +371,15 @@ def plan(
     Raises ProgramError, MachineError, InputError, InfeasibleError, SolverError or MissingPackageError, each a
     sentence with place and remedy.
     """
-    given = given_options(method, options, OF_ALL_METHODS)
-    solve: Callable[..., SpeedProfile] = planner(method, **given)
+    given = planners.given_options(method, options, OF_ALL_METHODS)
+    solve: Callable[..., SpeedProfile] = planners.planner(method, **given)
     time_limit = given.get("time_limit")
     # The limit of a method that can tell early what follows its plan is one for all of it.
-    limit = TimeLimit(time_limit) if time_limit is not None and takes(method, RESERVE) else None
+    early = planners.takes(method, planners.RESERVE)
+    limit = TimeLimit(time_limit) if time_limit is not None and early else None
     machine = Machine.of(machine)
     rival = machine.controller if controller is None else Controller.of(controller)
-    choice = corners(method)
+    choice = planners.corners(method)
     refits = one_of(path, "path", PATHS) == "fastest" and choice in (Corners.SMOOTH, Corners.ROUNDED)
     rounds = whole(path_rounds, "path_rounds", f"a whole number from 1 to {MAX_ROUNDS}", most=MAX_ROUNDS)
     if period is not None:
@@ -446,7 +434,7 @@ def plan(
     with _timed(compute, "plan"):
         problem = stated(followed)
         report("plan", 0.0)
-        planned = 1.0 if grid_error(method) else PLANNING
+        planned = 1.0 if planners.grid_error(method) else PLANNING
         others = {} if elsewhere is None else {"elsewhere": elsewhere}
         solve = partial(solve, **others)
         # Equal parts of the progress for each plan.
@@ -461,7 +449,7 @@ def plan(
                 own["reserve"] = lambda first: limit.keep_for(
                     Setpoints(problem, first, machine.period, interpolator, max_setpoints)
                 )
-            if takes(method, PROGRESS):
+            if planners.takes(method, planners.PROGRESS):
                 turn = next(turns)
                 own["progress"] = part(share, turn * each, (turn + 1) * each)
             profile = solve(problem, **own)
@@ -479,7 +467,7 @@ def plan(
 
         with _timed(compute, "refit"):
             words = path_words(program, machine)
-            jerk = words.max_jerk if limits_jerk(method) else np.full_like(words.max_jerk, np.inf)
+            jerk = words.max_jerk if planners.limits_jerk(method) else np.full_like(words.max_jerk, np.inf)
             first_of_all = Followed(followed, problem, profile)
             limits = FitLimits(words.max_acceleration, jerk)
             best, gain = faster(
@@ -490,7 +478,7 @@ def plan(
         least = profile.lower_bound
         if math.isnan(least):
             least = lower_bound(problem, profile, part(share, planned, 1.0))
-        settings = {**options_of(method), **given}
+        settings = {**planners.options_of(method), **given}
         wanted = settings.get("accuracy", 0.0)
         short = shortfalls(
             profile,
@@ -498,7 +486,7 @@ def plan(
             accuracy=wanted,
             to_prove="accuracy" in given,
             time_limit=time_limit,
-            left_to_grids=wanted * grid_error(method),
+            left_to_grids=wanted * planners.grid_error(method),
         )
         least += followed.pauses
     beside: Today | None = None
@@ -551,8 +539,8 @@ def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> Non
     """Raises InputError where runs are not planned elsewhere."""
     if not callable(getattr(elsewhere, "map", None)) or not callable(getattr(elsewhere, "count", None)):
         raise refuse("elsewhere", elsewhere, "a feedplan.jobs.cluster_runs.ClusterRuns")
-    if not takes(method, ELSEWHERE):
-        able = ", ".join(own for own in methods() if takes(own, ELSEWHERE))
+    if not planners.takes(method, planners.ELSEWHERE):
+        able = ", ".join(own for own in planners.methods() if planners.takes(own, planners.ELSEWHERE))
         raise InputError(
             f"the method {method} plans in less time than its runs take on the way to a cluster: leave the "
             f"cluster out, or use {able}"

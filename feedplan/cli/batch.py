@@ -13,25 +13,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from feedplan import outputs, planners
+from feedplan.cli import options as option
 from feedplan.cli import terminal
 from feedplan.cli.cluster_options import cluster_options
 from feedplan.cli.ending import BROKEN, DONE
-from feedplan.cli.options import (
-    ACCURACY,
-    FEED,
-    FEED_OVERRIDE,
-    JSON,
-    MOST_SETPOINTS,
-    NO_SETPOINTS,
-    PATH,
-    PERIOD,
-    QUIET,
-    TIME_LIMIT_HELP,
-    ZERO_OR_MORE,
-    Number,
-    given_only,
-    require_one_or_formats,
-)
 from feedplan.cli.reading_options import reading_options
 from feedplan.errors import InputError
 from feedplan.jobs.address import ClusterAddress
@@ -62,7 +47,7 @@ _SWEPT = "may be given several times"
     "--tolerance",
     "tolerances",
     multiple=True,
-    type=Number(),
+    type=option.Number(),
     metavar="MM",
     help=f"Allowed distance from the programmed path; {_SWEPT}.",
 )
@@ -76,18 +61,18 @@ _SWEPT = "may be given several times"
     help=f"{_SWEPT[:1].upper()}{_SWEPT[1:]}.",
 )
 @reading_options
-@ACCURACY
-@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=TIME_LIMIT_HELP)
-@PATH
-@FEED
-@FEED_OVERRIDE
-@PERIOD
-@MOST_SETPOINTS
+@option.ACCURACY
+@click.option("--time-limit", type=option.ZERO_OR_MORE, metavar="S", help=option.TIME_LIMIT_HELP)
+@option.PATH
+@option.FEED
+@option.FEED_OVERRIDE
+@option.PERIOD
+@option.MOST_SETPOINTS
 @click.option("--output", "-o", required=True, metavar="DIR", help="A folder for each plan is made there.")
 @click.option(
     "--format",
     "formats",
-    type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), NO_SETPOINTS]),
+    type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), option.NO_SETPOINTS]),
     multiple=True,
     help=f"Format of the setpoints, npz by default; {_SWEPT}. none: no setpoints.",
 )
@@ -100,7 +85,7 @@ _SWEPT = "may be given several times"
 @cluster_options
 @click.option(
     "--max-time",
-    type=Number(),
+    type=option.Number(),
     default=3600.0,
     show_default=True,
     metavar="S",
@@ -108,14 +93,14 @@ _SWEPT = "may be given several times"
 )
 @click.option(
     "--max-memory",
-    type=Number(),
+    type=option.Number(),
     default=8000.0,
     show_default=True,
     metavar="MB",
     help="Memory of a process here; the workers of a cluster have limits of their own.",
 )
-@JSON
-@QUIET
+@option.JSON
+@option.QUIET
 def batch(
     programs: tuple[str, ...],
     machines: tuple[str, ...],
@@ -149,7 +134,7 @@ def batch(
 
     if cluster is not None and jobs is not None:
         raise click.UsageError("--jobs is for processes of this computer: leave out --jobs or --cluster")
-    require_one_or_formats(formats)
+    option.require_one_or_formats(formats)
     table, folders = reading.pop("tool_table", None), reading.pop("subprograms", ())
     if table is not None:
         read_tools(FilePath(table))
@@ -158,9 +143,9 @@ def batch(
         [machine_text(name) for name in dict.fromkeys(machines)],
         tuple(dict.fromkeys(tolerances)) or (None,),
         tuple(dict.fromkeys(methods)),
-        given_only(**options),
+        option.given_only(**options),
         checked_reading(reading),
-        () if NO_SETPOINTS in formats else formats or ("npz",),
+        () if option.NO_SETPOINTS in formats else formats or ("npz",),
         None if table is None else FilePath(table).absolute(),
         tuple(FilePath(folder).absolute() for folder in folders),
     )

@@ -8,24 +8,10 @@ from typing import IO, Any
 
 import click
 
+from feedplan.cli import options as option
 from feedplan.cli import terminal
 from feedplan.cli.controller_options import Choice, controller_options
 from feedplan.cli.ending import BROKEN, DONE
-from feedplan.cli.options import (
-    ACCURACY,
-    FEED,
-    JSON,
-    MACHINE,
-    PATH,
-    PERIOD,
-    PROGRAM,
-    QUIET,
-    TIME_LIMIT_HELP,
-    TOLERANCE,
-    Number,
-    given_only,
-    name_of,
-)
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.comparison import TIME_LIMIT
 from feedplan.program.read import Reading
@@ -33,22 +19,27 @@ from feedplan.units import duration_text
 
 
 @click.command()
-@PROGRAM
-@MACHINE
+@option.PROGRAM
+@option.MACHINE
 @controller_options
 @reading_options
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
-@ACCURACY
+@option.ACCURACY
 @click.option(
-    "--time-limit", type=Number(), default=TIME_LIMIT, show_default=True, metavar="S", help=TIME_LIMIT_HELP
+    "--time-limit",
+    type=option.Number(),
+    default=TIME_LIMIT,
+    show_default=True,
+    metavar="S",
+    help=option.TIME_LIMIT_HELP,
 )
-@TOLERANCE
-@PATH
-@FEED
-@PERIOD
+@option.TOLERANCE
+@option.PATH
+@option.FEED
+@option.PERIOD
 @click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
-@JSON
-@QUIET
+@option.JSON
+@option.QUIET
 def compare(
     program: str | IO[bytes],
     machine: str,
@@ -83,11 +74,11 @@ def compare(
             reading=reading,
             controller=controller(known),
             progress=progress,
-            **given_only(**options),
+            **option.given_only(**options),
         )
         today = next((row.plan.today for row in rows if row.plan and row.plan.today), None)
         summary = {
-            "program": name_of(program),
+            "program": option.name_of(program),
             "machine": known.name,
             "today": today and today.of_controller(),
             "methods": [row.to_json() for row in rows],

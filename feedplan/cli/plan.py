@@ -12,31 +12,11 @@ from typing import IO, Any
 import click
 
 from feedplan import outputs
+from feedplan.cli import options as option
 from feedplan.cli import terminal
 from feedplan.cli.cluster_options import cluster_options
 from feedplan.cli.controller_options import Choice, controller_options
 from feedplan.cli.ending import BROKEN, DONE, fail
-from feedplan.cli.options import (
-    ACCURACY,
-    FEED,
-    FEED_OVERRIDE,
-    JSON,
-    MACHINE,
-    METHOD,
-    MOST_SETPOINTS,
-    NO_SETPOINTS,
-    PATH,
-    PATH_ROUNDS,
-    PERIOD,
-    PROGRAM,
-    QUIET,
-    TOLERANCE,
-    WHOLE_LIMIT_HELP,
-    ZERO_OR_MORE,
-    Number,
-    given_only,
-    require_one_or_formats,
-)
 from feedplan.cli.program_options import ProgramWanted, program_options
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.cli.serve import TOKEN_FILE
@@ -46,39 +26,43 @@ from feedplan.setpoints import INTERPOLATORS
 
 
 @click.command()
-@PROGRAM
-@MACHINE
+@option.PROGRAM
+@option.MACHINE
 @controller_options
 @reading_options
-@METHOD
-@ACCURACY
-@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=WHOLE_LIMIT_HELP)
-@TOLERANCE
-@PATH
-@PATH_ROUNDS
-@FEED
-@FEED_OVERRIDE
-@PERIOD
+@option.METHOD
+@option.ACCURACY
+@click.option("--time-limit", type=option.ZERO_OR_MORE, metavar="S", help=option.WHOLE_LIMIT_HELP)
+@option.TOLERANCE
+@option.PATH
+@option.PATH_ROUNDS
+@option.FEED
+@option.FEED_OVERRIDE
+@option.PERIOD
 @click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
-@MOST_SETPOINTS
-@click.option("--start-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
-@click.option("--end-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
+@option.MOST_SETPOINTS
+@click.option(
+    "--start-speed", type=option.ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start."
+)
+@click.option("--end-speed", type=option.ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
 @click.option("--one-step-more", is_flag=True, help="Plan again with each limit raised, and tell the gain.")
 @click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
 @click.option(
     "--format",
     "formats",
-    type=click.Choice((*outputs.formats(), NO_SETPOINTS)),
+    type=click.Choice((*outputs.formats(), option.NO_SETPOINTS)),
     multiple=True,
     help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
 )
-@click.option("--step", type=Number(), metavar="S", help="Longest step of a pvt table, which needs it.")
+@click.option(
+    "--step", type=option.Number(), metavar="S", help="Longest step of a pvt table, which needs it."
+)
 @program_options
 @click.option("--server", metavar="URL", help="Have a service plan, such as http://127.0.0.1:8000.")
 @TOKEN_FILE
 @cluster_options
-@JSON
-@QUIET
+@option.JSON
+@option.QUIET
 def plan(
     program: str | IO[bytes],
     machine: str,
@@ -109,7 +93,7 @@ def plan(
 
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
-    require_one_or_formats(formats)
+    option.require_one_or_formats(formats)
     if wanted.in_folder and not output:
         raise click.UsageError("--program needs a folder to write to: give -o DIR, or --program-out FILE")
     if server and (one_step_more or step is not None or wanted.file is not None or wanted.in_folder):
@@ -136,7 +120,7 @@ def plan(
             reading=reading,
             controller=controller(known),
             progress=progress,
-            **given_only(**options, elsewhere=elsewhere),
+            **option.given_only(**options, elsewhere=elsewhere),
         )
         planned = wanted.make(result)
         steps = _steps(result) if one_step_more else ()
@@ -147,7 +131,7 @@ def plan(
             files = write(
                 result,
                 output,
-                () if NO_SETPOINTS in formats else formats or ("npz",),
+                () if option.NO_SETPOINTS in formats else formats or ("npz",),
                 progress=progress,
                 **here,
             )

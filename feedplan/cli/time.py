@@ -7,23 +7,9 @@ from typing import IO, Any
 
 import click
 
+from feedplan.cli import options as option
 from feedplan.cli import terminal
 from feedplan.cli.controller_options import Choice, controller_options
-from feedplan.cli.options import (
-    ACCURACY,
-    FEED,
-    FEED_OVERRIDE,
-    JSON,
-    MACHINE,
-    METHOD,
-    PATH,
-    PROGRAM,
-    TIME_LIMIT_HELP,
-    TOLERANCE,
-    ZERO_OR_MORE,
-    given_only,
-    name_of,
-)
 from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.errors import InfeasibleError
 from feedplan.program.read import Reading
@@ -35,26 +21,26 @@ _SHOWN = 60
 
 
 @click.command()
-@PROGRAM
-@MACHINE
+@option.PROGRAM
+@option.MACHINE
 @reading_options
-@METHOD
-@ACCURACY
-@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=TIME_LIMIT_HELP)
-@TOLERANCE
-@PATH
-@FEED
-@FEED_OVERRIDE
+@option.METHOD
+@option.ACCURACY
+@click.option("--time-limit", type=option.ZERO_OR_MORE, metavar="S", help=option.TIME_LIMIT_HELP)
+@option.TOLERANCE
+@option.PATH
+@option.FEED
+@option.FEED_OVERRIDE
 @click.option(
     "--tool-change",
-    type=ZERO_OR_MORE,
+    type=option.ZERO_OR_MORE,
     default=0.0,
     show_default=True,
     metavar="S",
     help="Time of a tool change.",
 )
 @controller_options
-@JSON
+@option.JSON
 def time(
     program: str | IO[bytes],
     machine: str,
@@ -81,7 +67,7 @@ def time(
             reading=reading,
             controller=controller(known),
             progress=progress,
-            **given_only(**options),
+            **option.given_only(**options),
         )
         audit = result.audit(progress)
         operations = result.operations(tool_change)
@@ -91,7 +77,7 @@ def time(
         click.echo(f"warning: {warning}", err=True)
     if as_json:
         summary = {
-            "program": name_of(program),
+            "program": option.name_of(program),
             "machine": known.name,
             "method": result.method,
             "time": whole,

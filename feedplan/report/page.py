@@ -12,20 +12,11 @@ from typing import Any
 
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
+from feedplan.report import tables
 from feedplan.report.account import Account
 from feedplan.report.activity import ACTIVE
 from feedplan.report.container import as_text, contained
 from feedplan.report.gained import gained
-from feedplan.report.tables import (
-    audit_table,
-    fit_table,
-    limits_table,
-    numbers,
-    slowest_table,
-    stops_table,
-    totals_table,
-    verdict,
-)
 
 FILE = "report.html"
 # The script and the style of all pages; `make page` builds them from the folder page/.
@@ -57,24 +48,24 @@ def write_report(
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
-        verdict(audit),
-        numbers(summary, account, setpoints),
+        tables.verdict(audit),
+        tables.numbers(summary, account, setpoints),
         _warnings(summary.get("warnings") or ()),
     )
     charts = Template(asset("page_charts.html")).substitute(
         speed=_SPEED[any(check.name == "jerk" and check.judged for check in audit.checks)],
         fast=f"{data['length']['cutting_speed']:.4g} {account.motion.unit}/s",
     )
-    tables = Template(asset("page.html")).substitute(
-        limits=limits_table(account.limits),
+    details = Template(asset("page.html")).substitute(
+        limits=tables.limits_table(account.limits),
         active=f"{100 * ACTIVE:g} %",
-        totals=totals_table(account),
-        stops=stops_table(account.stops),
-        fit=fit_table(summary, account.tolerance),
-        slowest=slowest_table(account.slow, texts, account.motion.units),
-        audit=audit_table(audit),
+        totals=tables.totals_table(account),
+        stops=tables.stops_table(account.stops),
+        fit=tables.fit_table(summary, account.tolerance),
+        slowest=tables.slowest_table(account.slow, texts, account.motion.units),
+        audit=tables.audit_table(audit),
     )
-    about, sections = _about(summary, problem), gained(summary) + pictures(charts) + tables
+    about, sections = _about(summary, problem), gained(summary) + pictures(charts) + details
     file.write_text(framed("report", name, about, "\n".join(judged), sections, data), encoding="utf-8")
 
 
