@@ -4,12 +4,12 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::memory;
 use super::moves::Moves;
 use super::native::Of;
 use super::profile::Profile;
-use super::with_padded_axes;
 use super::work::run;
 
 use feedplan_audit::curve::{Followed, Pieces};

@@ -2,10 +2,10 @@
 
 use pyo3::prelude::*;
 
+use super::axes::with_padded_axes;
 use super::native::Of;
 use super::problem::Problem;
 use super::profile::Profile;
-use super::with_padded_axes;
 use feedplan_planner::Exact as _;
 
 /// A lower bound in s on the time of every profile of the problem; of `profile` only its division counts.

@@ -12,9 +12,9 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use super::arrays::rows;
+use super::axes::with_padded_axes;
 use super::native::InAxes;
 use super::views::view;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
 use feedplan_geometry::spline::error::SplineError;

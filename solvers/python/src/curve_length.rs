@@ -3,10 +3,10 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
+use super::axes::with_padded_axes;
 use super::curve::{check_places, Curve};
 use super::memory;
 use super::native::InAxes;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::spline::length::CurveLength as Kernel;
 

@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use super::arrays::{padded, rows};
+use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::moves::Moves;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_gcode::{read, CoordinateMode, Options, Place, Point, TipControl, Tool};
 use feedplan_geometry::spline::CompositeCurve;

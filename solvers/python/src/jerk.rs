@@ -7,11 +7,11 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows, to_array2};
+use super::axes::with_padded_axes;
 use super::memory;
 use super::native::Of;
 use super::problem::Problem;
 use super::profile::Profile;
-use super::with_padded_axes;
 use feedplan_jerk::jerk_limited::Effort;
 use feedplan_jerk::s_curve::on_path::Cutting;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};

@@ -7,10 +7,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::audit::{findings, phases, require, Findings, LimitArrays, ProblemArrays};
+use super::axes::with_padded_axes;
 use super::kinematics::{operation_rows, ExpressionArrays};
 use super::native::Of;
 use super::profile::Profile;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::joints::formula::Formula;
 use feedplan_audit::joints::path::{JointPath, Words};

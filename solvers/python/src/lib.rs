@@ -2,6 +2,7 @@
 
 mod arrays;
 mod audit;
+mod axes;
 mod bound;
 mod csv;
 mod curve;
@@ -23,34 +24,6 @@ mod views;
 mod work;
 
 use pyo3::prelude::*;
-
-/// Calls a generic kernel for 3, 6 or 9 axes, those beyond `count` at rest. An axis at rest does not change results, and
-/// three instances of a kernel suffice in place of nine. Another number of axes is an error, or as `otherwise` says.
-macro_rules! with_padded_axes {
-    ($count:expr, $m:ident, $call:expr) => {
-        with_padded_axes!($count, $m, $call, |count| {
-            Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 9 are supported")))
-        })
-    };
-    ($count:expr, $m:ident, $call:expr, |$other:ident| $otherwise:expr) => {
-        match $count {
-            1..=3 => {
-                const $m: usize = 3;
-                $call
-            }
-            4..=6 => {
-                const $m: usize = 6;
-                $call
-            }
-            7..=9 => {
-                const $m: usize = 9;
-                $call
-            }
-            $other => $otherwise,
-        }
-    };
-}
-pub(crate) use with_padded_axes;
 
 /// The native module of feedplan.
 #[pymodule]
@@ -80,9 +53,9 @@ mod _solvers {
     #[pymodule_export]
     use path::build_path;
     #[pymodule_export]
-    use plan::{feed_between, look_ahead, plan_bang_bang, PlanError};
+    use plan::{feed_between, look_ahead, plan_bang_bang};
     #[pymodule_export]
-    use problem::Problem;
+    use problem::{PlanError, Problem};
     #[pymodule_export]
     use profile::Profile;
     #[pymodule_export]

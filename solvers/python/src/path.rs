@@ -6,11 +6,11 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{indices, padded, padded_rows, row, rows, to_array2};
+use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::memory;
 use super::moves::Moves;
 use super::native::Of;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::spline::regular::{regular, Regular};
 use feedplan_geometry::spline::{CompositeCurve, Piece};

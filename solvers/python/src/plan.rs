@@ -5,22 +5,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{indices, rows};
+use super::axes::with_padded_axes;
 use super::native::Of;
 use super::problem::Problem;
 use super::profile::Profile;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::problem::Fault;
 use feedplan_planner::trapezoid::{Change, Segments};
 use feedplan_planner::Exact as _;
-
-pyo3::create_exception!(
-    _solvers,
-    PlanError,
-    pyo3::exceptions::PyException,
-    "No profile: (kind, piece or None, reachable speed or None, sentence), kind start, end, input or stuck."
-);
 
 /// The fastest profile.
 #[pyfunction]
@@ -34,17 +26,6 @@ pub fn plan_bang_bang<'py>(
         let profile = problem.solved::<M, _>(py, progress.as_ref(), |problem| problem.fastest())?;
         Ok(profile.into())
     })
-}
-
-pub fn to_exception(fault: &Fault) -> PyErr {
-    let text = fault.to_string();
-    let (kind, piece, reachable) = match *fault {
-        Fault::Start { piece, reachable } => ("start", Some(piece), Some(reachable)),
-        Fault::End { piece, reachable } => ("end", Some(piece), Some(reachable)),
-        Fault::Input { piece, .. } => ("input", piece, None),
-        Fault::Stuck { piece, .. } => ("stuck", Some(piece), None),
-    };
-    PlanError::new_err((kind, piece, reachable, text))
 }
 
 /// The greatest speed on each part of a piece at which the feed holds everywhere on the part (n,).

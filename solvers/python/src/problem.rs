@@ -6,15 +6,21 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows_with};
+use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::native::{InAxes, Of};
-use super::plan::to_exception;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{self, Both, Fault, SpeedSquare, Tip, TIP_AXES};
 use feedplan_setpoints::sampling::PathData;
+
+pyo3::create_exception!(
+    _solvers,
+    PlanError,
+    pyo3::exceptions::PyException,
+    "No profile: (kind, piece or None, reachable speed or None, sentence), kind start, end, input or stuck."
+);
 
 /// `feedplan.curves.speed_polynomial.SpeedPolynomial`.
 #[derive(FromPyObject)]
@@ -149,6 +155,17 @@ impl<const M: usize> Rows<M> {
     }
 }
 
+fn exception_of(fault: &Fault) -> PyErr {
+    let text = fault.to_string();
+    let (kind, piece, reachable) = match *fault {
+        Fault::Start { piece, reachable } => ("start", Some(piece), Some(reachable)),
+        Fault::End { piece, reachable } => ("end", Some(piece), Some(reachable)),
+        Fault::Input { piece, .. } => ("input", piece, None),
+        Fault::Stuck { piece, .. } => ("stuck", Some(piece), None),
+    };
+    PlanError::new_err((kind, piece, reachable, text))
+}
+
 impl Problem {
     pub fn axes(&self) -> usize {
         self.axes
@@ -168,7 +185,7 @@ impl Problem {
     ) -> PyResult<T> {
         let problem = self.rows()?.problem();
         let found = run(py, progress, |watch| kernel(problem::Problem { watch, ..problem }))?;
-        found.map_err(|fault| to_exception(&fault))
+        found.map_err(|fault| exception_of(&fault))
     }
 }
 

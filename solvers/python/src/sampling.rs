@@ -7,10 +7,10 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
 use super::arrays::to_array2;
+use super::axes::with_padded_axes;
 use super::native::{InAxes, Of};
 use super::problem::Problem;
 use super::profile::Profile;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
 use feedplan_setpoints::sampling::{Chunk, Interpolator, Resume, Sampler};

@@ -5,11 +5,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::audit::{findings, phases, programmed, require, Findings, LimitArrays, ProblemArrays};
+use super::axes::with_padded_axes;
 use super::joint_audit::JointWords;
 use super::moves::Moves;
 use super::native::Of;
 use super::profile::Profile;
-use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::joints::path::JointPath;
 use feedplan_audit::kernels::SetpointKernels;
