@@ -1,4 +1,4 @@
-//! Where the grid of a window needs short intervals, as a rough plan on a coarse grid shows.
+//! Where the grid of a plan needs short intervals, as rough plans on a coarse grid show.
 //!
 //! The optimum uses some limit fully at each place. A cubic spline cannot: within an interval the use of that limit varies,
 //! and the interval loses about Σ λ (greatest use − mean use) of time (`IntersampleCheck::losses`). The loss falls with the
@@ -7,16 +7,18 @@
 //! root of its loss.
 
 use super::constraints::Constraints;
-use super::hermite::{self, duration};
+use super::hermite;
 use super::intersample_check::IntersampleCheck;
 use feedplan_geometry::lanes::eight::Lanes;
 
-/// The loss of a part, over the mean time of the intervals and the square of the resolution.
-const LOSS: f64 = 0.055;
+/// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
+const LOSS: f64 = 0.08;
+/// It is lowered by this factor until the grid loses no more than the even grid of the resolution.
+const LOWER: f64 = 0.85;
 /// The most parts of an interval.
 const MOST: f64 = 8.0;
 /// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
-const GAP: f64 = 0.4;
+const GAP: f64 = 0.3;
 /// A limit counts as used where the rough plan uses more than this part of it.
 const USED: f64 = 0.97;
 /// Peaks that exceed the collocation points by more than this factor still move.
@@ -29,8 +31,8 @@ const MARGIN: f64 = 1.1;
 pub struct RoughPlan {
     /// (w_0, w'_0, w_1, …)
     pub x: Vec<f64>,
-    /// The number of parts in which each interval is to be split.
-    pub parts: Vec<u32>,
+    /// The time that each interval loses, in s.
+    pub losses: Vec<f64>,
     /// By what factors the uses of the limits of speed, acceleration and jerk between the collocation points exceed those at
     /// them; 1 where such a peak would move on a finer grid.
     pub peaks: Vec<[f32; 3]>,
@@ -41,21 +43,23 @@ pub fn tolerance(resolution: f64) -> f64 {
     GAP * LOSS / (resolution * resolution)
 }
 
+/// In how many parts each coarse interval is to be split, of losses in s; the intervals take `time` in all. The even grid of the
+/// resolution has `even` parts in each.
+pub fn parts(losses: &[f64], time: f64, resolution: f64, even: u32) -> Vec<u32> {
+    let split = |most: f64| move |loss: &f64| (loss / most).cbrt().ceil().clamp(1.0, MOST);
+    let allowed = losses.iter().sum::<f64>() / f64::from(even * even);
+    let mut most = LOSS / (resolution * resolution) * time / losses.len() as f64;
+    while losses.iter().map(|loss| loss / split(most)(loss).powi(2)).sum::<f64>() > allowed {
+        most *= LOWER;
+    }
+    losses.iter().map(split(most)).map(|parts| parts as u32).collect()
+}
+
 impl RoughPlan {
-    /// From the optimum x on the coarse grid and its multipliers. `resolution` is that of an even grid which would lose about as
-    /// much.
-    pub fn new(
-        rows: &Constraints,
-        check: &IntersampleCheck,
-        x: Vec<f64>,
-        dual: &[Lanes],
-        resolution: f64,
-    ) -> Self {
+    /// From the optimum x on the coarse grid and its multipliers.
+    pub fn new(rows: &Constraints, check: &IntersampleCheck, x: Vec<f64>, dual: &[Lanes]) -> Self {
         let used = check.utilisation(rows, &x);
         let losses = check.losses(rows, &x, dual, &used);
-        let time: f64 = (0..rows.count()).map(|n| duration(&x, n, rows.h(n))).sum();
-        let most = LOSS / (resolution * resolution) * time / rows.count() as f64;
-        let parts = losses.iter().map(|loss| ((loss / most).cbrt().min(MOST).ceil() as u32).max(1)).collect();
         let peak =
             |used: f64, at: f64| if at > USED && used < FIRM * at { (used / at).max(1.0) } else { 1.0 };
         let peaks = used
@@ -63,7 +67,7 @@ impl RoughPlan {
             .zip(rows.utilisation(&x))
             .map(|(used, at)| std::array::from_fn(|i| peak(used[i], at[i]) as f32))
             .collect();
-        Self { x, parts, peaks }
+        Self { x, losses, peaks }
     }
 
     /// The same on intervals that were split into numbers of parts with these lengths. Between collocation points that are
@@ -80,6 +84,7 @@ impl RoughPlan {
 
 #[cfg(test)]
 mod tests {
+    use super::super::hermite::duration;
     use super::super::interior_point::Effort;
     use super::super::prepare::Prepared;
     use super::super::profiles::Winding;
@@ -89,12 +94,12 @@ mod tests {
     use crate::path_problem::{self, End, Limits, Problem};
     use feedplan_geometry::watch::Watch;
 
-    /// The rough plan of a path on an even grid of this resolution.
-    fn planned(turn: f64, even: f64, resolution: f64) -> RoughPlan {
+    /// The losses of a path on an even grid of this resolution, and the time.
+    fn losses(turn: f64, resolution: f64) -> (Vec<f64>, f64) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
         let problem = Problem { geometry: &Winding::new(turn), limits, caps: &[], ends: [End::Rest; 2] };
-        let effort = path_problem::Effort { resolution: even, ..Default::default() };
+        let effort = path_problem::Effort { resolution, ..Default::default() };
         let prepared = Prepared::new(&problem, &effort).expect("a first plan");
         let mut window = Window::new(&limits);
         prepared.fill(0..prepared.grid.pieces.len(), &mut window);
@@ -103,28 +108,53 @@ mod tests {
         let effort =
             Effort { tolerance: 1e-6, max_iterations: 400, deadline: None, barrier, warm: false, watch };
         let mut space = InteriorPoint::default();
-        window.rough(prepared.ends, &prepared.x, resolution, &effort, &mut space).expect("a plan")
+        let RoughPlan { x, losses, .. } =
+            window.rough(prepared.ends, &prepared.x, &effort, &mut space).expect("a plan");
+        let time = (0..losses.len()).map(|n| duration(&x, n, window.rows.h(n))).sum();
+        (losses, time)
     }
 
     #[test]
     fn short_intervals_are_few_and_more_of_them_for_a_finer_resolution() {
         for turn in [0.2, 1.0, 2.0] {
+            let (losses, time) = losses(turn, 16.0 / 3.0);
             let counts = [16.0, 48.0, 144.0].map(|resolution| {
-                let parts = planned(turn, 16.0 / 3.0, resolution).parts;
+                let parts = parts(&losses, time, resolution, 1);
                 parts.iter().sum::<u32>() as f64 / parts.len() as f64
             });
-            assert!((1.0..2.5).contains(&counts[0]), "{counts:?}");
             // The number goes with the power 2/3 of the resolution, where not with 0: 3^(2/3) = 2.1.
             assert!(counts[1] > 1.4 * counts[0] && counts[2] > 1.4 * counts[1], "{counts:?}");
         }
     }
 
     #[test]
+    fn a_grid_loses_no_more_than_the_even_one() {
+        let even = |losses: &[f64]| losses.iter().sum::<f64>() / 9.0;
+        let lost = |losses: &[f64], parts: &[u32]| {
+            losses.iter().zip(parts).map(|(loss, &parts)| loss / f64::from(parts * parts)).sum::<f64>()
+        };
+        // By hand: thirds of all lose 1/9; a loss in one of eight places only is split there.
+        let (all, one) = ([1e-3; 8], std::array::from_fn::<_, 8, _>(|n| if n == 3 { 8e-3 } else { 0.0 }));
+        for losses in [all, one] {
+            let parts = parts(&losses, 1e6, 16.0, 3);
+            assert!(lost(&losses, &parts) <= even(&losses) * (1.0 + 1e-12), "{parts:?}");
+            let expected = losses.map(|loss| if loss > 0.0 { 3 } else { 1 });
+            assert_eq!(parts, expected);
+        }
+        for turn in [0.2, 1.0, 2.0] {
+            let (losses, time) = losses(turn, 16.0 / 3.0);
+            let parts = parts(&losses, time, 16.0, 3);
+            assert!(lost(&losses, &parts) <= even(&losses));
+            assert!(parts.iter().sum::<u32>() < 3 * parts.len() as u32);
+        }
+    }
+
+    #[test]
     fn a_refined_plan_is_the_same_spline_with_lower_peaks() {
-        let parts = vec![1, 3, 2];
+        let parts = [1, 3, 2];
         let mut plan = RoughPlan {
             x: vec![1.0, 0.0, 2.0, 0.5, 3.0, 0.0, 3.0, 0.0],
-            parts: parts.clone(),
+            losses: vec![],
             peaks: vec![[1.0, 1.25, 1.5], [1.0, 1.0, 1.9], [1.0; 3]],
         };
         plan.refine(&parts, &[0.6, 0.1, 0.1, 0.1, 0.2, 0.2]);

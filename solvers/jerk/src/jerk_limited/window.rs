@@ -7,7 +7,7 @@ use super::exact::Exact;
 use super::hermite::{blend, duration};
 use super::interior_point::{Effort, Outcome, Report};
 use super::intersample_check::IntersampleCheck;
-use super::refinement::{self, RoughPlan};
+use super::refinement::RoughPlan;
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use crate::path_problem::Limits;
@@ -113,21 +113,18 @@ impl Window {
         verdict
     }
 
-    /// The optimum at the collocation points, roughly, from a valid plan; None where it is not found. `resolution` is that of an
-    /// even grid which would lose about as much as the one that follows.
+    /// The optimum at the collocation points, roughly, from a valid plan; None where it is not found.
     pub fn rough(
         &self,
         ends: [WindowEnd; 2],
         x: &[f64],
-        resolution: f64,
         effort: &Effort,
         space: &mut InteriorPoint<Exact>,
     ) -> Option<RoughPlan> {
-        let effort = Effort { tolerance: refinement::tolerance(resolution), ..*effort };
-        let (starts, mut spent) = coarse::starts(&self.rows, ends, inside(x), &effort, space);
+        let (starts, mut spent) = coarse::starts(&self.rows, ends, inside(x), effort, space);
         let (y, report) = self.attempt(ends, starts, space, &mut spent)?;
         let found = report.outcome != Outcome::Stopped;
-        found.then(|| RoughPlan::new(&self.rows, &self.check, y, &space.state.dual, resolution))
+        found.then(|| RoughPlan::new(&self.rows, &self.check, y, &space.state.dual))
     }
 
     /// Solves from the first start that leads to a plan; `spent` counts the iterations of all.

@@ -8,6 +8,7 @@
 //! All windows are planned twice: roughly on a coarse grid, which shows where the grid needs short intervals, and on that
 //! grid.
 
+use std::mem::take;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
@@ -21,7 +22,7 @@ use super::interior_point;
 use super::lower_bound::{self, Part, Planned};
 use super::prepare::{Prepared, PREPARING};
 use super::profile::{Plan, Profile};
-use super::refinement::RoughPlan;
+use super::refinement::{self, RoughPlan};
 use super::relaxed::Relaxed;
 use super::rest_ramp;
 use super::window::{ramps, Window, WindowReport};
@@ -53,6 +54,20 @@ const BLENDED: f64 = 1.0 + 5e-7;
 
 /// The plan of least time.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
+    let fine = Effort { watch: effort.watch.part(1.0 - ROUGH), ..*effort };
+    let (prepared, sections) = refined(problem, effort, &fine)?;
+    if prepared.x.is_empty() {
+        return Err(Fault::NoPlan { s: prepared.grid.stations[0] });
+    }
+    Run::new(&prepared, &fine).plan(&sections)
+}
+
+/// The problem on the grid that rough plans ask for, for the effort `fine`; with the sections of the path.
+fn refined<'a, G: Geometry<M>, const M: usize>(
+    problem: &'a Problem<'a, G, M>,
+    effort: &Effort<'a>,
+    fine: &Effort<'a>,
+) -> Result<(Prepared<'a, G, M>, Vec<Section>), Fault> {
     let coarse = Effort {
         resolution: effort.resolution / f64::from(COARSE),
         // A window has more intervals on the grid that follows.
@@ -60,40 +75,21 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
         watch: effort.watch.part(ROUGH),
         ..*effort
     };
-    let effort = &Effort { watch: effort.watch.part(1.0 - ROUGH), ..*effort };
     let rough = Prepared::new(problem, &coarse)?;
-    let shortest = SHORTEST * problem.geometry.knots().last().copied().unwrap_or(0.0);
-    let (mut sections, mut parts) = (vec![], vec![COARSE; rough.grid.pieces.len()]);
-    if !rough.x.is_empty() {
-        let run = Run::new(&rough, &coarse);
-        sections = run.sections();
-        run.roughly(&mut sections, effort.resolution);
-        for Section { range, core, rough } in &sections {
-            match rough {
-                Some(rough) => {
-                    let own = core.start - range.start..core.end - range.start;
-                    parts[core.clone()].copy_from_slice(&rough.parts[own]);
-                }
-                None if effort.expired() => parts[core.clone()].fill(1),
-                None => {}
-            }
+    let run = Run::new(&rough, &coarse);
+    let mut sections = if rough.x.is_empty() { vec![] } else { run.sections() };
+    run.roughly(&mut sections, effort.resolution);
+    let parts = run.parts(&mut sections, effort.resolution);
+    let prepared = rough.refined(&parts, fine);
+    if !prepared.x.is_empty() {
+        let run = Run::new(&prepared, fine);
+        if sections.is_empty() {
+            sections = run.sections();
+        } else {
+            run.refine(&mut sections, &parts);
         }
     }
-    for (parts, h) in parts.iter_mut().zip(rough.grid.lengths()) {
-        *parts = (*parts).min((h / shortest) as u32).max(1);
-    }
-    let prepared = rough.refined(&parts, effort);
-    drop(rough);
-    if prepared.x.is_empty() {
-        return Err(Fault::NoPlan { s: prepared.grid.stations[0] });
-    }
-    let run = Run::new(&prepared, effort);
-    if sections.is_empty() {
-        sections = run.sections();
-    } else {
-        run.refine(&mut sections, &parts);
-    }
-    run.plan(&sections)
+    Ok((prepared, sections))
 }
 
 /// Some neighbouring intervals that are solved as one window.
@@ -233,6 +229,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
     /// Adds rough plans where they are found.
     fn roughly(&self, sections: &mut [Section], resolution: f64) {
         let watch = self.watch(sections);
+        let effort = interior_point::Effort { tolerance: refinement::tolerance(resolution), ..self.solver() };
         sections.par_iter_mut().for_each(|Section { range, rough, .. }| {
             if self.effort.expired() {
                 return;
@@ -242,10 +239,38 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
             *rough = self.in_space(|Space { window, exact, .. }| {
                 self.prepared.fill(range.clone(), window);
                 window.rows.drop_at_ends(&ends);
-                window.rough(ends, x, resolution, &self.solver(), exact)
+                window.rough(ends, x, &effort, exact)
             });
             watch.advance(range.len());
         });
+    }
+
+    /// In how many parts each interval of the coarse grid is to be split.
+    fn parts(&self, sections: &mut [Section], resolution: f64) -> Vec<u32> {
+        let (mut losses, mut time) = (vec![0.0; self.stations.len() - 1], 0.0);
+        for Section { range, core, rough } in sections.iter_mut() {
+            if let Some(rough) = rough {
+                losses[core.clone()].copy_from_slice(
+                    &take(&mut rough.losses)[core.start - range.start..core.end - range.start],
+                );
+                time +=
+                    core.clone().map(|n| duration(&rough.x, n - range.start, self.length(n))).sum::<f64>();
+            }
+        }
+        let by_loss = refinement::parts(&losses, time, resolution, COARSE);
+        let mut parts = vec![COARSE; losses.len()];
+        for Section { core, rough, .. } in sections.iter() {
+            if rough.is_some() {
+                parts[core.clone()].copy_from_slice(&by_loss[core.clone()]);
+            } else if self.effort.expired() {
+                parts[core.clone()].fill(1);
+            }
+        }
+        let shortest = SHORTEST * self.stations.last().copied().unwrap_or(0.0);
+        for (n, parts) in parts.iter_mut().enumerate() {
+            *parts = (*parts).min((self.length(n) / shortest) as u32).max(1);
+        }
+        parts
     }
 
     /// Takes sections of a coarse grid whose intervals were split into these numbers of parts.
