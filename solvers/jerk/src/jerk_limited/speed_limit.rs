@@ -19,6 +19,8 @@ use crate::path_problem::MOST_AXES;
 const ROUNDS: usize = 4;
 /// Relative rounding of the sums along a window.
 const ROUNDING: f64 = 1e-12;
+/// κ w^(3/2) is lowered to less than this part of itself, or not at all: cube roots take long.
+const CLOSE: f64 = 1.0 - 1e-6;
 /// q'' jumps where it changes by more than this part of itself at a station; κ w^(3/2) jumps there as well.
 const JUMP: f64 = 1e-6;
 
@@ -67,6 +69,11 @@ pub fn lower(rows: &mut Constraints) {
 }
 
 impl Point {
+    /// q_k''.
+    fn second(&self, k: usize) -> f64 {
+        self.normal[k] * self.bend
+    }
+
     /// Lowers w to what can be reached from another point.
     fn lower(&mut self, from: &Self, energy: &[f64], step: &Step) {
         // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
@@ -82,7 +89,7 @@ impl Point {
         let cubed = |w: f64| w * w.sqrt();
         let straight = step.straight * cubed(from.w.max(self.w));
         let bent = (from.bend * cubed(from.w)).min(straight) + step.bending;
-        if bent < self.bend * cubed(self.w) {
+        if bent < CLOSE * self.bend * cubed(self.w) {
             self.w = (bent / self.bend).cbrt().powi(2);
         }
     }
@@ -112,11 +119,12 @@ fn points(rows: &Constraints) -> (Vec<Point>, Vec<Step>) {
             let mut next = Point { first, normal, bend, w, convex: 0.0, s: 0.0, integral: 0.0 };
             if let Some(last) = points.last() {
                 let h = if p == 0 { 0.0 } else { rows.h(n) / 3.0 };
-                let change = 3.0 * 0.5 * (along(&last.first) + along(&next.first)) * h;
+                let mean = mean_direction(last, &next, h);
+                let change = 3.0 * along(&mean) * h;
                 next.s = last.s + h;
                 next.integral = last.integral + h * (slope + 0.5 * change);
                 slope += change;
-                steps.push(step(last, &next, h, &along, length(&jerk), &most));
+                steps.push(step(last, &next, h, &mean, &along, length(&jerk), &most));
             }
             points.push(next);
         }
@@ -128,15 +136,16 @@ fn step(
     last: &Point,
     next: &Point,
     h: f64,
+    mean: &Axes,
     along: &impl Fn(&Axes) -> f64,
     all: f64,
     most: &impl Fn(usize, bool) -> f64,
 ) -> Step {
     let energy = [false, true].map(|back| {
         std::array::from_fn(|k| {
-            let (a, b) = (last.first[k], next.first[k]);
             // Acceleration against the axis is negative; on the way back the signs change.
-            h * (a.abs() + b.abs()) * most(k, (a + b < 0.0) != back)
+            let against = last.first[k] + next.first[k] < 0.0;
+            2.0 * h * mean[k] * most(k, against != back)
         })
     });
     let bends = [last, next].map(|point| point.normal.map(|part| part * point.bend));
@@ -154,6 +163,21 @@ fn step(
     let part = (back / length(&apart).powi(2).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     let straight = length(&std::array::from_fn(|k| bends[0][k] + part * apart[k]));
     Step { energy, bending: h * if turn < 1.0 { steep.min(all) } else { all }, straight }
+}
+
+/// The greatest mean of |q_k'| between two points, h apart: by the trapezoidal rule on an arc, or by the cubic with the same q''
+/// at both points.
+fn mean_direction(last: &Point, next: &Point, h: f64) -> Axes {
+    // The mean of a component on an arc of the angle 2 φ exceeds that of its ends by tan φ/φ; this is more for chords up to 1.
+    let chord = length(&difference(&last.first, &next.first));
+    let arc = 1.0 + chord * chord / 8.0;
+    std::array::from_fn(|k| {
+        let (a, b) = (last.first[k], next.first[k]);
+        let ends = 0.5 * (a.abs() + b.abs());
+        // |q_k'| is convex where it becomes 0.
+        let bulge = if a * b > 0.0 { (last.second(k) - next.second(k)) * a.signum() * h / 12.0 } else { 0.0 };
+        (arc * ends).max(ends + bulge)
+    })
 }
 
 /// Lowers w to the lower convex hull of v³ plus the integral over the arc length.
