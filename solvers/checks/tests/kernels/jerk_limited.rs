@@ -129,7 +129,7 @@ fn lines_take_as_long_as_seven_sections() {
         let length = 10f64.powi(exponent);
         let line = Line::new(length);
         let problem = problem(&line, FAST);
-        for (resolution, most) in [(16.0, 6e-5), (64.0, 6e-6)] {
+        for (resolution, most) in [(16.0, 1e-5), (64.0, 1e-6)] {
             let plan =
                 plan(&problem, &Effort { resolution, ..proving() }).expect("the line can be travelled");
             let part = plan.time / seven_sections(length, FAST) - 1.0;
@@ -208,7 +208,7 @@ fn the_lemniscate_is_optimal_and_holds_all_limits() {
 fn the_trefoil_is_optimal_and_holds_all_limits() {
     let parameters: Vec<f64> = (0..=60).map(|i| 0.3 + PI * i as f64 / 30.0).collect();
     let gap = assert_curve(&ByLength::new(Trefoil(20.0), &parameters, 20), 2.0352);
-    assert!(gap < 3e-5, "{gap:e}");
+    assert!(gap < 2e-5, "{gap:e}");
 }
 
 #[test]
@@ -240,7 +240,8 @@ fn random_case(seed: u64) -> (Bends, [f64; 3]) {
 #[test]
 fn random_paths_hold_all_limits() {
     let mut stopped = 0;
-    for seed in seeds(24) {
+    // In the last three the direction turns unevenly between collocation points.
+    for seed in seeds(24).chain([663, 945, 1440]) {
         let (path, limits) = random_case(seed);
         let problem = problem(&path, limits);
         let plan = plan(&problem, &proving()).unwrap_or_else(|fault| panic!("seed {seed}: {fault:?}"));
@@ -341,9 +342,8 @@ fn windows_agree_where_the_optimum_lies_on_limits_all_along() {
     let windows = plan(&problem, &Effort { window: 1000, ..Effort::default() }).expect("a plan");
     assert!(whole.converged && windows.converged);
     assert!(whole.iterations < 60.0, "{} iterations", whole.iterations);
-    // The grid of each follows its own rough plan.
     let loss = windows.time / whole.time - 1.0;
-    assert!(loss < 5e-6, "{loss:e}");
+    assert!(loss < 1e-6, "{loss:e}");
     assert_held(&problem, &windows.profile);
 }
 
@@ -443,7 +443,7 @@ fn the_same_path_backwards_takes_as_long() {
     let back = Bends::turned(length, back, 0.3 + total + PI);
     let forth = planned(&problem(&path, FAST)).time;
     let time = planned(&problem(&back, FAST)).time;
-    assert!((time / forth - 1.0).abs() < 2e-5, "{time} s and {forth} s");
+    assert!((time / forth - 1.0).abs() < 3e-5, "{time} s and {forth} s");
 }
 
 #[test]

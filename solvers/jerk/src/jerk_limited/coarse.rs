@@ -123,7 +123,7 @@ mod tests {
             rows.push(h, 1.0 + n as f64);
             for p in 0..COUNT {
                 let count = (4 * n + p) as f64;
-                rows.set(p, count, 1.0, |_| [count, 100.0 + count, 200.0 + count]);
+                rows.set(p, [count; 2], 1.0, |_| [count, 100.0 + count, 200.0 + count]);
             }
         }
         rows

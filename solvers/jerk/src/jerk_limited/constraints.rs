@@ -44,8 +44,9 @@ pub struct Block {
 /// The same at one collocation point of each.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
-    /// 1/w_max.
+    /// 1/w_max, and that by the speed cap of the path alone.
     pub speed: Lanes,
+    pub cap: Lanes,
     /// Factor by which the acceleration limit is tighter: 1 or more, 0 where it does not apply.
     pub acceleration: Lanes,
 }
@@ -111,7 +112,7 @@ impl Block {
     const NONE: Self = Self {
         h: Lanes::ONE,
         jerk: Lanes::ONE,
-        points: [Point { speed: Lanes::ZERO, acceleration: Lanes::ZERO }; COUNT],
+        points: [Point { speed: Lanes::ZERO, cap: Lanes::ZERO, acceleration: Lanes::ZERO }; COUNT],
         live: Lanes::ZERO,
     };
 
@@ -225,13 +226,21 @@ impl Constraints {
         self.count += 1;
     }
 
-    /// Sets 1/w_max, the factor of the acceleration limit, and q', q'', q''' by the axis at collocation point p of the last
-    /// interval.
-    pub fn set(&mut self, p: usize, speed: f64, acceleration: f64, q: impl Fn(usize) -> [f64; 3]) {
+    /// Sets 1/w_max, that by the speed cap of the path, the factor of the acceleration limit, and q', q'', q''' by the axis at
+    /// collocation point p of the last interval.
+    pub fn set(
+        &mut self,
+        p: usize,
+        [speed, cap]: [f64; 2],
+        acceleration: f64,
+        q: impl Fn(usize) -> [f64; 3],
+    ) {
         let (b, lane, axes) = ((self.count - 1) / LANES, (self.count - 1) % LANES, self.axes());
-        let point = &mut self.blocks[b].points[p];
-        point.speed.values_mut()[lane] = speed;
-        point.acceleration.values_mut()[lane] = acceleration;
+        let own = &mut self.blocks[b].points[p];
+        let values = [(&mut own.speed, speed), (&mut own.cap, cap), (&mut own.acceleration, acceleration)];
+        for (lanes, value) in values {
+            lanes.values_mut()[lane] = value;
+        }
         for (axis, of_axis) in self.q[(b * COUNT + p) * axes..][..axes].iter_mut().enumerate() {
             for (lanes, value) in of_axis.iter_mut().zip(q(axis)) {
                 lanes.values_mut()[lane] = value;
@@ -243,8 +252,10 @@ impl Constraints {
     pub fn push_from(&mut self, others: &Self, h: f64, jerk: f64, from: [(usize, usize); COUNT]) {
         self.push(h, jerk);
         for (p, (n, at)) in from.into_iter().enumerate() {
-            let acceleration = others.blocks[n / LANES].points[at].acceleration.values()[n % LANES];
-            self.set(p, others.speed(n, at), acceleration, |axis| others.derivatives(n, at, axis));
+            let Point { speed, cap, acceleration } = &others.blocks[n / LANES].points[at];
+            let [speed, cap, acceleration] =
+                [speed, cap, acceleration].map(|lanes| lanes.values()[n % LANES]);
+            self.set(p, [speed, cap], acceleration, |axis| others.derivatives(n, at, axis));
         }
     }
 
@@ -274,7 +285,8 @@ impl Constraints {
                     _ => f64::INFINITY,
                 };
                 let speed = limits.per_speed_sq(&point).max(1.0 / (cap * cap));
-                self.set(p, speed, 1.0, |k| [point.first[k], point.second[k], point.third[k]]);
+                let of_path = 1.0 / (point.speed_cap * point.speed_cap);
+                self.set(p, [speed, of_path], 1.0, |k| [point.first[k], point.second[k], point.third[k]]);
             }
         }
     }

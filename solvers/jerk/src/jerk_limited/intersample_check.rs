@@ -10,8 +10,9 @@ use super::sides::Sides;
 use crate::path_problem::{Geometry, Limits};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
-/// Samples of an interval, its ends included.
-const SAMPLES: usize = 16;
+/// Steps between the samples of an interval from one collocation point to the next, and samples, the ends included.
+const STEPS: usize = 5;
+const SAMPLES: usize = STEPS * LAST + 1;
 /// Peaks are only sought where a sample uses more than this part of a limit.
 const NEAR: f64 = 0.97;
 
@@ -75,7 +76,7 @@ impl IntersampleCheck {
         Self { axes: (0..M).map(axis).collect(), blocks: vec![], q: vec![] }
     }
 
-    /// Samples between `stations`; speed caps at stations and factors of jerk are those of `rows`.
+    /// Samples between `stations`; those at collocation points, speed caps at stations and factors of jerk are those of `rows`.
     pub fn sample<const M: usize>(
         &mut self,
         geometry: &impl Geometry<M>,
@@ -89,15 +90,22 @@ impl IntersampleCheck {
         for (b, own) in rows.blocks.iter().enumerate() {
             let first = b * LANES;
             let mut caps = [Lanes::ZERO; SAMPLES];
+            let samples = &mut self.q[b * M..(b + 1) * M];
+            for (p, point) in own.points.iter().enumerate() {
+                caps[STEPS * p] = point.cap;
+                for (samples, q) in samples.iter_mut().zip(rows.q(b, p)) {
+                    samples[STEPS * p] = *q;
+                }
+            }
             for (lane, &piece) in pieces[first..].iter().take(LANES).enumerate() {
                 let (start, h) = (stations[first + lane], own.h.values()[lane]);
                 let s = |i: usize| start + h * (i as f64 / (SAMPLES - 1) as f64);
-                for first in (0..SAMPLES).step_by(4) {
+                for first in (1..SAMPLES).step_by(STEPS) {
                     let points = geometry.at_four(piece as usize, std::array::from_fn(|i| s(first + i)));
-                    for (q, of_axis) in self.q[b * M..(b + 1) * M].iter_mut().zip(&points.q) {
+                    for (samples, of_axis) in samples.iter_mut().zip(&points.q) {
                         for (order, values) in of_axis.iter().enumerate() {
                             for (i, value) in values.values().iter().enumerate() {
-                                q[first + i][order].values_mut()[lane] = *value;
+                                samples[first + i][order].values_mut()[lane] = *value;
                             }
                         }
                     }

@@ -12,13 +12,13 @@ use super::intersample_check::IntersampleCheck;
 use feedplan_geometry::lanes::eight::Lanes;
 
 /// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
-const LOSS: f64 = 0.08;
+const LOSS: f64 = 0.05;
 /// It is lowered by this factor until the grid loses no more than the even grid of the resolution.
 const LOWER: f64 = 0.85;
 /// The most parts of an interval.
 const MOST: f64 = 8.0;
 /// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
-const GAP: f64 = 0.3;
+const GAP: f64 = 0.45;
 /// A limit counts as used where the rough plan uses more than this part of it.
 const USED: f64 = 0.97;
 /// Peaks that exceed the collocation points by more than this factor still move.
