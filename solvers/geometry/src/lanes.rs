@@ -148,6 +148,12 @@ macro_rules! lanes {
                 Self(1.0 / self.0)
             }
 
+            /// Its numbers from one on, then the first ones of another register.
+            #[inline(always)]
+            pub fn slide<const FROM: usize>(self, next: Self) -> Self {
+                Self(self.0.slide::<FROM>(next.0))
+            }
+
             #[inline(always)]
             pub fn values(self) -> [f64; LANES] {
                 self.0.into()

@@ -262,18 +262,16 @@ impl<const M: usize> Section<M> {
         let options = SmoothOptions { long: *long, bounds: std::array::from_fn(bounds) };
         let smooth = smooth_fit(&line, &cut, &options, watch);
         let rest = chords.points[run.start];
+        let mut control = Vec::new();
         for (piece, along) in smooth.curve.pieces().zip(&smooth.covered) {
-            let control: Vec<[f64; M]> = piece
-                .control
-                .iter()
-                .map(|point| {
-                    let mut wide = rest;
-                    for (k, &axis) in moving.iter().enumerate() {
-                        wide[axis] = point[k];
-                    }
-                    wide
-                })
-                .collect();
+            control.clear();
+            control.extend(piece.control.iter().map(|point| {
+                let mut wide = rest;
+                for (k, &axis) in moving.iter().enumerate() {
+                    wide[axis] = point[k];
+                }
+                wide
+            }));
             if along.stop {
                 self.runs.push(self.chunk.pieces.len());
             }

@@ -1,106 +1,163 @@
 //! Cholesky factor L D Lᵀ of the matrix of the fit: symmetric, positive definite, in blocks of D unknowns, of which each
 //! meets its five neighbours on either side.
+//!
+//! Four rows, a tile, are factored together, so that each row below them is read and written once for the four. All rows of
+//! a tile begin at its first column: vectors of different rows hold the same columns, and what lies before the diagonal does
+//! not count.
 
-use super::spline::{DEGREE, ORDER};
+use fearless_simd::Simd;
+use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
+
+use super::spline::ORDER;
 
 /// Added to the diagonal, in parts of it: what rounding may take from it.
 const REGULAR: f64 = 1e-13;
 /// An unknown whose pivot is below this part of its diagonal stays where it is.
 const LEAST_PIVOT: f64 = 1e-15;
 
-/// Row i holds the entries (i, i) to (i, i + WIDTH − 1).
-pub struct Band<const D: usize> {
-    /// Entries of the blocks (i, i + b) by b and place in the block, those of all i side by side: sums over intervals side
-    /// by side go to places side by side.
-    blocks: [[[Vec<f64>; D]; D]; ORDER],
-    entry: Vec<f64>,
-    /// 1/D.
-    inverse: Vec<f64>,
-}
+/// A row from the first column of its tile on: for D of 2 or more these are the columns of all rows of the tile.
+type Row<const D: usize> = [[Lanes; D]; 2];
 
-impl<const D: usize> Default for Band<D> {
-    fn default() -> Self {
-        let blocks = std::array::from_fn(|_| std::array::from_fn(|_| std::array::from_fn(|_| vec![])));
-        Self { blocks, entry: vec![], inverse: vec![] }
-    }
+#[derive(Default)]
+pub struct Band<const D: usize> {
+    /// Entries (k, m), k ≤ m, of the symmetric blocks (i, i + b) by b, k and m, those of four i side by side: sums over
+    /// intervals side by side go to places side by side.
+    pub blocks: Vec<[[[Lanes; D]; D]; ORDER]>,
+    /// The rows of the matrix, then those of Lᵀ without its diagonal; after the last there are zeros.
+    rows: Vec<Row<D>>,
+    /// 1/D, by tile.
+    inverse: Vec<Lanes>,
 }
 
 impl<const D: usize> Band<D> {
     const WIDTH: usize = ORDER * D;
+    /// The vectors of a row.
+    const VECTORS: usize = 2 * D;
 
-    /// A matrix of zeros for so many blocks.
-    pub fn clear(&mut self, count: usize) {
-        for column in self.blocks.as_flattened_mut().as_flattened_mut() {
-            column.clear();
-            column.resize(count, 0.0);
-        }
+    /// A matrix of zeros for four blocks a vector.
+    pub fn clear(&mut self, vectors: usize) {
+        self.blocks.clear();
+        self.blocks.resize(vectors, [[[Lanes::ZERO; D]; D]; ORDER]);
     }
 
-    /// The entries (k, m) of blocks (i, i + b), by i; of b = 0 those with k ≤ m count.
+    /// Writes the rows, `fixed` unknowns taken out: their rows and columns become those of the unit matrix. In place of
+    /// 1/D stands the pivot below which an unknown stays.
     #[inline(always)]
-    pub fn block(&mut self, b: usize, k: usize, m: usize) -> &mut [f64] {
-        &mut self.blocks[b][k][m]
-    }
-
-    /// Factors the matrix, `fixed` unknowns taken out: their rows and columns become those of the unit matrix.
-    #[inline(always)]
-    pub fn factor(&mut self, fixed: &[bool]) {
-        let width = Self::WIDTH;
+    fn write(&mut self, fixed: &[bool]) {
         let count = fixed.len();
-        self.entry.clear();
-        self.entry.resize(count * D * width, 0.0);
-        self.inverse.resize(count * D, 0.0);
-        for (i, rows) in self.entry.chunks_exact_mut(D * width).enumerate() {
+        let tiles = (count * D).div_ceil(LANES);
+        self.inverse.clear();
+        self.inverse.resize(tiles, Lanes::ZERO);
+        self.rows.clear();
+        self.rows.resize((tiles + Self::VECTORS) * LANES, [[Lanes::ZERO; D]; 2]);
+        for i in 0..count {
+            let blocks = &self.blocks[i / LANES];
+            let reach = ORDER.min(count - i);
+            let any = fixed[i..i + reach].contains(&true);
             for k in 0..D {
-                let row = &mut rows[k * width..(k + 1) * width];
+                let (tile, lane) = ((i * D + k) / LANES, (i * D + k) % LANES);
+                let row = self.rows[i * D + k].as_flattened_mut();
                 if fixed[i] {
-                    row[0] = 1.0;
-                    continue;
-                }
-                for b in (0..=DEGREE.min(count - 1 - i)).filter(|b| !fixed[i + b]) {
-                    for m in if b == 0 { k } else { 0 }..D {
-                        row[b * D + m - k] = self.blocks[b][k][m][i];
+                    row[0].values_mut()[lane] = 1.0;
+                } else {
+                    for b in 0..reach {
+                        if any && fixed[i + b] {
+                            continue;
+                        }
+                        for m in if b == 0 { k } else { 0 }..D {
+                            let column = lane + b * D + m - k;
+                            let entry = blocks[b][k.min(m)][k.max(m)].values()[i % LANES];
+                            row[column / LANES].values_mut()[column % LANES] = entry;
+                        }
                     }
                 }
-            }
-        }
-        // What the diagonal was before the rows above took from it is needed once the row is reached.
-        for (inverse, row) in self.inverse.iter_mut().zip(self.entry.chunks_exact_mut(width)) {
-            *inverse = LEAST_PIVOT * row[0];
-            row[0] += REGULAR * row[0];
-        }
-        for i in 0..count * D {
-            let (done, rest) = self.entry[i * width..].split_at_mut(width);
-            let pivot = done[0];
-            let inverse = if pivot > self.inverse[i] { 1.0 / pivot } else { 0.0 };
-            self.inverse[i] = inverse;
-            for (k, below) in (1..width).zip(rest.chunks_exact_mut(width)) {
-                let factor = done[k] * inverse;
-                for (x, y) in below.iter_mut().zip(&done[k..]) {
-                    *x -= factor * y;
-                }
-            }
-            // Row i of Lᵀ.
-            for x in &mut done[1..] {
-                *x *= inverse;
+                let diagonal = &mut row[0].values_mut()[lane];
+                self.inverse[tile].values_mut()[lane] = LEAST_PIVOT * *diagonal;
+                *diagonal += REGULAR * *diagonal;
             }
         }
     }
 
-    /// Solves in place.
+    /// Factors the matrix without `fixed` unknowns.
     #[inline(always)]
-    pub fn solve(&self, x: &mut [f64]) {
-        let width = Self::WIDTH;
-        for (i, row) in self.entry.chunks_exact(width).enumerate() {
-            let (own, rest) = x[i..].split_at_mut(1);
-            for (y, l) in rest.iter_mut().zip(&row[1..]) {
-                *y -= l * own[0];
+    pub fn factor<S: Simd>(&mut self, simd: S, fixed: &[bool]) {
+        self.write(fixed);
+        for (tile, inverse) in self.inverse.iter_mut().enumerate() {
+            let (own, below) =
+                self.rows[tile * LANES..].split_first_chunk_mut::<LANES>().expect("zeros after the last");
+            // The rows before they are divided by their pivots.
+            let mut whole = [[[Register::all(simd, 0.0); D]; 2]; LANES];
+            for p in 0..LANES {
+                let first = *own[p][0][0].values();
+                let pivot = first[p];
+                let one = if pivot > inverse.values()[p] { 1.0 / pivot } else { 0.0 };
+                inverse.values_mut()[p] = one;
+                for v in 0..Self::VECTORS {
+                    let (half, k) = (v / D, v % D);
+                    let x = own[p][half][k].load(simd);
+                    whole[p][half][k] = x;
+                    own[p][half][k] = (x * one).into();
+                    for q in p + 1..LANES {
+                        let y = &mut own[q][half][k];
+                        *y = (y.load(simd) - x * (first[q] * one)).into();
+                    }
+                }
+                for lane in 0..=p {
+                    own[p][0][0].values_mut()[lane] = 0.0;
+                }
+            }
+            // The vectors of a row below that lies so many vectors farther are the last ones of these.
+            for (i, row) in (LANES..Self::WIDTH + LANES - 1).zip(below) {
+                let (from, lane) = (i / LANES, i % LANES);
+                let mut parts = [0.0; LANES];
+                for p in 0..LANES {
+                    parts[p] = own[p].as_flattened()[from].values()[lane];
+                }
+                for (x, v) in row.as_flattened_mut().iter_mut().zip(from..Self::VECTORS) {
+                    let mut rest = x.load(simd);
+                    for p in 0..LANES {
+                        rest = rest - whole[p].as_flattened()[v] * parts[p];
+                    }
+                    *x = rest.into();
+                }
             }
         }
-        for (i, row) in self.entry.chunks_exact(width).enumerate().rev() {
-            let (own, rest) = x[i..].split_at_mut(1);
-            let sum: f64 = rest.iter().zip(&row[1..]).map(|(y, l)| y * l).sum();
-            own[0] = own[0] * self.inverse[i] - sum;
+    }
+
+    /// Solves in place; x is made longer by zeros.
+    #[inline(always)]
+    pub fn solve<S: Simd>(&self, simd: S, x: &mut Vec<Lanes>) {
+        let tiles = self.inverse.len();
+        x.resize(tiles + Self::VECTORS, Lanes::ZERO);
+        for tile in 0..tiles {
+            let rows = &self.rows[tile * LANES..(tile + 1) * LANES];
+            let x = &mut x[tile..tile + Self::VECTORS];
+            for p in 0..LANES {
+                let own = x[0].values()[p];
+                for (x, l) in x.iter_mut().zip(rows[p].as_flattened()) {
+                    *x = (x.load(simd) - l.load(simd) * own).into();
+                }
+            }
+        }
+        for tile in (0..tiles).rev() {
+            let rows = &self.rows[tile * LANES..(tile + 1) * LANES];
+            let (own, rest) = x[tile..tile + Self::VECTORS].split_at_mut(1);
+            let own = own[0].values_mut();
+            // First what later tiles take from all rows of this one.
+            let mut sums = [0.0; LANES];
+            for p in 0..LANES {
+                let mut sum = Register::all(simd, 0.0);
+                for (x, l) in rest.iter().zip(&rows[p].as_flattened()[1..]) {
+                    sum += x.load(simd) * *l;
+                }
+                sums[p] = sum.sum();
+            }
+            for p in (0..LANES).rev() {
+                for q in p + 1..LANES {
+                    sums[p] += rows[p][0][0].values()[q] * own[q];
+                }
+                own[p] = own[p] * self.inverse[tile].values()[p] - sums[p];
+            }
         }
     }
 }
@@ -108,38 +165,47 @@ impl<const D: usize> Band<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fearless_simd::{dispatch, Level};
 
     #[test]
     fn a_banded_system_is_solved_with_one_block_fixed() {
-        let count = 7;
         let full = |i: usize, j: usize| match i.abs_diff(j) {
             _ if (i / 2).abs_diff(j / 2) >= ORDER => 0.0,
             0 => 4.0 + i as f64,
-            1 => -1.0,
+            1 if i / 2 == j / 2 => -1.0,
             2 => 0.5,
-            11 => 0.25,
+            10 => 0.25,
             _ => 0.0,
         };
+        let count = 9;
+        let mut fixed = [false; 9];
+        fixed[3] = true;
+        let given = |i: usize| if fixed[i / 2] { 0.0 } else { i as f64 - 2.0 };
         let mut band = Band::<2>::default();
-        band.clear(count);
-        for b in 0..ORDER {
-            for (k, m) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                for (i, entry) in band.block(b, k, m).iter_mut().enumerate() {
-                    *entry = full(2 * i + k, 2 * (i + b) + m);
+        let mut x: Vec<Lanes> = vec![Lanes::ZERO; 5];
+        for i in 0..2 * count {
+            x[i / LANES].values_mut()[i % LANES] = given(i);
+        }
+        // What was left by a matrix of more rows does not count.
+        for count in [20, count] {
+            band.clear(count.div_ceil(LANES));
+            for b in 0..ORDER {
+                for (k, m) in [(0, 0), (0, 1), (1, 1)] {
+                    for i in 0..count {
+                        band.blocks[i / LANES][b][k][m].values_mut()[i % LANES] =
+                            full(2 * i + k, 2 * (i + b) + m);
+                    }
                 }
             }
+            let fixed = if count == 9 { &fixed[..] } else { &[false; 20] };
+            dispatch!(Level::new(), simd => band.factor(simd, fixed));
         }
-        let mut fixed = [false; 7];
-        fixed[3] = true;
-        band.factor(&fixed);
-        let is_fixed = |i: usize| fixed[i / 2];
-        let mut x: Vec<f64> = (0..14).map(|i| if is_fixed(i) { 0.0 } else { i as f64 - 2.0 }).collect();
-        let given = x.clone();
-        band.solve(&mut x);
+        dispatch!(Level::new(), simd => band.solve(simd, &mut x));
+        let x: Vec<f64> = x.iter().flat_map(|x| *x.values()).collect();
         assert_eq!(x[6..8], [0.0; 2]);
-        for i in (0..14).filter(|&i| !is_fixed(i)) {
-            let sum: f64 = (0..14).map(|j| full(i, j) * x[j]).sum();
-            assert!((sum - given[i]).abs() < 1e-11, "{i}");
+        for i in (0..2 * count).filter(|&i| !fixed[i / 2]) {
+            let sum: f64 = (0..2 * count).map(|j| full(i, j) * x[j]).sum();
+            assert!((sum - given(i)).abs() < 1e-11, "{i}");
         }
     }
 }

@@ -20,7 +20,7 @@ use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
 
 use super::band::Band;
 use super::problem::Problem;
-use super::quads::{Columns, LocalMatrix, Quads};
+use super::quads::{Columns, Quads, Share, BEYOND};
 use super::spline::{DEGREE, ORDER};
 
 /// It ends when the sum of all s λ is below this part of the energy,
@@ -71,7 +71,7 @@ impl<const D: usize> Problem<D> {
             if newton.is_solved(&residuals) {
                 break;
             }
-            newton.band.factor(&newton.problem.fixed);
+            newton.band.factor(simd, &newton.problem.fixed);
             newton.predict(simd, newton.least_mu(&residuals));
             newton.correct(simd);
             if !newton.length.iter().all(|length| length.is_finite()) {
@@ -165,6 +165,8 @@ struct Newton<'a, const D: usize> {
     x: Columns<D>,
     step: Columns<D>,
     state: Vec<Pairs<D>>,
+    /// What the rows of one quad add.
+    shares: Vec<Share<D>>,
     /// The gradient of energy and multipliers, its parts by the sums of both multipliers of each row.
     gradient: Columns<D>,
     size: Columns<D>,
@@ -182,7 +184,7 @@ struct Newton<'a, const D: usize> {
     /// Σ s λ at μ = 1.
     whole: f64,
     least_energy: f64,
-    unknowns: Vec<[f64; D]>,
+    unknowns: Vec<Lanes>,
 }
 
 impl<'a, const D: usize> Newton<'a, D> {
@@ -194,7 +196,11 @@ impl<'a, const D: usize> Newton<'a, D> {
         };
         let zeros = Columns::zeros(quads.count());
         let mut x = zeros.clone();
-        x.set(&problem.x);
+        for (i, point) in problem.x.iter().enumerate() {
+            for k in 0..D {
+                x.set(i, k, point[k]);
+            }
+        }
         let none = [[Lanes::ZERO; D]; 2];
         let one = [[Lanes::ONE; D]; 2];
         let state = Pairs { off: none[0], s: one, l: none, inverse: one, ds: none, dl: none };
@@ -204,6 +210,7 @@ impl<'a, const D: usize> Newton<'a, D> {
             x,
             step: zeros.clone(),
             state: vec![state; quads.rows.len()],
+            shares: quads.shares(),
             gradient: zeros.clone(),
             size: zeros.clone(),
             predictor: zeros,
@@ -228,13 +235,11 @@ impl<'a, const D: usize> Newton<'a, D> {
     /// there is no solution, the bends of the same window are then near their places.
     #[inline(always)]
     fn approximate<S: Simd>(&mut self, simd: S) {
-        self.band.clear(self.x.len());
+        self.band.clear(self.quads.count() + BEYOND);
         self.quads.energy_gradient(simd, &self.x, &mut self.gradient);
         for quad in 0..self.quads.count() {
             let x = self.x.around(simd, quad);
-            let mut local = LocalMatrix::zero();
-            let mut gradient = [[Register::all(simd, 0.0); D]; ORDER];
-            for row in &self.quads.rows[self.quads.range(quad)] {
+            for (row, share) in self.quads.rows[self.quads.range(quad)].iter().zip(&mut self.shares) {
                 let mut weight = row.place(simd, &x);
                 let mut force = weight;
                 for r in 0..D {
@@ -242,14 +247,14 @@ impl<'a, const D: usize> Newton<'a, D> {
                     weight[r] = row.unit.load(simd) * START_WEIGHT * (per_half * per_half) + row.pull;
                     force[r] = weight[r] * (force[r] - row.target[r]);
                 }
-                local.add(simd, row, &weight);
-                row.push(simd, &force, &mut gradient);
+                share.form = row.form(simd, &weight);
+                share.forces[0] = row.along_axes(simd, &force);
             }
-            self.quads.add_to(simd, quad, &local, self.band);
-            self.gradient.add(quad, &gradient);
+            self.quads.add_forms(simd, quad, &self.shares, self.band);
+            self.quads.add_forces(simd, quad, &self.shares, 0, &mut self.gradient);
         }
-        self.band.factor(&self.problem.fixed);
-        self.downhill(|newton, i| newton.gradient.point(i));
+        self.band.factor(simd, &self.problem.fixed);
+        self.downhill(simd, false);
         self.x.add_parts(&self.step, |_| 1.0);
     }
 
@@ -278,7 +283,7 @@ impl<'a, const D: usize> Newton<'a, D> {
     #[inline(always)]
     fn linearise<S: Simd>(&mut self, simd: S) -> Residuals {
         let zero = Register::all(simd, 0.0);
-        self.band.clear(self.x.len());
+        self.band.clear(self.quads.count() + BEYOND);
         let mut energy = self.quads.energy_gradient(simd, &self.x, &mut self.gradient);
         self.size.fill(0.0);
         self.predictor.fill(0.0);
@@ -286,15 +291,13 @@ impl<'a, const D: usize> Newton<'a, D> {
         for quad in 0..self.quads.count() {
             let x = self.x.around(simd, quad);
             let length = self.length[quad];
-            let mut local = LocalMatrix::zero();
             let (mut work, mut mu) = (zero, zero);
-            // Gradient, its size, and what the predictor adds to the gradient.
-            let mut sums = [[[zero; D]; ORDER]; 3];
-            for i in self.quads.range(quad) {
+            for (i, share) in self.quads.range(quad).zip(&mut self.shares) {
                 let (row, pairs) = (&self.quads.rows[i], &mut self.state[i]);
                 let place = row.place(simd, &x);
                 let pull = row.pull.load(simd);
                 let mut weight = [pull; D];
+                // Gradient, its size, and what the predictor adds to the gradient.
                 let mut forces = [[zero; D]; 3];
                 let mut product = zero;
                 for r in 0..D {
@@ -325,17 +328,19 @@ impl<'a, const D: usize> Newton<'a, D> {
                 }
                 mu += product * row.per_unit;
                 work += product;
-                local.add(simd, row, &weight);
-                for (force, sums) in forces.iter().zip(&mut sums) {
-                    row.push(simd, force, sums);
+                share.form = row.form(simd, &weight);
+                for (along, force) in share.forces.iter_mut().zip(&forces) {
+                    *along = row.along_axes(simd, force);
                 }
             }
             self.work[quad] = work.into();
             self.mu[quad] = mu.sum() / self.pairs[quad];
-            self.quads.add_to(simd, quad, &local, self.band);
-            self.gradient.add(quad, &sums[0]);
-            self.size.add(quad, &sums[1]);
-            self.predictor.add(quad, &sums[2]);
+            self.quads.add_forms(simd, quad, &self.shares, self.band);
+            for (number, column) in
+                [&mut self.gradient, &mut self.size, &mut self.predictor].into_iter().enumerate()
+            {
+                self.quads.add_forces(simd, quad, &self.shares, number, column);
+            }
         }
         energy += 0.5 * pulled.sum();
         let sum = self.work.iter().map(|work| work.values().iter().sum::<f64>()).sum();
@@ -373,10 +378,7 @@ impl<'a, const D: usize> Newton<'a, D> {
     /// the corrector.
     #[inline(always)]
     fn predict<S: Simd>(&mut self, simd: S, least_mu: f64) {
-        self.downhill(|newton, i| {
-            let (a, b) = (newton.gradient.point(i), newton.predictor.point(i));
-            std::array::from_fn(|k| a[k] + b[k])
-        });
+        self.downhill(simd, true);
         let zero = Register::all(simd, 0.0);
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
@@ -415,8 +417,7 @@ impl<'a, const D: usize> Newton<'a, D> {
     fn correct<S: Simd>(&mut self, simd: S) {
         let zero = Register::all(simd, 0.0);
         for quad in 0..self.quads.count() {
-            let mut sums = [[zero; D]; ORDER];
-            for i in self.quads.range(quad) {
+            for (i, share) in self.quads.range(quad).zip(&mut self.shares) {
                 let (row, pairs) = (&self.quads.rows[i], &self.state[i]);
                 let aim = row.unit.load(simd) * self.mu[quad];
                 let mut force = [zero; D];
@@ -428,11 +429,11 @@ impl<'a, const D: usize> Newton<'a, D> {
                         force[r] += (aim + l * lack - s * l - product.load(simd)) * inverse * SIGN[side];
                     }
                 }
-                row.push(simd, &force, &mut sums);
+                share.forces[0] = row.along_axes(simd, &force);
             }
-            self.gradient.add(quad, &sums);
+            self.quads.add_forces(simd, quad, &self.shares, 0, &mut self.gradient);
         }
-        self.downhill(|newton, i| newton.gradient.point(i));
+        self.downhill(simd, false);
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
             let mut most = Register::all(simd, 1e-300);
@@ -465,22 +466,39 @@ impl<'a, const D: usize> Newton<'a, D> {
         let part = |i: usize| {
             let place = ((i as f64 - MIDDLE) / LANES as f64).clamp(0.0, last as f64);
             let before = place as usize;
-            let [a, b] = [before, (before + 1).min(last)].map(|quad| self.length[quad]);
+            let (a, b) = (self.length[before], self.length[(before + 1).min(last)]);
             a + (b - a) * (place - before as f64)
         };
         self.x.add_parts(&self.step, part);
     }
 
-    /// The step of Newton's matrix against a gradient.
+    /// The step of Newton's matrix against the gradient, or against that and what the predictor adds to it.
     #[inline(always)]
-    fn downhill(&mut self, gradient: impl Fn(&Self, usize) -> [f64; D]) {
+    fn downhill<S: Simd>(&mut self, simd: S, predictor: bool) {
         let fixed = &self.problem.fixed;
         let mut unknowns = std::mem::take(&mut self.unknowns);
         unknowns.clear();
-        let against = |i: usize| gradient(self, i).map(|g| -g);
-        unknowns.extend((0..fixed.len()).map(|i| if fixed[i] { [0.0; D] } else { against(i) }));
-        self.band.solve(unknowns.as_flattened_mut());
-        self.step.set(&unknowns);
+        unknowns.resize((fixed.len() * D).div_ceil(LANES), Lanes::ZERO);
+        for i in 0..fixed.len() {
+            if fixed[i] {
+                continue;
+            }
+            for k in 0..D {
+                let mut sum = self.gradient.at(i, k);
+                if predictor {
+                    sum += self.predictor.at(i, k);
+                }
+                let place = i * D + k;
+                unknowns[place / LANES].values_mut()[place % LANES] = -sum;
+            }
+        }
+        self.band.solve(simd, &mut unknowns);
+        for i in 0..fixed.len() {
+            for k in 0..D {
+                let place = i * D + k;
+                self.step.set(i, k, unknowns[place / LANES].values()[place % LANES]);
+            }
+        }
         self.unknowns = unknowns;
     }
 }

@@ -17,80 +17,112 @@ pub type Around<S, const D: usize> = [[Register<S>; D]; ORDER];
 
 /// A number for each coefficient and axis, in the order of the coefficients; beyond the last there are zeros.
 #[derive(Clone)]
-pub struct Columns<const D: usize>([Vec<f64>; D]);
+pub struct Columns<const D: usize>([Vec<Lanes>; D]);
 
 impl<const D: usize> Columns<D> {
     /// Zeros for so many quads.
     pub fn zeros(quads: usize) -> Self {
-        Self(std::array::from_fn(|_| vec![0.0; quads * LANES + ORDER]))
-    }
-
-    pub fn set(&mut self, points: &[[f64; D]]) {
-        for (i, point) in points.iter().enumerate() {
-            for k in 0..D {
-                self.0[k][i] = point[k];
-            }
-        }
+        Self(std::array::from_fn(|_| vec![Lanes::ZERO; quads + BEYOND]))
     }
 
     /// Coefficients, those beyond the last included.
     pub fn len(&self) -> usize {
-        self.0[0].len()
+        self.0[0].len() * LANES
     }
 
     /// Adds to each coefficient a part of that of the other.
     pub fn add_parts(&mut self, other: &Self, part: impl Fn(usize) -> f64) {
         for i in 0..self.len() {
             let part = part(i);
-            for (column, other) in self.0.iter_mut().zip(&other.0) {
-                column[i] += part * other[i];
+            for k in 0..D {
+                self.0[k][i / LANES].values_mut()[i % LANES] +=
+                    part * other.0[k][i / LANES].values()[i % LANES];
             }
         }
     }
 
     pub fn fill(&mut self, value: f64) {
         for column in &mut self.0 {
-            column.fill(value);
+            column.fill(Lanes::all(value));
         }
     }
 
     #[inline(always)]
+    pub fn set(&mut self, i: usize, k: usize, value: f64) {
+        self.0[k][i / LANES].values_mut()[i % LANES] = value;
+    }
+
+    #[inline(always)]
+    pub fn at(&self, i: usize, k: usize) -> f64 {
+        self.0[k][i / LANES].values()[i % LANES]
+    }
+
+    #[inline(always)]
     pub fn point(&self, i: usize) -> [f64; D] {
-        std::array::from_fn(|k| self.0[k][i])
+        std::array::from_fn(|k| self.at(i, k))
     }
 
     /// The coefficients that the intervals of a quad see.
     #[inline(always)]
     pub fn around<S: Simd>(&self, simd: S, quad: usize) -> Around<S, D> {
         let mut out = [[Register::all(simd, 0.0); D]; ORDER];
-        for a in 0..ORDER {
-            for k in 0..D {
-                out[a][k] = four(&self.0[k], quad * LANES + a).load(simd);
-            }
+        for k in 0..D {
+            let column = &self.0[k][quad..quad + BEYOND + 1];
+            let (a, b, c) = (column[0].load(simd), column[1].load(simd), column[2].load(simd));
+            out[0][k] = a;
+            out[1][k] = a.slide::<1>(b);
+            out[2][k] = a.slide::<2>(b);
+            out[3][k] = a.slide::<3>(b);
+            out[4][k] = b;
+            out[5][k] = b.slide::<1>(c);
         }
         out
     }
 
     /// Adds to the coefficients that the intervals of a quad see.
     #[inline(always)]
-    pub fn add<S: Simd>(&mut self, quad: usize, terms: &Around<S, D>) {
-        for a in 0..ORDER {
-            for k in 0..D {
-                add_four(&mut self.0[k], quad * LANES + a, terms[a][k]);
-            }
-        }
+    pub fn add<S: Simd>(&mut self, simd: S, quad: usize, k: usize, sums: &[Register<S>; ORDER]) {
+        let column = &mut self.0[k][quad..quad + BEYOND + 1];
+        let given = [column[0].load(simd), column[1].load(simd), column[2].load(simd)];
+        let [a, b, c] = plus(simd, given, sums, ORDER);
+        (column[0], column[1], column[2]) = (a.into(), b.into(), c.into());
     }
 }
 
-#[inline(always)]
-fn four(column: &[f64], at: usize) -> Lanes {
-    Lanes::new(column[at..at + LANES].try_into().expect("four numbers"))
-}
+/// The vectors of a column after those of the first coefficients of the quads.
+pub const BEYOND: usize = 2;
 
+/// Three vectors of a column with the first `count` of some sums: those of the n-th coefficients that the intervals of a quad
+/// see. All are read as they were written, because other parts of them would have to wait for the writing.
 #[inline(always)]
-fn add_four<S: Simd>(column: &mut [f64], at: usize, terms: Register<S>) {
-    let sum = terms + four(column, at);
-    column[at..at + LANES].copy_from_slice(&sum.values());
+fn plus<S: Simd>(
+    simd: S,
+    [mut a, mut b, mut c]: [Register<S>; 3],
+    sums: &[Register<S>; ORDER],
+    count: usize,
+) -> [Register<S>; 3] {
+    let zero = Register::all(simd, 0.0);
+    a += sums[0];
+    if count > 1 {
+        a += zero.slide::<3>(sums[1]);
+        b += sums[1].slide::<3>(zero);
+    }
+    if count > 2 {
+        a += zero.slide::<2>(sums[2]);
+        b += sums[2].slide::<2>(zero);
+    }
+    if count > 3 {
+        a += zero.slide::<1>(sums[3]);
+        b += sums[3].slide::<1>(zero);
+    }
+    if count > 4 {
+        b += sums[4];
+    }
+    if count > 5 {
+        b += zero.slide::<3>(sums[5]);
+        c += sums[5].slide::<3>(zero);
+    }
+    [a, b, c]
 }
 
 /// A row of each interval of a quad. Where one has fewer rows than the others, its lane holds a row of no weight.
@@ -154,56 +186,44 @@ impl<const D: usize> QuadRow<D> {
         place
     }
 
-    /// Adds a force in the directions of the row to the coefficients.
+    /// A force in the directions of the row along the axes.
     #[inline(always)]
-    pub fn push<S: Simd>(&self, simd: S, force: &[Register<S>; D], sums: &mut Around<S, D>) {
-        let mut push = [Register::all(simd, 0.0); D];
-        for r in 0..D {
-            for k in 0..D {
-                push[k] += self.direction[r][k] * force[r];
+    pub fn along_axes<S: Simd>(&self, simd: S, force: &[Register<S>; D]) -> [Lanes; D] {
+        let mut out = [Lanes::ZERO; D];
+        for k in 0..D {
+            let mut sum = Register::all(simd, 0.0);
+            for r in 0..D {
+                sum += self.direction[r][k] * force[r];
+            }
+            out[k] = sum.into();
+        }
+        out
+    }
+
+    /// Σ weight n nᵀ over its directions n: entries k ≤ m.
+    #[inline(always)]
+    pub fn form<S: Simd>(&self, simd: S, weight: &[Register<S>; D]) -> [[Lanes; D]; D] {
+        let mut out = [[Lanes::ZERO; D]; D];
+        for k in 0..D {
+            for m in k..D {
+                let mut sum = Register::all(simd, 0.0);
+                for r in 0..D {
+                    sum += self.direction[r][m] * (self.direction[r][k] * weight[r]);
+                }
+                out[k][m] = sum.into();
             }
         }
-        for a in 0..ORDER {
-            for k in 0..D {
-                sums[a][k] += self.basis[a] * push[k];
-            }
-        }
+        out
     }
 }
 
-/// The matrices of the intervals of a quad: blocks (a, b) with a ≤ b, of which each is symmetric: entries k ≤ m.
-pub struct LocalMatrix<const D: usize>([[[[Lanes; D]; D]; ORDER]; ORDER]);
-
-impl<const D: usize> LocalMatrix<D> {
-    #[inline(always)]
-    pub fn zero() -> Self {
-        Self([[[[Lanes::ZERO; D]; D]; ORDER]; ORDER])
-    }
-
-    /// Adds Σ weight n nᵀ B Bᵀ of a row with directions n.
-    #[inline(always)]
-    pub fn add<S: Simd>(&mut self, simd: S, row: &QuadRow<D>, weight: &[Register<S>; D]) {
-        let mut form = [[Register::all(simd, 0.0); D]; D];
-        for r in 0..D {
-            for k in 0..D {
-                let share = row.direction[r][k] * weight[r];
-                for m in k..D {
-                    form[k][m] += row.direction[r][m] * share;
-                }
-            }
-        }
-        for a in 0..ORDER {
-            for k in 0..D {
-                for m in k..D {
-                    let part = row.basis[a] * form[k][m];
-                    for b in a..ORDER {
-                        let entry = &mut self.0[a][b][k][m];
-                        *entry = (row.basis[b] * part + *entry).into();
-                    }
-                }
-            }
-        }
-    }
+/// What a row adds to matrix and gradients, by axis.
+#[derive(Clone, Copy)]
+pub struct Share<const D: usize> {
+    /// The form of which B Bᵀ comes into the matrix: entries k ≤ m.
+    pub form: [[Lanes; D]; D],
+    /// The forces of which B comes into gradient, size of the gradient, and predictor.
+    pub forces: [[Lanes; D]; 3],
 }
 
 /// The energy and the rows of all intervals, four intervals side by side.
@@ -252,26 +272,82 @@ impl<const D: usize> Quads<D> {
         self.energy.len()
     }
 
+    /// Room for what the rows of any quad add.
+    pub fn shares(&self) -> Vec<Share<D>> {
+        let most = self.start.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
+        vec![Share { form: [[Lanes::ZERO; D]; D], forces: [[Lanes::ZERO; D]; 3] }; most]
+    }
+
     /// The rows of a quad.
     pub fn range(&self, quad: usize) -> Range<usize> {
         self.start[quad]..self.start[quad + 1]
     }
 
-    /// Adds the energy of a quad and the matrix of its rows to that of all.
+    /// Adds the energy of a quad, and the forms of its rows, to the matrix.
     #[inline(always)]
-    pub fn add_to<S: Simd>(&self, simd: S, quad: usize, local: &LocalMatrix<D>, band: &mut Band<D>) {
-        for a in 0..ORDER {
-            for b in a..ORDER {
-                for k in 0..D {
-                    for m in if a == b { k } else { 0 }..D {
-                        let mut entry = local.0[a][b][k.min(m)][k.max(m)].load(simd);
-                        if k == m {
-                            entry += self.energy[quad][k][a][b];
-                        }
-                        add_four(band.block(b - a, k, m), quad * LANES + a, entry);
-                    }
+    pub fn add_forms<S: Simd>(&self, simd: S, quad: usize, shares: &[Share<D>], band: &mut Band<D>) {
+        for k in 0..D {
+            for m in k..D {
+                // As many sums at a time as the processor has registers for.
+                self.add_blocks::<S, 0, 2>(simd, quad, shares, [k, m], band);
+                self.add_blocks::<S, 2, 4>(simd, quad, shares, [k, m], band);
+            }
+        }
+    }
+
+    /// Adds the entries (k, m) of COUNT blocks from (i, i + FROM) on.
+    #[inline(always)]
+    fn add_blocks<S: Simd, const FROM: usize, const COUNT: usize>(
+        &self,
+        simd: S,
+        quad: usize,
+        shares: &[Share<D>],
+        [k, m]: [usize; 2],
+        band: &mut Band<D>,
+    ) {
+        let mut sums = [[Register::all(simd, 0.0); ORDER]; COUNT];
+        for (row, share) in self.rows[self.range(quad)].iter().zip(shares) {
+            let form = share.form[k][m].load(simd);
+            for a in 0..ORDER - FROM {
+                let part = row.basis[a] * form;
+                for b in FROM..(FROM + COUNT).min(ORDER - a) {
+                    sums[b - FROM][a] += row.basis[a + b] * part;
                 }
             }
+        }
+        for b in FROM..FROM + COUNT {
+            let sums = &mut sums[b - FROM];
+            if k == m {
+                for a in 0..ORDER - b {
+                    sums[a] += self.energy[quad][k][a][a + b];
+                }
+            }
+            let blocks = &mut band.blocks[quad..quad + BEYOND + 1];
+            let given =
+                [blocks[0][b][k][m].load(simd), blocks[1][b][k][m].load(simd), blocks[2][b][k][m].load(simd)];
+            let [x, y, z] = plus(simd, given, sums, ORDER - b);
+            (blocks[0][b][k][m], blocks[1][b][k][m], blocks[2][b][k][m]) = (x.into(), y.into(), z.into());
+        }
+    }
+
+    /// Adds forces of the rows of a quad, of the three those of a number.
+    #[inline(always)]
+    pub fn add_forces<S: Simd>(
+        &self,
+        simd: S,
+        quad: usize,
+        shares: &[Share<D>],
+        number: usize,
+        to: &mut Columns<D>,
+    ) {
+        for k in 0..D {
+            let mut sums = [Register::all(simd, 0.0); ORDER];
+            for (row, share) in self.rows[self.range(quad)].iter().zip(shares) {
+                for a in 0..ORDER {
+                    sums[a] += row.basis[a] * share.forces[number][k].load(simd);
+                }
+            }
+            to.add(simd, quad, k, &sums);
         }
     }
 
@@ -283,19 +359,21 @@ impl<const D: usize> Quads<D> {
         let mut twice = zero;
         for (quad, (forms, pull)) in self.energy.iter().zip(&self.pull).enumerate() {
             let x = x.around(simd, quad);
-            let mut terms = [[zero; D]; ORDER];
+            let mut terms = [[zero; ORDER]; D];
             for a in 0..ORDER {
                 for b in 0..ORDER {
                     for k in 0..D {
-                        terms[a][k] += forms[k][a][b] * x[b][k];
+                        terms[k][a] += forms[k][a][b] * x[b][k];
                     }
                 }
                 for k in 0..D {
-                    twice += terms[a][k] * x[a][k];
-                    terms[a][k] = terms[a][k] - pull[k][a].load(simd);
+                    twice += terms[k][a] * x[a][k];
+                    terms[k][a] = terms[k][a] - pull[k][a].load(simd);
                 }
             }
-            out.add(quad, &terms);
+            for k in 0..D {
+                out.add(simd, quad, k, &terms[k]);
+            }
         }
         0.5 * twice.sum()
     }

@@ -61,16 +61,25 @@ pub fn rows<const D: usize>(
 ) -> (Vec<Row<D>>, Vec<usize>) {
     let (mut rows, mut start) = (Vec::with_capacity(2 * SAMPLES * density.len()), vec![0]);
     let mut chord = line.chord_at(knots[first]);
+    let limits_in = |chord: usize, vertex: Option<usize>| {
+        let (along, limits) = limits(line, chord, vertex);
+        (frame(&along), std::array::from_fn(|r| if r + 1 == D { limits[1] } else { limits[0] }))
+    };
+    // Most samples lie between the vertices of the same chord as the one before.
+    let mut inside = (chord, limits_in(chord, None));
     for (j, density) in (first..).zip(density) {
         let (t, low, high) = (around(knots, j), knots[j], knots[j + 1]);
         let mut push = |u: f64, chord: usize, vertex: Option<usize>| {
-            let (along, limits) = limits(line, chord, vertex);
+            if vertex.is_none() && inside.0 != chord {
+                inside = (chord, limits_in(chord, None));
+            }
+            let (direction, half) = if vertex.is_none() { inside.1 } else { limits_in(chord, vertex) };
             let point = line.point(chord, u);
             rows.push(Row {
                 basis: basis(&t, u),
                 target: std::array::from_fn(|k| point[k] - origin[k]),
-                direction: frame(&along),
-                half: std::array::from_fn(|r| if r + 1 == D { limits[1] } else { limits[0] }),
+                direction,
+                half,
                 pull: vertex.map_or(0.0, |i| density * pull(line, i, high - low)),
             });
         };
