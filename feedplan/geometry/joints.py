@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,7 @@ def tangent_jumps(curve: CompositeCurve) -> Array:
     length_out, length_in = np.linalg.norm(edge_out, axis=1), np.linalg.norm(edge_in, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         jump: Array = np.abs(edge_in / length_in[:, None] - edge_out / length_out[:, None])
-        size = np.abs(points).max(axis=1, initial=0.0)
+        size = _greatest(points)
         noise = ROUNDING_MARGIN * np.finfo(float).eps * size / np.minimum(length_in, length_out)
         jump[jump <= (SMOOTH_TURN + noise)[:, None]] = 0.0
     return jump
@@ -46,12 +48,21 @@ def end_edges(curve: CompositeCurve) -> tuple[Array, Array]:
     start, end = control[first + 1] - control[first], control[last] - control[last - 1]
     if len(curve) == 0:
         return start, end
+    # A piece is no larger than the whole curve: few edges are so short that the size of their pieces counts.
+    if min(_greatest(edge).min() for edge in (start, end)) > VANISHING_EDGE * (control.max() - control.min()):
+        return start, end
     greatest, least = (f.reduceat(control, first) for f in (np.maximum, np.minimum))
-    shortest = VANISHING_EDGE * (greatest - least).max(axis=1)
+    shortest = VANISHING_EDGE * _greatest(greatest - least)
     for edge, near, sign in ((start, first, 1), (end, last, -1)):
+        rows = np.flatnonzero(_greatest(edge) <= shortest)
         for step in range(1, int(degree.max()) + 1):
-            rows = np.flatnonzero(np.abs(edge).max(axis=1) <= shortest)
             more = rows[degree[rows] > step]
             edge[more] = sign * (control[near[more] + sign * (step + 1)] - control[near[more] + sign * step])
             edge[rows[degree[rows] <= step]] = 0.0
+            rows = more[_greatest(edge[more]) <= shortest[more]]
     return start, end
+
+
+def _greatest(vectors: Array) -> Array:
+    """The greatest component of each vector (n, axes); by axis, because NumPy is slow along short rows."""
+    return reduce(np.maximum, np.abs(vectors.T))
