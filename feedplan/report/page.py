@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import resources
+from itertools import islice
 from pathlib import Path as FilePath
 from string import Template
 from typing import Any
@@ -105,11 +106,13 @@ def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
     texts: dict[int, str] = {}
     try:
         with io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as stream:
-            for number, line in enumerate(stream, start=1):
-                if number in wanted:
-                    texts[number] = line.decode("utf-8", errors="replace")
-                    if len(texts) == len(wanted):
-                        break
+            at = 0
+            for number in sorted(number for number in wanted if number > at):
+                line = next(islice(stream, number - at - 1, None), None)
+                if line is None:
+                    break
+                texts[number] = line.decode("utf-8", errors="replace")
+                at = number
     except OSError:
         return {}
     return texts
