@@ -29,10 +29,13 @@ type Axes = [f64; MOST_AXES];
 
 struct Point {
     first: Axes,
+    /// q_k'² and its inverse.
+    square: [Axes; 2],
     normal: Axes,
     bend: f64,
-    /// Bounds of w, and of v³ plus the integral.
+    /// Bounds of w, of v³, and of v³ plus the integral.
     w: f64,
+    cube: f64,
     convex: f64,
     /// Arc length and twice the integral of 3 J, from the start of the window.
     s: f64,
@@ -76,22 +79,27 @@ impl Point {
 
     /// Lowers w to what can be reached from another point.
     fn lower(&mut self, from: &Self, energy: &[f64], step: &Step) {
-        // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
+        let mut w = self.w;
         if self.s == from.s {
-            self.w = self.w.min(from.w);
-        }
-        for (k, energy) in energy.iter().enumerate() {
-            let square = self.first[k] * self.first[k];
-            if square > 0.0 && self.s != from.s {
-                self.w = self.w.min((from.first[k] * from.first[k] * from.w + energy) / square);
+            // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
+            w = w.min(from.w);
+        } else {
+            for (k, energy) in energy.iter().enumerate() {
+                w = w.min((from.square[0][k] * from.w + energy) * self.square[1][k]);
             }
         }
-        let cubed = |w: f64| w * w.sqrt();
-        let straight = step.straight * cubed(from.w.max(self.w));
-        let bent = (from.bend * cubed(from.w)).min(straight) + step.bending;
-        if bent < CLOSE * self.bend * cubed(self.w) {
-            self.w = (bent / self.bend).cbrt().powi(2);
+        if w < self.w {
+            (self.w, self.cube) = (w, w * w.sqrt());
         }
+        let bent = (from.bend * from.cube).min(step.straight * from.cube.max(self.cube)) + step.bending;
+        if bent < CLOSE * self.bend * self.cube {
+            self.lower_to(bent / self.bend);
+        }
+    }
+
+    /// Lowers v³.
+    fn lower_to(&mut self, cube: f64) {
+        (self.w, self.cube) = (cube.cbrt().powi(2), cube);
     }
 }
 
@@ -116,7 +124,10 @@ fn points(rows: &Constraints) -> (Vec<Point>, Vec<Step>) {
             let normal = second.map(|second: f64| second / bend.max(f64::MIN_POSITIVE));
             let across: f64 = (0..MOST_AXES).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
             let w = (1.0 / rows.speed(n, p)).min(across / bend);
-            let mut next = Point { first, normal, bend, w, convex: 0.0, s: 0.0, integral: 0.0 };
+            let square = first.map(|first| first * first);
+            let square = [square, square.map(|square| 1.0 / square)];
+            let cube = w * w.sqrt();
+            let mut next = Point { first, square, normal, bend, w, cube, convex: 0.0, s: 0.0, integral: 0.0 };
             if let Some(last) = points.last() {
                 let h = if p == 0 { 0.0 } else { rows.h(n) / 3.0 };
                 let mean = mean_direction(last, &next, h);
@@ -184,7 +195,7 @@ fn mean_direction(last: &Point, next: &Point, h: f64) -> Axes {
 fn convex(points: &mut [Point]) {
     let mut hull: Vec<usize> = vec![];
     for n in 0..points.len() {
-        points[n].convex = points[n].w * points[n].w.sqrt() + points[n].integral;
+        points[n].convex = points[n].cube + points[n].integral;
         let above = |a: usize, b: usize| {
             let [a, b, c] = [&points[a], &points[b], &points[n]];
             (b.convex - a.convex) * (c.s - a.s) >= (c.convex - a.convex) * (b.s - a.s)
@@ -200,7 +211,7 @@ fn convex(points: &mut [Point]) {
             let most = convex + (last - convex) * (point.s - s) / (end - s);
             // Where rounding takes the digits of a low speed, it stays as it is.
             if most < (1.0 - ROUNDING) * point.convex {
-                point.w = (most - point.integral).max(0.0).cbrt().powi(2);
+                point.lower_to((most - point.integral).max(0.0));
             }
         }
     }
