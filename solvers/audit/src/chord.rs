@@ -2,6 +2,7 @@
 
 /// How far a circle of this curvature leaves its chord of length `step`. Chords longer than the diameter do not
 /// exist; a path of length `step` stays within half of it of one of its ends.
+#[inline(always)]
 pub fn chord_error(step: f64, curvature: f64) -> f64 {
     let half = 0.5 * step;
     let reach = half * curvature;

@@ -182,10 +182,11 @@ impl<const M: usize> Places<'_, '_, M> {
         let (per_slope, per_bend) = (0.5 / length, 0.5 / (length * length));
         let a = each(|i| per_slope * (c[1] + x[i] * (2.0 * c[2] + x[i] * (3.0 * c[3]))));
         let j = each(|i| per_bend * v[i] * (2.0 * c[2] + 6.0 * c[3] * x[i]));
-        let (time, is_good) = integral(&each(|i| slope[i] / v[i]));
-        if !is_good {
-            return None;
-        }
+        let time = match integral(&each(|i| slope[i] / v[i])) {
+            (time, true) => time * width,
+            // The time of a speed that changes fast takes more places than anything else.
+            _ => Some(speed.time(length)).filter(|time| time.is_finite())?,
+        };
         // The derivatives by the length; see `Station`.
         let per = each(|i| 1.0 / slope[i]);
         let first: [Lanes; M] = axes(|k| each(|i| c1[k][i] * per[i]));
@@ -204,7 +205,8 @@ impl<const M: usize> Places<'_, '_, M> {
             }
         }
         let (second_sq, third_sq) = (inner(&second, &second), inner(&third, &third));
-        let curvature = greatest(&second_sq).sqrt();
+        let curvatures = each(|i| second_sq[i].sqrt());
+        let curvature = greatest(&curvatures);
         let pace = |i: usize| Pace { v: v[i], a: a[i], j: j[i] };
         let known = Known {
             interval: LONGEST * width,
@@ -257,14 +259,22 @@ impl<const M: usize> Places<'_, '_, M> {
             }
         }
         if self.limits.chord_tolerance.is_finite() {
-            let step = bulge.most_speed * self.limits.period;
-            let error = chord_error(step, curvature + bulge.curvature);
-            let is_low = error <= worst(Check::Chord) * self.limits.chord_tolerance;
-            if !is_low {
+            // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
+            let greater = |of: &Lanes, i: usize| of[i].max(of[(i + 1).min(PLACES - 1)]);
+            let errors = each(|i| {
+                let fastest = (greater(&v, i) + bulge.rates[0]).min(bulge.most_speed);
+                chord_error(fastest * self.limits.period, greater(&curvatures, i) + bulge.curvature)
+            });
+            let known = worst(Check::Chord) * self.limits.chord_tolerance;
+            let mut are_low = true;
+            for i in 0..PLACES {
+                are_low &= errors[i] <= known;
+            }
+            if !are_low {
                 return None;
             }
         }
-        Some(time * width)
+        Some(time)
     }
 }
 
@@ -400,8 +410,8 @@ mod tests {
         }
     }
 
-    /// The answer where `worst` of each rate and of the feed have been found before, in parts of what the phase uses; the time by the
-    /// law; and what it uses of each rate.
+    /// The answer where `worst` of each rate, of the feed and of the chord error have been found before, in parts of what the phase
+    /// uses; the time by the law; and what it uses of each rate.
     fn look(
         control: &[f64],
         [u, speeds, a]: [[f64; 2]; 3],
@@ -417,12 +427,13 @@ mod tests {
         let phases =
             Phases { a0: &a[..1], a1: &a[1..], ..Phases::of_one(&[SPEED_CUBIC], &[255], &[0.0], &u, &p) };
         let motion = phases.by_length(0, &mut columns).unwrap();
-        let (mut most, mut fastest) = ([[0.0_f64; 2]; 3], 0.0_f64);
+        let (mut most, mut fastest, mut farthest) = ([[0.0_f64; 2]; 3], 0.0_f64, 0.0_f64);
         for i in 0..=2000 {
             let at = u[0] + (u[1] - u[0]) * f64::from(i) / 2000.0;
             let (pace, station) = (motion.place(at).pace, Station::new(&curve, at).unwrap());
             let rates = [station.velocity(pace.v), station.acceleration(pace), station.jerk(pace)];
             fastest = fastest.max(pace.v);
+            farthest = farthest.max(chord_error(pace.v * free.period, station.curvature));
             for (row, rate) in rates.iter().enumerate() {
                 for k in 0..2 {
                     most[row][k] = most[row][k].max(rate[k].abs());
@@ -432,7 +443,7 @@ mod tests {
         // One limit for both axes; the worst of each axis is what it uses of that, but for the part that is asked for.
         let limit = most.map(|row| [row[0].max(row[1]); 2]);
         let of = |limit: [f64; 2]| Sided { positive: limit, negative: limit };
-        let mut limits = Limits { judges_jerk: true, jerk: limit[2], ..free };
+        let mut limits = Limits { judges_jerk: true, jerk: limit[2], chord_tolerance: farthest, ..free };
         (limits.velocity, limits.acceleration) = (of(limit[0]), of(limit[1]));
         let mut tally = Tally::default();
         for (row, check) in RATES.into_iter().enumerate() {
@@ -441,6 +452,7 @@ mod tests {
             }
         }
         tally.offer(Check::Feed, 0, worst(Check::Feed, 0), 1.0, 0.0, 1);
+        tally.offer(Check::Chord, 0, worst(Check::Chord, 0) * farthest, farthest, 0.0, 1);
         let (feeds, feeds_along) = ([fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY], [true; FEEDS]);
         let columns = Columns::new(&path, &limits, None);
         let places = Places { curve: &curve, columns: &columns, limits: &limits, feeds, feeds_along };
@@ -450,9 +462,26 @@ mod tests {
     #[test]
     fn a_gentle_phase_that_uses_no_more_than_was_found_has_its_time() {
         let control = [0.0, 0.0, 1.0, 0.1, 2.0, 0.1, 3.0, 0.0];
-        let (found, time, _) =
-            look(&control, [[0.5, 0.55], [1.0, 1.0012], [0.02, 0.028]], &|_, _| 1.0 + 1e-6);
+        // Speed and curvature are greatest at different ends of it.
+        let worst = |check, _| if check == Check::Chord { 1.0 + 1e-3 } else { 1.0 + 1e-6 };
+        let (found, time, _) = look(&control, [[0.5, 0.55], [1.0, 1.0012], [0.02, 0.028]], &worst);
         assert!((found.unwrap() / time - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_phase_whose_speed_changes_fast_has_its_time() {
+        let control = [0.0, 0.0, 1.0, 0.1, 2.0, 0.1, 3.0, 0.0];
+        let (found, time, _) = look(&control, [[0.5, 0.6], [0.3, 1.0], [4.5, 4.5]], &|_, _| 10.0);
+        assert!((found.unwrap() / time - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_phase_that_is_fastest_where_it_is_bent_least_has_its_time() {
+        let control = [0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 3.0, 0.3];
+        let worst = |check, _| if check == Check::Chord { 1.2 } else { 10.0 };
+        // From 1.4 mm/s to 1 mm/s, where the curvature is 1.4 times as great.
+        let (found, time, _) = look(&control, [[1.0, 1.4], [1.4, 1.0], [-1.2, -1.2]], &worst);
+        assert!((found.unwrap() / time - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -484,7 +513,7 @@ mod tests {
             prop_assert!(found.is_none_or(|found| (found / time - 1.0).abs() < 1e-9), "{found:?} {time}");
             let rates = RATES.into_iter().enumerate().flat_map(|(row, check)| [(row, check, 0), (row, check, 1)]);
             let rates = rates.filter(|&(row, _, k)| most[row][k] > 1e-6).map(|(_, check, k)| (check, k));
-            for broken in rates.chain([(Check::Feed, 0)]) {
+            for broken in rates.chain([(Check::Feed, 0), (Check::Chord, 0)]) {
                 let worst = |check, k| if (check, k) == broken { 0.9999 } else { 1.001 };
                 prop_assert_eq!(look(&control, [u, speeds, a], &worst).0, None, "{:?}", broken);
             }
