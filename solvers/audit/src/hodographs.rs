@@ -27,6 +27,19 @@ const BINOMIALS: [[f64; MOST + 1]; MOST + 1] = {
     rows
 };
 
+/// Evaluates an expression with the degree of a piece as a constant where it is that of most pieces, so that its loops are unrolled.
+macro_rules! with_degree {
+    ($degree:expr, $n:ident, $call:expr) => {
+        match $degree {
+            5 => {
+                let $n = 5_usize;
+                $call
+            }
+            $n => $call,
+        }
+    };
+}
+
 #[derive(Clone, Debug)]
 pub struct Hodographs<const M: usize> {
     start: [f64; M],
@@ -71,19 +84,17 @@ impl<const M: usize> Hodographs<M> {
         let bounds = [f64::INFINITY; 4];
         let mut own = Self { start: polygon.start, degree, rational, rows, weights, sizes, bounds };
         if rational {
-            derive(ways, degree, 4, &mut own.rows);
-            derive(of_weights, degree, 4, &mut own.weights);
+            derive(ways, 1.0, degree, 4, &mut own.rows);
+            derive(of_weights, 1.0, degree, 4, &mut own.weights);
         } else {
-            derive(ways, degree, 1, &mut own.rows[..1]);
+            with_degree!(degree, n, derive(ways, 1.0, n, 1, &mut own.rows[..1]));
             // From the steps themselves: differences of sums of them lose digits.
             let mut slopes = [[0.0; M]; MOST + 1];
             slopes[..degree].copy_from_slice(steps);
-            let scale = degree as f64;
-            let [_, bounds @ ..] = derive(slopes, degree.saturating_sub(1), 5, &mut own.rows[1..]);
-            own.bounds = bounds.map(|length| scale * length);
-            for row in own.rows[1..].iter_mut().flat_map(|rows| &mut rows[..degree]) {
-                *row = vector_of(|k| scale * row[k]);
-            }
+            let [_, bounds @ ..] = with_degree!(degree, n, {
+                derive(slopes, n as f64, n.saturating_sub(1), 5, &mut own.rows[1..])
+            });
+            own.bounds = bounds;
         }
         own
     }
@@ -92,9 +103,11 @@ impl<const M: usize> Hodographs<M> {
     #[inline(always)]
     fn local<const R: usize>(&self, t: f64, rest: f64) -> [[f64; M]; R] {
         let mut c = [[0.0; M]; R];
-        for order in 0..R.min(self.degree + 1) {
-            c[order] = sum(&self.rows[order][..=self.degree - order], t, rest);
-        }
+        with_degree!(self.degree, n, {
+            for order in 0..R.min(n + 1) {
+                c[order] = sum(&self.rows[order][..=n - order], t, rest);
+            }
+        });
         if self.rational {
             let mut w = [0.0; R];
             for order in 0..R.min(self.degree + 1) {
@@ -129,7 +142,7 @@ impl<const M: usize> Hodographs<M> {
         if self.rational {
             self.local::<2>(t, rest)[1]
         } else {
-            sum(&self.rows[1][..self.degree], t, rest)
+            with_degree!(self.degree, n, sum(&self.rows[1][..n], t, rest))
         }
     }
 
@@ -147,7 +160,9 @@ impl<const M: usize> Hodographs<M> {
                 length(&vector_of::<M>(|k| slope[k] * per * scale[k]))
             });
         }
-        dispatch!(Level::new(), _simd => lengths(&self.rows[1][..self.degree], t, rest, factors))
+        dispatch!(Level::new(), _simd => {
+            with_degree!(self.degree, n, lengths(&self.rows[1][..n], t, rest, factors))
+        })
     }
 
     /// The first three derivatives by t.
@@ -158,9 +173,11 @@ impl<const M: usize> Hodographs<M> {
             return rates;
         }
         let mut rates = [[0.0; M]; 3];
-        for order in 1..=self.degree.min(3) {
-            rates[order - 1] = sum(&self.rows[order][..=self.degree - order], t, rest);
-        }
+        with_degree!(self.degree, n, {
+            for order in 1..=n.min(3) {
+                rates[order - 1] = sum(&self.rows[order][..=n - order], t, rest);
+            }
+        });
         rates
     }
 
@@ -168,9 +185,11 @@ impl<const M: usize> Hodographs<M> {
     #[inline(always)]
     pub fn rates_at_each<const K: usize>(&self, t: &[f64; K], rest: &[f64; K]) -> [[[f64; K]; M]; 3] {
         let mut rates = [[[0.0; K]; M]; 3];
-        for order in 1..=self.degree.min(3) {
-            rates[order - 1] = sum_at_each(&self.rows[order][..=self.degree - order], t, rest);
-        }
+        with_degree!(self.degree, n, {
+            for order in 1..=n.min(3) {
+                rates[order - 1] = sum_at_each(&self.rows[order][..=n - order], t, rest);
+            }
+        });
         rates
     }
 
@@ -252,31 +271,34 @@ fn lengths<const M: usize, const K: usize>(
     sum
 }
 
-/// The coefficients, times binomials, of a function of this degree and of its first derivatives; returns the greatest lengths of
-/// the coefficients of so many orders.
+/// The coefficients, times binomials and a factor, of a function of this degree and of its first derivatives; returns the greatest
+/// lengths of the coefficients of so many orders, times the factor.
+#[inline(always)]
 fn derive<const M: usize>(
     mut rows: Rows<M>,
+    factor: f64,
     degree: usize,
     orders: usize,
     found: &mut [Rows<M>],
 ) -> [f64; 5] {
     let mut squares = [0.0_f64; 5];
-    for order in 0..orders.min(degree + 1) {
+    for order in 0..5.min(orders).min(degree + 1) {
         let count = degree - order;
-        for i in 0..=count {
-            squares[order] = squares[order].max(inner(&rows[i], &rows[i]));
+        let rows = &mut rows[..=count];
+        for row in &*rows {
+            squares[order] = squares[order].max(inner(row, row));
         }
         if let Some(found) = found.get_mut(order) {
-            for i in 0..=count {
-                found[i] = vector_of(|k| BINOMIALS[count][i] * rows[i][k]);
+            for ((found, row), binomial) in found.iter_mut().zip(&*rows).zip(&BINOMIALS[count]) {
+                *found = vector_of(|k| factor * (binomial * row[k]));
             }
         }
         let scale = count as f64;
-        for i in 0..count {
-            rows[i] = vector_of(|k| scale * (rows[i + 1][k] - rows[i][k]));
+        for i in 1..rows.len() {
+            rows[i - 1] = vector_of(|k| scale * (rows[i][k] - rows[i - 1][k]));
         }
     }
-    squares.map(f64::sqrt)
+    squares.map(|square| factor * square.sqrt())
 }
 
 #[cfg(test)]

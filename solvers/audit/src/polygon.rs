@@ -12,7 +12,7 @@
 
 mod nearest;
 
-use super::vectors::length;
+use super::vectors::{length, vector_of};
 
 /// Greatest degree.
 pub const MOST: usize = 9;
@@ -48,7 +48,7 @@ impl<const M: usize> Polygon<M> {
             if i == 0 {
                 start = point;
             } else {
-                steps[i - 1] = std::array::from_fn(|k| point[k] - end[k]);
+                steps[i - 1] = vector_of(|k| point[k] - end[k]);
             }
             end = point;
         }
