@@ -13,8 +13,10 @@ use feedplan_geometry::lanes::eight::Lanes;
 
 /// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
 const LOSS: f64 = 0.05;
-/// It is lowered by this factor until the grid loses no more than the even grid of the resolution.
-const LOWER: f64 = 0.85;
+/// It is lowered by this factor until the grid loses no more than the even grid of the resolution, or than this part of the time
+/// over the square of the resolution.
+const LOWER: f64 = 0.93;
+const LITTLE: f64 = 0.012;
 /// The most parts of an interval.
 const MOST: f64 = 8.0;
 /// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
@@ -47,8 +49,9 @@ pub fn tolerance(resolution: f64) -> f64 {
 /// resolution has `even` parts in each.
 pub fn parts(losses: &[f64], time: f64, resolution: f64, even: u32) -> Vec<u32> {
     let split = |most: f64| move |loss: &f64| (loss / most).cbrt().ceil().clamp(1.0, MOST);
-    let allowed = losses.iter().sum::<f64>() / f64::from(even * even);
-    let mut most = LOSS / (resolution * resolution) * time / losses.len() as f64;
+    let unit = time / (resolution * resolution);
+    let allowed = (losses.iter().sum::<f64>() / f64::from(even * even)).max(LITTLE * unit);
+    let mut most = LOSS * unit / losses.len() as f64;
     while losses.iter().map(|loss| loss / split(most)(loss).powi(2)).sum::<f64>() > allowed {
         most *= LOWER;
     }
@@ -136,7 +139,7 @@ mod tests {
         // By hand: thirds of all lose 1/9; a loss in one of eight places only is split there.
         let (all, one) = ([1e-3; 8], std::array::from_fn::<_, 8, _>(|n| if n == 3 { 8e-3 } else { 0.0 }));
         for losses in [all, one] {
-            let parts = parts(&losses, 1e6, 16.0, 3);
+            let parts = parts(&losses, 1.0, 16.0, 3);
             assert!(lost(&losses, &parts) <= even(&losses) * (1.0 + 1e-12), "{parts:?}");
             let expected = losses.map(|loss| if loss > 0.0 { 3 } else { 1 });
             assert_eq!(parts, expected);
@@ -144,7 +147,7 @@ mod tests {
         for turn in [0.2, 1.0, 2.0] {
             let (losses, time) = losses(turn, 16.0 / 3.0);
             let parts = parts(&losses, time, 16.0, 3);
-            assert!(lost(&losses, &parts) <= even(&losses));
+            assert!(lost(&losses, &parts) <= even(&losses).max(LITTLE * time / 256.0));
             assert!(parts.iter().sum::<u32>() < 3 * parts.len() as u32);
         }
     }
