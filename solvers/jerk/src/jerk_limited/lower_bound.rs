@@ -26,7 +26,6 @@ use std::ops::Range;
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::coarse;
 use super::columns::Columns;
 use super::constraints::{Constraints, RowLayout};
 use super::exact::Exact;
@@ -52,11 +51,13 @@ struct Start {
     tolerance: f64,
 }
 
-/// Beside the plan, with its multipliers.
-const NEAR: Start = Start { below: 1e-3, above: 1e-3, barrier: 1e-3, warm: true, tolerance: 1e-5 };
-/// Far inside the limits.
+/// Beside the plan, with its multipliers, where these are nearly those of the relaxation …
+const BESIDE: Start = Start { below: 1e-3, above: 1e-3, barrier: 1e-3, warm: true, tolerance: 1e-5 };
+/// … and where they are not.
+const NEAR: Start = Start { below: 1e-2, above: 0.1, barrier: 0.03, warm: true, tolerance: 3e-5 };
+/// Far inside the limits, where no solution is found from there.
 const FAR: Start = Start { below: 0.03, above: 0.1, barrier: 1.0, warm: false, tolerance: 3e-5 };
-/// The solution starts near the plan where its multipliers of jerk exceed c by at most this part.
+/// The solution starts beside the plan where its multipliers of jerk exceed c by at most this part.
 const TIGHT: f64 = 2e-5;
 const MAX_ITERATIONS: usize = 60;
 /// The multipliers are balanced until the boxes cost less than this part of the time, at most so many times.
@@ -157,7 +158,7 @@ pub fn part(
 ) -> (Part, Option<Solution>) {
     loosen(planned, &mut space.state.dual);
     let tight = excess(planned.rows, &space.state.dual) <= TIGHT;
-    let starts = if tight { &[NEAR, FAR][..] } else { &[FAR] };
+    let starts = [if tight { BESIDE } else { NEAR }, FAR];
     let lowered = (!tight).then(|| {
         let mut rows = planned.rows.clone();
         speed_limit::lower(&mut rows);
@@ -183,13 +184,7 @@ pub fn part(
             warm: start.warm,
             ..*effort
         };
-        let from =
-            if start.warm { vec![(x, own)] } else { coarse::starts(planned.rows, ends, x, &own, space).0 };
-        x = vec![];
-        let converged = from.into_iter().any(|(near, own)| {
-            x = near;
-            space.solve(planned.rows, ends, &mut x, &own).outcome == Outcome::Converged
-        });
+        let converged = space.solve(planned.rows, ends, &mut x, &own).outcome == Outcome::Converged;
         if converged {
             break;
         }
