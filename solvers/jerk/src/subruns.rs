@@ -166,31 +166,20 @@ fn turn<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, before: &Subru
 }
 
 pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
+    let watch = problem.watch.part(CUTTING).each(problem.width.len());
+    let places = |i: usize| {
+        watch.advance(1);
+        cuts(problem, i)
+    };
+    let mut all: Vec<Cuts> = (0..problem.width.len()).into_par_iter().map(places).collect();
     let mut out: Vec<Subrun> = vec![];
     for (run, pair) in problem.runs.windows(2).enumerate() {
         let mut rests = true;
         for i in pair[0]..pair[1] {
-            problem.watch.part(CUTTING).each(problem.width.len()).count(i);
-            let (cuts, cusped) = cusps(problem, i);
-            let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
-            let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
-            for u in slow_points(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
-                cuts.push((u, turn_speed(problem, i, u) < CREEP));
-                let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
-                cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
-            }
-            cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
-            let inside = AT_END * problem.width[i]..=(1.0 - AT_END) * problem.width[i];
-            cuts.retain(|(u, _)| inside.contains(u));
-            cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
-            cuts.dedup_by(|b, a| {
-                let same = b.0 - a.0 <= AT_END * problem.width[i];
-                a.1 |= same && b.1;
-                same
-            });
+            let Cuts { inside, cusped } = std::mem::take(&mut all[i]);
             rests |= i > pair[0] && problem.junction_speed[i] == 0.0;
             let (mut from, mut rest) = (0.0, rests || cusped[0]);
-            for (to, then) in cuts.into_iter().chain([(problem.width[i], false)]) {
+            for (to, then) in inside.into_iter().chain([(problem.width[i], false)]) {
                 if rest {
                     out.push(Subrun { number: out.len(), run, parts: vec![], ends: [0.0; 2] });
                 }
@@ -213,6 +202,36 @@ pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
     out[0].ends[0] = on_path(problem.start_speed, 0, 0.0);
     out[last].ends[1] = on_path(problem.end_speed, end, problem.width[end]);
     out
+}
+
+/// Where a piece is cut.
+#[derive(Default)]
+struct Cuts {
+    /// Rising parameters inside it, and whether the tool must rest there.
+    inside: Vec<(f64, bool)>,
+    /// Whether it must at either end.
+    cusped: [bool; 2],
+}
+
+fn cuts<const M: usize>(problem: &Problem<M>, i: usize) -> Cuts {
+    let (cusps, cusped) = cusps(problem, i);
+    let mut cuts: Vec<(f64, bool)> = cusps.into_iter().map(|u| (u, true)).collect();
+    let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
+    for u in slow_points(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
+        cuts.push((u, turn_speed(problem, i, u) < CREEP));
+        let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
+        cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
+    }
+    cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
+    let inside = AT_END * problem.width[i]..=(1.0 - AT_END) * problem.width[i];
+    cuts.retain(|(u, _)| inside.contains(u));
+    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    cuts.dedup_by(|b, a| {
+        let same = b.0 - a.0 <= AT_END * problem.width[i];
+        a.1 |= same && b.1;
+        same
+    });
+    Cuts { inside: cuts, cusped }
 }
 
 /// Parameters inside piece `i` at which the tool must rest, and whether it must at either end.
