@@ -16,7 +16,7 @@ const LOSS: f64 = 0.05;
 /// It is lowered by this factor until the grid loses no more than the even grid of the resolution, or than this part of the time
 /// over the square of the resolution.
 const LOWER: f64 = 0.93;
-const LITTLE: f64 = 0.012;
+const LITTLE: f64 = 0.003;
 /// The most parts of an interval.
 const MOST: f64 = 8.0;
 /// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
@@ -139,7 +139,7 @@ mod tests {
         // By hand: thirds of all lose 1/9; a loss in one of eight places only is split there.
         let (all, one) = ([1e-3; 8], std::array::from_fn::<_, 8, _>(|n| if n == 3 { 8e-3 } else { 0.0 }));
         for losses in [all, one] {
-            let parts = parts(&losses, 1.0, 16.0, 3);
+            let parts = parts(&losses, 50.0, 16.0, 3);
             assert!(lost(&losses, &parts) <= even(&losses) * (1.0 + 1e-12), "{parts:?}");
             let expected = losses.map(|loss| if loss > 0.0 { 3 } else { 1 });
             assert_eq!(parts, expected);
