@@ -129,7 +129,7 @@ fn lines_take_as_long_as_seven_sections() {
         let length = 10f64.powi(exponent);
         let line = Line::new(length);
         let problem = problem(&line, FAST);
-        for (resolution, most) in [(16.0, 1e-5), (64.0, 1e-6)] {
+        for (resolution, most) in [(16.0, 1e-5), (64.0, 2e-6)] {
             let plan =
                 plan(&problem, &Effort { resolution, ..proving() }).expect("the line can be travelled");
             let part = plan.time / seven_sections(length, FAST) - 1.0;
