@@ -12,7 +12,7 @@ use super::intersample_check::IntersampleCheck;
 use feedplan_geometry::lanes::eight::Lanes;
 
 /// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
-const LOSS: f64 = 0.05;
+const LOSS: f64 = 0.067;
 /// It is lowered by this factor until the grid loses no more than the even grid of the resolution, or than this part of the time
 /// over the square of the resolution.
 const LOWER: f64 = 0.93;

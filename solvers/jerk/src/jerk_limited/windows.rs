@@ -40,7 +40,7 @@ const EASE: usize = 20;
 /// Least travel time from cut to cut, in the same stop times.
 const LONG: f64 = 36.0;
 /// Intervals of an even grid in one of the grid of rough plans.
-const COARSE: u32 = 4;
+const COARSE: u32 = 3;
 /// No part of an interval is shorter than this part of the path: arc lengths have no digits for less.
 const SHORTEST: f64 = rest_ramp::SHORTEST / 16.0;
 /// The share of the rough plans in the work.
