@@ -8,7 +8,7 @@
 //! | `knots`, `extract` | a checked B-spline or NURBS; its pieces |
 //! | `circle` | pieces of arcs and helices |
 //! | `bezier`, `rational` | values and derivatives of a piece, parts of it, the same of another degree |
-//! | `joints`, `cusps` | how neighbours meet; where C' is 0 |
+//! | `cusps` | where C' is 0 |
 //! | `regular` | the same curve as pieces without a cusp inside |
 //! | `speed`, `length` | \|C'\| with bounds of its derivatives; the length and its inverse |
 //! | `error` | what is wrong with a spline that a user gives |
@@ -18,7 +18,6 @@ pub mod circle;
 pub mod cusps;
 pub mod error;
 pub mod extract;
-pub mod joints;
 pub mod knots;
 pub mod length;
 pub mod rational;

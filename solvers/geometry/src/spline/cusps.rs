@@ -6,35 +6,15 @@
 //! to √ε.
 
 use super::rational::Hodograph;
-use super::{binomial, CompositeCurve, Piece, MAX_HODOGRAPH, MAX_SQUARE};
+use super::{binomial, Piece, MAX_HODOGRAPH, MAX_SQUARE};
 use crate::quadratic::dot;
 use crate::tolerance::SQUARE_ROUNDING;
-use crate::watch::Watch;
 
 /// Greatest number of halvings: intervals are then as short as the spacing of numbers near 1.
 const MAX_DEPTH: u32 = 52;
 
-/// A place where |C'| is at most a given fraction of its greatest value on the piece; of neighbours the one with the least
-/// |C'|.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cusp {
-    pub piece: usize,
-    pub u: f64,
-}
-
-/// The cusps of each piece in order, with its ends. A piece of length zero has one, at its start.
-pub fn cusps<const M: usize>(curve: &CompositeCurve<M>, tolerance: f64, watch: Watch) -> Vec<Cusp> {
-    let mut found = vec![];
-    for (i, piece) in curve.pieces().enumerate() {
-        watch.each(curve.len()).count(i);
-        for t in piece_cusps(&piece, tolerance) {
-            found.push(Cusp { piece: i, u: t * piece.width });
-        }
-    }
-    found
-}
-
-/// The cusps of one piece by t = u / width in [0, 1].
+/// The cusps of a piece by t = u / width in [0, 1]: places where |C'| is at most a part `tolerance` of its greatest value on the
+/// piece, of neighbours the one with the least |C'|. Ends count; a piece of length zero has one, at its start.
 pub fn piece_cusps<const M: usize>(piece: &Piece<M>, tolerance: f64) -> Vec<f64> {
     let hodograph = Hodograph::new(piece);
     let h = hodograph.coefficients();
