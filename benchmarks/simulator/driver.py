@@ -115,20 +115,18 @@ class Simulator:
         with open(file, "rb") as rows:
             ready = min(READY, sum(not row.startswith(b"#") for row in rows))
         feeder = subprocess.Popen(["halstreamer", file])
-        end = time.monotonic() + seconds
 
-        def wait(done) -> None:
-            while not done(hal.get_value("streamer.0.curr-depth")):
-                if time.monotonic() > end:
-                    feeder.kill()
-                    raise TimeoutError(f"the stream did not end in {seconds:g} s")
-                time.sleep(0.02)
+        def depth() -> int:
+            return hal.get_value("streamer.0.curr-depth")
 
         # HAL tells the rows in its memory once in a period, which may come late: the end of the feeder tells
         # nothing of them.
-        wait(lambda depth: depth >= ready)
-        self.pins["play"] = True
-        wait(lambda depth: feeder.poll() is not None and depth == 0)
+        try:
+            self.wait(lambda _: depth() >= ready, seconds)
+            self.pins["play"] = True
+            self.wait(lambda _: feeder.poll() is not None and depth() == 0, seconds)
+        finally:
+            feeder.kill()
         time.sleep(0.05)
         self.pins["play"] = False
 
