@@ -168,7 +168,7 @@ fn turn<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, before: &Subru
 pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
     let watch = problem.watch.part(CUTTING).each(problem.width.len());
     let places = |i: usize| {
-        watch.advance(1);
+        watch.count(i);
         cuts(problem, i)
     };
     let mut all: Vec<Cuts> = (0..problem.width.len()).into_par_iter().map(places).collect();

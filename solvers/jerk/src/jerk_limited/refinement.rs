@@ -13,9 +13,9 @@ use feedplan_geometry::lanes::eight::Lanes;
 
 /// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
 const LOSS: f64 = 0.067;
-/// It is lowered by this factor until the grid loses no more than the even grid of the resolution, or than this part of the time
-/// over the square of the resolution.
+/// It is lowered by this factor until the grid loses no more in all than the even grid of the resolution.
 const LOWER: f64 = 0.93;
+/// A grid whose loss is at most this part of the time, over the square of the resolution, is fine enough.
 const LITTLE: f64 = 0.003;
 /// The most parts of an interval.
 const MOST: f64 = 8.0;
@@ -45,8 +45,8 @@ pub fn tolerance(resolution: f64) -> f64 {
     GAP * LOSS / (resolution * resolution)
 }
 
-/// In how many parts each coarse interval is to be split, of losses in s; the intervals take `time` in all. The even grid of the
-/// resolution has `even` parts in each.
+/// The number of parts in which each coarse interval is to be split. `losses` are those of the intervals, in s, and `time` is the
+/// time on all of them. The even grid of the resolution has `even` parts in each.
 pub fn parts(losses: &[f64], time: f64, resolution: f64, even: u32) -> Vec<u32> {
     let split = |most: f64| move |loss: &f64| (loss / most).cbrt().ceil().clamp(1.0, MOST);
     let unit = time / (resolution * resolution);
