@@ -107,7 +107,7 @@ def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
     try:
         with io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as stream:
             at = 0
-            for number in sorted(number for number in wanted if number > at):
+            for number in sorted(number for number in wanted if number > 0):
                 line = next(islice(stream, number - at - 1, None), None)
                 if line is None:
                     break
