@@ -19,11 +19,11 @@ from feedplan.program.gcode import Options
 from feedplan.program.program import Program
 
 __all__ = [
-    "Curve", "CurveLength", "Moves", "PlanError", "Problem", "Profile", "Sampler",
-    "SetpointAudit", "__version__", "audit_joints", "audit_plan", "build_path", "csv_rows", "feed_between",
+    "Curve", "CurveLength", "Moves", "PlanError", "Problem", "Profile", "Sampler", "SetpointAudit",
+    "__version__", "audit_joints", "audit_plan", "buckets", "build_path", "csv_rows", "feed_between",
     "joint_derivatives", "joint_enclosures", "joint_interpolants", "joint_path", "joint_positions",
     "look_ahead", "lower_bound", "path_segments", "plan_bang_bang", "plan_jerk_limited", "plan_s_curve",
-    "profile_of_sections", "read_gcode",
+    "profile_of_sections", "read_gcode", "thin",
 ]  # fmt: skip
 
 _Floats = NDArray[np.float64]
@@ -90,6 +90,8 @@ class Sampler:
     def along(self, piece: _Naturals, u: _Floats) -> _Chunk: ...
 
 def csv_rows(values: _Floats, last: NDArray[np.int32]) -> bytes: ...
+def buckets(values: _Floats, weight: _Floats, width: int) -> tuple[_Integers, _Floats]: ...
+def thin(points: _Floats, cost: _Floats, tolerance: float) -> tuple[_Integers, _Floats]: ...
 
 @final
 class Moves:

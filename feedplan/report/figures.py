@@ -53,8 +53,8 @@ class SetpointFigures:
         if len(chunk.t) == 0:
             return
         speed = self._path.add(chunk)
-        curves = np.column_stack((speed, chunk.velocity, chunk.acceleration, chunk.jerk))
-        self._curves.add(chunk.t, curves, chunk.line.astype(np.int64))
+        rates = (chunk.velocity, chunk.acceleration, chunk.jerk)
+        self._curves.add(chunk.t, chunk.line, speed[:, None], *rates)
         self.count += len(chunk.t)
         self.duration = float(chunk.t[-1])
 
@@ -101,9 +101,8 @@ def over_length(
     is_cut = np.isfinite(problem.path.feed)[profile.piece.astype(np.int64)]
     top = cutting = 0.0
     for block in limit_samples(problem, profile, motion, progress):
-        table = np.column_stack([getattr(block, name) for name in names])
-        piece = profile.piece[block.phase].astype(np.int64)
-        curves.add(block.length, table, problem.path.line[piece].astype(np.int64))
+        line = problem.path.line[profile.piece[block.phase]]
+        curves.add(block.length, line, *(getattr(block, name)[:, None] for name in names))
         speed = block.speed[np.isfinite(block.speed)]
         top = max(top, float(speed.max(initial=0.0)))
         cut = block.speed[is_cut[block.phase]]

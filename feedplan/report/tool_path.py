@@ -56,13 +56,13 @@ class ToolPath:
         points, speed = self._tool(chunk)
         if len(chunk) == 0:
             return speed
-        position = path_position(self._problem, chunk.piece, chunk.u)
         length = self._lengths(chunk.t, speed)
-        tags = (chunk.line, np.round(1e6 * chunk.t), np.round(1e6 * length), position)
-        table = np.column_stack([tag.astype(np.int64) for tag in tags])
-        self._path.add(np.column_stack((points, self._speed_weight * speed)), table)
-        self._top = max(self._top, float(speed.max()))
-        self._cutting = max(self._cutting, float(speed[self._is_cut[chunk.piece]].max(initial=0.0)))
+        weighted = np.column_stack((points, self._speed_weight * speed))
+        self._path.add(weighted, chunk.line, chunk.t, length, chunk.piece, chunk.u)
+        top = float(speed.max())
+        self._top = max(self._top, top)
+        if top > self._cutting:
+            self._cutting = max(self._cutting, float(speed[self._is_cut[chunk.piece]].max(initial=0.0)))
         return speed
 
     def mark(self, chunk: SetpointChunk, time: float) -> None:
@@ -80,18 +80,18 @@ class ToolPath:
         colour scale. `unit` is that of the length: mm, or deg if only rotary axes move.
         """
         kept, tags, tolerance = self._path.result(points, 0.0 if points is None else self._overview)
-        kept = kept if kept.size else np.empty((0, 4))
-        tags = tags if tags.size else np.empty((0, 4), np.int64)
-        feed = self._problem.path.feed[tags[:, 3] >> 20]
-        moment = activity.at(tags[:, 3])
+        empty: Any = np.empty((5, 0), np.int64)
+        line, t, length, piece, u = tags or empty
+        feed = self._problem.path.feed[piece]
+        moment = activity.at(path_position(self._problem, piece, u))
         known = len(activity.weight) > 0
         return {
             **{name: kept[:, k] for k, name in enumerate("xyz")},
             "speed": kept[:, 3] / self._speed_weight,
-            "line": tags[:, 0],
-            "time": 1e-6 * tags[:, 1],
-            "length": 1e-6 * tags[:, 2],
-            "feed": np.where(np.isfinite(feed), self._problem.feed[tags[:, 3] >> 20], 0.0),
+            "line": line,
+            "time": t.round(6),
+            "length": length.round(6),
+            "feed": np.where(np.isfinite(feed), self._problem.feed[piece], 0.0),
             "active": (activity.active[moment] if known else moment).astype(np.uint8),
             "lost": np.round(
                 255.0 * np.clip(1.0 - activity.pace[moment] if known else 0.0 * moment, 0.0, 1.0)

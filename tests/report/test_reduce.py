@@ -17,7 +17,7 @@ def envelope(values: np.ndarray, points: int, cuts: tuple[int, ...] = ()) -> Env
     result = Envelope(len(values), points)
     x, tag = np.arange(len(values), dtype=float), np.arange(len(values)) * 10
     for first, last in zip((0, *cuts), (*cuts, len(values)), strict=True):
-        result.add(x[first:last], values[first:last], tag[first:last])
+        result.add(x[first:last], tag[first:last], values[first:last])
     return result
 
 
@@ -59,7 +59,7 @@ def test_the_mean_is_over_x_not_over_samples() -> None:
     # Nine tenths of the samples are in the first tenth of x, where the value is 1; elsewhere it is 0.
     x = np.concatenate([np.linspace(0.0, 0.1, 900), np.linspace(0.1, 1.0, 101)[1:]])
     curves = Envelope(1000, 2)
-    curves.add(x, (x <= 0.1).astype(float)[:, None])
+    curves.add(x, np.zeros(1000, np.int32), (x <= 0.1).astype(float)[:, None])
     assert curves.mean(0, 10)[1] == pytest.approx([0.1])
 
 
@@ -99,9 +99,11 @@ def polyline(
     points: np.ndarray, limit: int, tolerance: float, size: int = 1000
 ) -> tuple[np.ndarray, np.ndarray, float]:
     result = Polyline(limit, tolerance)
+    columns = np.pad(points, ((0, 0), (0, 4 - points.shape[1])))
     for first in range(0, len(points), size):
-        result.add(points[first : first + size], np.arange(first, min(first + size, len(points))))
-    return result.result()
+        result.add(columns[first : first + size], np.arange(first, min(first + size, len(points))))
+    kept, (tag,), tolerance = result.result()
+    return kept[:, : points.shape[1]], tag, tolerance
 
 
 def test_a_square_of_many_points_is_reduced_to_its_corners() -> None:
@@ -135,6 +137,6 @@ def test_every_sample_stays_within_the_returned_tolerance() -> None:
 
 
 def test_zero_points_and_one_point_can_be_reduced() -> None:
-    assert Polyline(10, 1.0).result()[1].size == 0
+    assert Polyline(10, 1.0).result()[0].size == 0
     assert len(polyline(np.zeros((1, 3)), 10, 1.0)[0]) == 1
     assert len(polyline(np.zeros((5000, 3)), 10, 1.0)[0]) == 2

@@ -18,6 +18,7 @@ mod path;
 mod plan;
 mod problem;
 mod profile;
+mod reduce;
 mod sampling;
 mod setpoint_audit;
 mod views;
@@ -58,6 +59,8 @@ mod _solvers {
     use problem::{PlanError, Problem};
     #[pymodule_export]
     use profile::Profile;
+    #[pymodule_export]
+    use reduce::{buckets, thin};
     #[pymodule_export]
     use sampling::PySampler;
     #[pymodule_export]

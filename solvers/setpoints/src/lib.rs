@@ -1,7 +1,8 @@
-//! From a speed profile to the motion at any time: setpoints, and their text.
+//! From a speed profile to the motion at any time: setpoints, their text, and the few of them that a chart shows.
 
 pub mod csv;
 pub mod phase_motion;
+pub mod reduce;
 pub mod sampling;
 
 use std::ops::Range;

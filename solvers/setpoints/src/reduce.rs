@@ -1,0 +1,83 @@
+//! Millions of samples as the few points that a chart shows.
+
+/// The columns of the points of a line.
+const D: usize = 4;
+/// A pass over the points of a line is idle where it removes no more than one in so many.
+const FEW: usize = 50;
+
+/// The extremes and the mean of each bucket of `width` consecutive rows of `values`, column by column: the rows of the least and
+/// the greatest value, in order, and the sum of `weight` times value. A value that is not a number is an extreme only where the
+/// bucket has no other.
+pub fn buckets(values: &[f64], columns: usize, weight: &[f64], width: usize) -> (Vec<[i64; 2]>, Vec<f64>) {
+    let (mut extremes, mut sums) = (Vec::new(), Vec::new());
+    for column in 0..columns {
+        for (bucket, (rows, weight)) in values.chunks(width * columns).zip(weight.chunks(width)).enumerate() {
+            let (mut least, mut greatest, mut sum) = ((f64::INFINITY, 0), (f64::NEG_INFINITY, 0), 0.0);
+            for (i, (row, weight)) in rows.chunks(columns).zip(weight).enumerate() {
+                let value = row[column];
+                sum += weight * value;
+                if value < least.0 {
+                    least = (value, i);
+                }
+                if value > greatest.0 {
+                    greatest = (value, i);
+                }
+            }
+            let pair = [least.1.min(greatest.1), least.1.max(greatest.1)];
+            extremes.push(pair.map(|i| (bucket * width + i) as i64));
+            sums.push(sum);
+        }
+    }
+    (extremes, sums)
+}
+
+/// Leaves out points of a line that are within `tolerance` of the segment between their neighbours. `cost` is the part of the
+/// tolerance that is used between each point and the next; returned are the rows of the points that stay, and theirs.
+pub fn thin(points: &[[f64; D]], cost: &[f64], tolerance: f64) -> (Vec<i64>, Vec<f64>) {
+    let mut left: Vec<(usize, f64)> = cost.iter().copied().enumerate().collect();
+    let (mut idle, mut first) = (0, 1);
+    while idle < 2 && left.len() > 2 {
+        let (before, mut stay) = (left.len(), first);
+        // Every second point is a candidate: its neighbours stay.
+        for i in (first..before).step_by(2) {
+            let (row, own) = left[i];
+            let Some(&next) = left.get(i + 1) else {
+                left[stay] = (row, own);
+                stay += 1;
+                break;
+            };
+            let last = &mut left[stay - 1];
+            let total = last.1.max(own) + distance(&points[row], &points[last.0], &points[next.0]);
+            if total <= tolerance {
+                last.1 = total;
+            } else {
+                left[stay] = (row, own);
+                stay += 1;
+            }
+            left[stay] = next;
+            stay += 1;
+        }
+        left.truncate(stay);
+        idle = if before - stay <= stay / FEW { idle + 1 } else { 0 };
+        first = 3 - first;
+    }
+    left.into_iter().map(|(row, cost)| (row as i64, cost)).unzip()
+}
+
+/// Distance of a point from the segment a–b.
+fn distance(point: &[f64; D], a: &[f64; D], b: &[f64; D]) -> f64 {
+    let (way, along) = (minus(point, a), minus(b, a));
+    let square = dot(&along, &along);
+    let part = dot(&way, &along) / if square > 0.0 { square } else { 1.0 };
+    let part = part.clamp(0.0, 1.0);
+    let off = std::array::from_fn(|k| way[k] - part * along[k]);
+    dot(&off, &off).sqrt()
+}
+
+fn minus(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn dot(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3])
+}
