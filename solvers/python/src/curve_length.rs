@@ -8,7 +8,7 @@ use super::curve::{check_places, Curve};
 use super::memory;
 use super::native::InAxes;
 use super::work::run;
-use feedplan_geometry::spline::length::CurveLength as Kernel;
+use feedplan_geometry::spline::length::{CurveLength as Kernel, Measured};
 
 /// The lengths along a curve.
 #[pyclass(frozen, module = "feedplan._solvers")]
@@ -33,8 +33,7 @@ impl CurveLength {
         let (axes, width) = (curve.axes(), curve.widths().to_vec());
         with_padded_axes!(axes, M, {
             let pieces = curve.padded::<M>()?;
-            let lengths =
-                InAxes::new(run(py, progress.as_ref(), |watch| Kernel::new(pieces, accuracy, watch))?);
+            let lengths = InAxes::new(run(py, progress.as_ref(), |watch| pieces.lengths(accuracy, watch))?);
             py.detach(memory::give_back);
             Ok(Self { axes, lengths, width })
         })

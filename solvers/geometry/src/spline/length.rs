@@ -9,10 +9,19 @@ use super::cusps::piece_cusps;
 use super::speed::{Coefficients, Speed};
 use super::{CompositeCurve, Piece};
 use crate::arc_length::{quadrature, tabulate, Length, Node, QuadraticSpeed, Table};
+use crate::instances;
 use crate::inverse_length::{self, Located};
 use crate::newton;
 use crate::tolerance::CUSP;
 use crate::watch::Watch;
+
+instances! {
+    /// Curves whose lengths can be measured.
+    pub trait Measured for [3, 6, 9] CompositeCurve<M> = {
+        /// See `CurveLength::new`.
+        fn lengths(&self, accuracy: f64, watch: Watch) -> CurveLength<M> = CurveLength::new;
+    }
+}
 
 /// A place on a curve: its piece, its parameter, and how it was found.
 #[derive(Clone, Copy, Debug)]

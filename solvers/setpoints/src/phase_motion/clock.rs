@@ -9,7 +9,7 @@ mod cubic;
 use super::lengths::{fill, PiecePath, SLOW};
 use super::pace::{time_of_way, Pace};
 use super::part::Part;
-use super::rate::{FromRest, Line};
+use super::rate::{FromRest, Line, Rate};
 pub use cubic::Cubic;
 use feedplan_geometry::arc_length::{Integrand, Node, Table};
 use feedplan_geometry::inverse_length::{self, Located};
@@ -181,31 +181,28 @@ impl SpeedLine {
             _ => None,
         };
         let mut made = Self { law: phase.law, line, rest, times: vec![], time_error: 0.0 };
-        let mut times = vec![];
-        made.time_error = match made.time_from_rest(path) {
-            Some(f) => fill(f, (0.0, (u1 - u0).sqrt()), &mut times),
-            None => fill(path.rate(phase.law, line), (u0, u1), &mut times),
+        let rate = path.bounded(phase.law, line);
+        (made.times, made.time_error) = match made.from_rest(&rate) {
+            Some(f) => fill(f, (0.0, (u1 - u0).sqrt())),
+            None => fill(rate, (u0, u1)),
         };
-        Self { times, ..made }
+        made
     }
 
-    fn time_from_rest<'a, const M: usize>(&self, path: &'a PiecePath<M>) -> Option<FromRest<'a, M>> {
-        self.rest.map(|(place, sign)| FromRest {
-            source: path.rate(self.law, self.line).source,
-            place,
-            sign,
-            slope: self.line.slope.abs(),
-        })
+    fn from_rest<'a, const M: usize>(&self, rate: &Rate<'a, M>) -> Option<FromRest<'a, M>> {
+        let (source, slope) = (rate.source, self.line.slope.abs());
+        self.rest.map(|(place, sign)| FromRest { source, place, sign, slope })
     }
 
     /// The place when these parts of the duration are done and left, within an error in parts of the duration.
     pub fn place<const M: usize>(&self, path: &PiecePath<M>, done: f64, left: f64, error: f64) -> Located {
-        match self.time_from_rest(path) {
+        let rate = path.rate(self.law, self.line);
+        match self.from_rest(&rate) {
             Some(f) => {
                 let found = self.invert(f, if f.sign > 0.0 { done } else { left }, error);
                 Located { u: f.u(found.u), ..found }
             }
-            None => self.invert(path.rate(self.law, self.line), done, error),
+            None => self.invert(rate, done, error),
         }
     }
 
@@ -218,7 +215,8 @@ impl SpeedLine {
 
     /// The part of the duration that has passed at u.
     pub fn done<const M: usize>(&self, path: &PiecePath<M>, u: f64) -> f64 {
-        match self.time_from_rest(path) {
+        let rate = path.rate(self.law, self.line);
+        match self.from_rest(&rate) {
             Some(f) => {
                 let table = Table { f, nodes: &self.times };
                 let done = table.integral((u - f.place).abs().sqrt()) / table.total();
@@ -229,7 +227,7 @@ impl SpeedLine {
                 }
             }
             None => {
-                let table = Table { f: path.rate(self.law, self.line), nodes: &self.times };
+                let table = Table { f: rate, nodes: &self.times };
                 table.integral(u) / table.total()
             }
         }

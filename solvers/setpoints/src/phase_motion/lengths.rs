@@ -37,10 +37,8 @@ pub struct PiecePath<'a, const M: usize> {
     piece: Piece<'a, M>,
     feed: Counts<M>,
     way: Counts<M>,
-    /// The end of the piece where C' vanishes; not a number where it does not.
-    foot: f64,
     /// Of the axes, of the feed, of the way.
-    tables: [OnceCell<Lengths<M>>; 3],
+    lengths: [OnceCell<Lengths<'a, M>>; 3],
     /// A place, and the square of the length per u there.
     last_square: [Cell<[f64; 2]>; 3],
 }
@@ -50,14 +48,8 @@ const AXES: usize = 0;
 impl<'a, const M: usize> PiecePath<'a, M> {
     /// What counts at the feed, and in laws about the way along the path. On a speed line shares do not count.
     pub fn new(piece: Piece<'a, M>, feed: Counts<M>, way: Counts<M>) -> Self {
-        let square = |u: f64| {
-            let q = derivatives(&piece, u)[1];
-            dot(&q, &q)
-        };
-        let least = SLOW * square(0.5 * piece.width);
-        let foot = [0.0, piece.width].into_iter().find(|&u| square(u) <= least).unwrap_or(f64::NAN);
         let last_square = [const { Cell::new([f64::NAN; 2]) }; 3];
-        Self { piece, feed, way, foot, tables: Default::default(), last_square }
+        Self { piece, feed, way, lengths: Default::default(), last_square }
     }
 
     pub(super) fn piece(&self) -> &Piece<'a, M> {
@@ -77,12 +69,12 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         matches!(self.counts(law).1, Counts::Tip(_))
     }
 
-    fn lengths(&self, number: usize, counts: &Counts<M>) -> &Lengths<M> {
-        self.tables[number].get_or_init(|| Lengths::new(&self.piece, counts, self.foot))
+    fn lengths(&self, number: usize, counts: &Counts<M>) -> &Lengths<'a, M> {
+        self.lengths[number].get_or_init(|| Lengths::new(self.piece, counts))
     }
 
     /// The length that a law is about.
-    fn of(&self, law: PhaseLaw) -> &Lengths<M> {
+    fn of(&self, law: PhaseLaw) -> &Lengths<'a, M> {
         let (number, counts) = self.counts(law);
         self.lengths(number, counts)
     }
@@ -101,19 +93,22 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         }
         let table = lengths.table();
         let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()));
-        Located { miss: found.miss + lengths.error, ..found }
+        Located { miss: found.miss + lengths.error(), ..found }
     }
 
     /// The length of a phase from one quadrature.
     pub(super) fn rough_length(&self, phase: &Phase) -> f64 {
-        let (_, counts) = self.counts(phase.law);
-        let speeds = Speeds::new(&self.piece, counts);
-        quadrature(&speeds.rate(self.foot, Line::ONE), phase.u0, phase.u1)
+        quadrature(&self.rate(phase.law, Line::ONE), phase.u0, phase.u1)
     }
 
     /// The time per u of a speed line.
     pub(super) fn rate(&self, law: PhaseLaw, line: Line) -> Rate<'_, M> {
-        self.of(law).speeds.rate(self.foot, line)
+        self.of(law).rate(line)
+    }
+
+    /// The same with the bounds that a table is built by.
+    pub(super) fn bounded(&self, law: PhaseLaw, line: Line) -> Rate<'_, M> {
+        self.of(law).bounded(line)
     }
 
     /// Square of the length per u.
@@ -184,7 +179,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
             Some(even) => 4.0 * f64::EPSILON * even * self.piece.width,
             None => lengths.table().rounding(),
         };
-        [rounding, lengths.error]
+        [rounding, lengths.error()]
     }
 }
 
@@ -220,7 +215,6 @@ impl<const M: usize> Speeds<M> {
         }
     }
 
-    /// The values alone.
     fn source(&self) -> Source<'_, M> {
         match self {
             Self::Tip { square, width } => Source::Tip(Tip { square, width: *width }),
@@ -229,39 +223,24 @@ impl<const M: usize> Speeds<M> {
             }
         }
     }
-
-    /// Over the root of v², with the bounds that tables are built by.
-    fn rate(&self, foot: f64, line: Line) -> Rate<'_, M> {
-        let source = match self.source() {
-            Source::Own(speed) if foot.is_nan() => Source::Own(speed.without_foot()),
-            Source::Own(speed) => Source::Own(speed.with_foot(foot)),
-            tip => tip,
-        };
-        Rate { source, line, foot }
-    }
 }
 
-/// A table of a length with its proven error.
-struct Lengths<const M: usize> {
+/// A length of a piece, with a table of it that is filled when it is first asked for.
+struct Lengths<'a, const M: usize> {
+    piece: Piece<'a, M>,
     speeds: Speeds<M>,
     /// The length per u, where it is the same everywhere: on lines.
     even: Option<f64>,
-    foot: f64,
-    nodes: Vec<Node>,
-    error: f64,
+    /// With its proven error.
+    table: OnceCell<(Vec<Node>, f64)>,
     /// A parameter and the length up to it that was asked for last: most phases begin where one has ended.
     last: Cell<[f64; 2]>,
 }
 
-impl<const M: usize> Lengths<M> {
-    fn new(piece: &Piece<M>, counts: &Counts<M>, foot: f64) -> Self {
-        let speeds = Speeds::new(piece, counts);
-        let even = speeds.even();
-        let (mut nodes, mut error) = (vec![], 0.0);
-        if even.is_none() {
-            error = fill(speeds.rate(foot, Line::ONE), (0.0, piece.width), &mut nodes);
-        }
-        Self { speeds, even, foot, nodes, error, last: Cell::new([0.0; 2]) }
+impl<'a, const M: usize> Lengths<'a, M> {
+    fn new(piece: Piece<'a, M>, counts: &Counts<M>) -> Self {
+        let speeds = Speeds::new(&piece, counts);
+        Self { piece, even: speeds.even(), speeds, table: OnceCell::new(), last: Cell::new([0.0; 2]) }
     }
 
     /// The length up to u.
@@ -275,14 +254,43 @@ impl<const M: usize> Lengths<M> {
         length
     }
 
+    /// The length per u over the root of v².
+    fn rate(&self, line: Line) -> Rate<'_, M> {
+        Rate { source: self.speeds.source(), line, foot: f64::NAN }
+    }
+
+    /// The same with the bounds that a table is built by, and the end of the piece where C' vanishes.
+    fn bounded(&self, line: Line) -> Rate<'_, M> {
+        let square = |u: f64| {
+            let q = derivatives(&self.piece, u)[1];
+            dot(&q, &q)
+        };
+        let least = SLOW * square(0.5 * self.piece.width);
+        let foot = [0.0, self.piece.width].into_iter().find(|&u| square(u) <= least).unwrap_or(f64::NAN);
+        let source = match self.speeds.source() {
+            Source::Own(speed) if foot.is_nan() => Source::Own(speed.without_foot()),
+            Source::Own(speed) => Source::Own(speed.with_foot(foot)),
+            tip => tip,
+        };
+        Rate { source, line, foot }
+    }
+
+    fn filled(&self) -> &(Vec<Node>, f64) {
+        self.table.get_or_init(|| fill(self.bounded(Line::ONE), (0.0, self.piece.width)))
+    }
+
     fn table(&self) -> Table<'_, Rate<'_, M>> {
-        let f = Rate { source: self.speeds.source(), line: Line::ONE, foot: self.foot };
-        Table { f, nodes: &self.nodes }
+        Table { f: self.rate(Line::ONE), nodes: &self.filled().0 }
+    }
+
+    fn error(&self) -> f64 {
+        self.even.map_or_else(|| self.filled().1, |_| 0.0)
     }
 }
 
-/// Tabulates f from one end to another; its proven error.
-pub(super) fn fill<F: Integrand>(f: F, ends: (f64, f64), nodes: &mut Vec<Node>) -> f64 {
-    let estimate = quadrature(&f, ends.0, ends.1);
-    tabulate(f, ends.0, ends.1, ERROR * estimate, nodes)
+/// A table of f from one end to another, and its proven error.
+pub(super) fn fill<F: Integrand>(f: F, ends: (f64, f64)) -> (Vec<Node>, f64) {
+    let (estimate, mut nodes) = (quadrature(&f, ends.0, ends.1), Vec::new());
+    let error = tabulate(f, ends.0, ends.1, ERROR * estimate, &mut nodes);
+    (nodes, error)
 }
