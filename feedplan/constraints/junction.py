@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +23,9 @@ def junction_limit(path: Path, max_velocity_jump: NDArray[np.float64]) -> NDArra
     if path.corners is Corners.SMOOTH:
         max_velocity_jump = np.zeros_like(max_velocity_jump)
     with np.errstate(divide="ignore", invalid="ignore"):
-        allowed = np.where(jump > 0, max_velocity_jump / jump, np.inf).min(axis=1)
+        by_axis = np.where(jump > 0, max_velocity_jump / jump, np.inf)
     limit = np.full(len(path) + 1, np.inf)
-    limit[1:-1] = allowed
+    # By axis, because NumPy is slow along short rows.
+    limit[1:-1] = reduce(np.minimum, by_axis.T)
     limit[path.runs] = 0.0
     return limit

@@ -150,7 +150,7 @@ def build_path(
         line=program.line[move[:, 0]],
         runs=runs,
         dwell=program.dwell[move[runs[1:] - 1, 1]],
-        tolerance=allowed + left_out[move].max(axis=1, initial=0.0),
+        tolerance=allowed + np.maximum(left_out[move[:, 0]], left_out[move[:, 1]]),
         fit=FitSummary.of(*summary),
         start_dwell=program.start_dwell,
         coordinate_mode=None if program.coordinate_mode is None else program.coordinate_mode[first],

@@ -88,7 +88,7 @@ def account(
         turns = own & motion.turns
         moved = own & ~motion.turns
         return Total(
-            *(math.fsum(values) for values in (time[own], lengths[moved], lengths[turns], time[turns])),
+            *(math.fsum(of.tolist()) for of in (time[own], lengths[moved], lengths[turns], time[turns])),
         )
 
     feed = np.isfinite(path.feed)

@@ -52,7 +52,9 @@ def stops_by_cause(problem: Problem, program: Program | None, activity: Activity
     if len(path.runs) < 2:
         return []
     # The first piece after each stop, and the number of pieces.
-    rests = np.union1d(path.runs, np.flatnonzero(problem.junction_speed == 0.0))
+    rest = problem.junction_speed == 0.0
+    rest[path.runs] = True
+    rests = np.flatnonzero(rest)
     causes = [ENDS, *_causes(problem, program, rests[1:-1]), ENDS]
     pauses = np.zeros(len(rests))
     pauses[np.searchsorted(rests, path.runs)] = [path.start_dwell, *path.dwell]
