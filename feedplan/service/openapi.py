@@ -133,6 +133,7 @@ def complete(app: FastAPI) -> None:
                 for status in {*map(str, _ALWAYS), *(own for own in told if own >= "400")}:
                     text = told.get(status, {}).get("description") or "A problem"
                     told[status] = {"description": text, "content": problem}
+                operation["responses"] = dict(sorted(told.items()))
         found["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         found["security"] = [{"token": []}, {}]
         app.openapi_schema = found

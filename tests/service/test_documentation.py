@@ -40,6 +40,7 @@ def test_every_address_is_documented_with_its_problems(server: Server) -> None:
     for operations in document["paths"].values():
         for operation in operations.values():
             assert operation["summary"]
+            assert list(operation["responses"]) == sorted(operation["responses"])
             for status, told in operation["responses"].items():
                 if status >= "400":
                     assert list(told["content"]) == ["application/problem+json"]
