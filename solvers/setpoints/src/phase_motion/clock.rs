@@ -182,14 +182,14 @@ impl SpeedLine {
         };
         let mut made = Self { law: phase.law, line, rest, times: vec![], time_error: 0.0 };
         let rate = path.bounded(phase.law, line);
-        (made.times, made.time_error) = match made.from_rest(&rate) {
+        (made.times, made.time_error) = match made.time_from_rest(&rate) {
             Some(f) => fill(f, (0.0, (u1 - u0).sqrt())),
             None => fill(rate, (u0, u1)),
         };
         made
     }
 
-    fn from_rest<'a, const M: usize>(&self, rate: &Rate<'a, M>) -> Option<FromRest<'a, M>> {
+    fn time_from_rest<'a, const M: usize>(&self, rate: &Rate<'a, M>) -> Option<FromRest<'a, M>> {
         let (source, slope) = (rate.source, self.line.slope.abs());
         self.rest.map(|(place, sign)| FromRest { source, place, sign, slope })
     }
@@ -197,7 +197,7 @@ impl SpeedLine {
     /// The place when these parts of the duration are done and left, within an error in parts of the duration.
     pub fn place<const M: usize>(&self, path: &PiecePath<M>, done: f64, left: f64, error: f64) -> Located {
         let rate = path.rate(self.law, self.line);
-        match self.from_rest(&rate) {
+        match self.time_from_rest(&rate) {
             Some(f) => {
                 let found = self.invert(f, if f.sign > 0.0 { done } else { left }, error);
                 Located { u: f.u(found.u), ..found }
@@ -216,7 +216,7 @@ impl SpeedLine {
     /// The part of the duration that has passed at u.
     pub fn done<const M: usize>(&self, path: &PiecePath<M>, u: f64) -> f64 {
         let rate = path.rate(self.law, self.line);
-        match self.from_rest(&rate) {
+        match self.time_from_rest(&rate) {
             Some(f) => {
                 let table = Table { f, nodes: &self.times };
                 let done = table.integral((u - f.place).abs().sqrt()) / table.total();
