@@ -1,5 +1,7 @@
 //! Millions of samples as the few points that a chart shows.
 
+use feedplan_geometry::quadratic::Segment;
+
 /// The columns of the points of a line.
 const D: usize = 4;
 /// A pass over the points of a line is idle where it removes no more than one in so many.
@@ -47,7 +49,8 @@ pub fn thin(points: &[[f64; D]], cost: &[f64], tolerance: f64) -> (Vec<i64>, Vec
                 break;
             };
             let last = &mut left[stay - 1];
-            let total = last.1.max(own) + distance(&points[row], &points[last.0], &points[next.0]);
+            let segment = Segment::new(&points[last.0], &points[next.0]);
+            let total = last.1.max(own) + segment.distance_sq(&points[row]).sqrt();
             if total <= tolerance {
                 last.1 = total;
             } else {
@@ -62,22 +65,4 @@ pub fn thin(points: &[[f64; D]], cost: &[f64], tolerance: f64) -> (Vec<i64>, Vec
         first = 3 - first;
     }
     left.into_iter().map(|(row, cost)| (row as i64, cost)).unzip()
-}
-
-/// Distance of a point from the segment a–b.
-fn distance(point: &[f64; D], a: &[f64; D], b: &[f64; D]) -> f64 {
-    let (way, along) = (minus(point, a), minus(b, a));
-    let square = dot(&along, &along);
-    let part = dot(&way, &along) / if square > 0.0 { square } else { 1.0 };
-    let part = part.clamp(0.0, 1.0);
-    let off = std::array::from_fn(|k| way[k] - part * along[k]);
-    dot(&off, &off).sqrt()
-}
-
-fn minus(a: &[f64; D], b: &[f64; D]) -> [f64; D] {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3])
 }
