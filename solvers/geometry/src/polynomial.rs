@@ -16,7 +16,7 @@ pub const MOST: usize = 74;
 const FEW: usize = 12;
 
 /// Pascal's triangle.
-pub(crate) static BINOMIALS: [[f64; MOST]; MOST] = binomials();
+static BINOMIALS: [[f64; MOST]; MOST] = binomials();
 
 const fn binomials() -> [[f64; MOST]; MOST] {
     let mut table = [[0.0; MOST]; MOST];
@@ -31,6 +31,12 @@ const fn binomials() -> [[f64; MOST]; MOST] {
         n += 1;
     }
     table
+}
+
+/// n over k, exact for every degree that occurs.
+#[inline(always)]
+pub fn binomial(n: usize, k: usize) -> f64 {
+    BINOMIALS[n][k]
 }
 
 /// A polynomial of degree `n` with its scaled Bernstein coefficients `c[0..=n]`; the others are 0.

@@ -24,7 +24,6 @@ pub mod rational;
 pub mod regular;
 pub mod speed;
 
-use crate::polynomial::BINOMIALS;
 use crate::quadratic::{lerp, norm, sub, Quadratic};
 use crate::tolerance::NO_DIRECTION;
 
@@ -34,12 +33,6 @@ pub const MAX_DEGREE: usize = 9;
 pub const MAX_HODOGRAPH: usize = 2 * MAX_DEGREE - 1;
 /// Greatest number of coefficients of its square.
 pub(crate) const MAX_SQUARE: usize = 2 * MAX_HODOGRAPH - 1;
-
-/// n over k, exact for every degree that occurs.
-#[inline(always)]
-pub(crate) fn binomial(n: usize, k: usize) -> f64 {
-    BINOMIALS[n][k]
-}
 
 /// One piece: degree + 1 control points in mm, as many weights (none if it is polynomial), and the width of its parameter
 /// interval.

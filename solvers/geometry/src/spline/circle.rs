@@ -164,7 +164,9 @@ fn axial_fractions(theta: f64, degree: usize) -> [f64; MAX_DEGREE + 1] {
         let s = -(j as f64 * std::f64::consts::PI / degree as f64).cos();
         let t = 0.5 * (1.0 + s);
         for i in 0..n {
-            row[i] = super::binomial(degree, i) * t.powi(i as i32) * (1.0 - t).powi((degree - i) as i32);
+            row[i] = crate::polynomial::binomial(degree, i)
+                * t.powi(i as i32)
+                * (1.0 - t).powi((degree - i) as i32);
         }
         row[n] = rest(top * s);
     }

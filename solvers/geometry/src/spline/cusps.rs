@@ -6,7 +6,8 @@
 //! to √ε.
 
 use super::rational::Hodograph;
-use super::{binomial, Piece, MAX_HODOGRAPH, MAX_SQUARE};
+use super::{Piece, MAX_HODOGRAPH, MAX_SQUARE};
+use crate::polynomial::binomial;
 use crate::quadratic::dot;
 use crate::tolerance::SQUARE_ROUNDING;
 

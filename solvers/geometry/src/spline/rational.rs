@@ -4,7 +4,8 @@
 //! Weights are positive, so the factors of each mean are positive. Differences of points are taken before products, so
 //! errors depend on the extent of a piece and not on its coordinates.
 
-use super::{binomial, Piece, MAX_HODOGRAPH};
+use super::{Piece, MAX_HODOGRAPH};
+use crate::polynomial::binomial;
 use crate::quadratic::{lerp, sub};
 
 /// The point at `alpha` between two points, exactly `b` at 1.

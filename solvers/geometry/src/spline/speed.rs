@@ -7,8 +7,9 @@
 use fearless_simd::{dispatch, Level};
 
 use super::rational::Hodograph;
-use super::{binomial, Piece, MAX_DEGREE, MAX_HODOGRAPH, MAX_SQUARE};
+use super::{Piece, MAX_DEGREE, MAX_HODOGRAPH, MAX_SQUARE};
 use crate::arc_length::{Disc, Integrand};
+use crate::polynomial::binomial;
 use crate::quadratic::dot;
 
 /// Greatest radius of a disc in half panels: the error of one panel is then below rounding.

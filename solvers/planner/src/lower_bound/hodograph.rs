@@ -1,7 +1,7 @@
 //! The hodograph of a piece with proven errors: tangents, their slopes and the distances of the axes, from the
 //! control points and weights.
 
-use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::polynomial::{binomial, Polynomial};
 
 /// The numerator of C' of a rational piece has degree 2 d − 2, d ≤ 9.
 type Numerator = Polynomial<20>;
@@ -292,9 +292,4 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
 fn lerp<const M: usize>(a: &[f64; M], b: &[f64; M], t: f64) -> [f64; M] {
     let rest = 1.0 - t;
     std::array::from_fn(|k| rest * a[k] + t * b[k])
-}
-
-/// n over k.
-pub fn binomial(n: usize, k: usize) -> f64 {
-    (0..k).fold(1.0, |product, i| product * (n - i) as f64 / (i + 1) as f64)
 }

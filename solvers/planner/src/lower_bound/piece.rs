@@ -1,10 +1,10 @@
 //! A piece under its limits: the greatest x at a station, its rise over an interval, the least time of an interval.
 
-use super::hodograph::{binomial, Distances, Hodograph, Station};
+use super::hodograph::{Distances, Hodograph, Station};
 use super::length::root_integral;
 use super::time::least_time;
 use super::{Task, DOWN, UP};
-use crate::problem::TIP_AXES;
+use feedplan_geometry::polynomial::binomial;
 
 /// Greatest distance in t of a station from a turn, for the limit of x at the turn to be used.
 const NEAR_TURN: f64 = 1e-7;
@@ -14,9 +14,6 @@ const MOST_CHORDS: f64 = 64.0;
 
 /// The chord-error limit is used on an interval if v² at an end exceeds this fraction of it.
 const NEAR_CHORD: f64 = 0.5;
-
-/// The piece of the tip, of any kind.
-type TipCurve = Hodograph<TIP_AXES, 17, 10>;
 
 /// D: v² of the tip is D x, where the axes are joints.
 struct TipSpeed<'a> {
@@ -30,8 +27,6 @@ pub struct Piece<'a, const M: usize, const C: usize, const R: usize> {
     task: &'a Task<'a, M>,
     pub curve: Hodograph<M, C, R>,
     tip_speed: Option<TipSpeed<'a>>,
-    /// The curve of the tip, where the axes are joints and the chord error limits the speed.
-    tip_curve: Option<TipCurve>,
     feed_sq: f64,
     /// The factors of the axes in the speed that the feed limits, if that is not the tool's.
     share: Option<&'a [f64; M]>,
@@ -48,15 +43,10 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             let noise = (8 * coefficients.len() + 4) as f64 * f64::EPSILON * factor * greatest;
             TipSpeed { coefficients, factor, noise }
         });
-        let tip_curve = problem.tip.filter(|_| task.chord.is_some()).map(|tip| {
-            let range = tip.offset[i]..tip.offset[i + 1];
-            Hodograph::new(&tip.control[range.clone()], tip.weight.get(range).unwrap_or(&[]))
-        });
         Self {
             task,
-            curve: task.hodograph(i),
+            curve: Hodograph::new(problem.points(i), problem.weights(i)),
             tip_speed,
-            tip_curve,
             feed_sq: problem.feed[i].powi(2) * task.speed_share,
             share: problem.share(i),
         }
@@ -152,11 +142,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     /// An upper limit of v² by the chord error at a station.
     fn chord_speed_sq(&self, station: &Station<M>) -> Option<f64> {
         let chord = self.task.chord.as_ref()?;
-        let limit = match &self.tip_curve {
-            Some(tip) => tip.chord_speed_sq(chord, &tip.station(station.t)),
-            None => self.curve.chord_speed_sq(chord, station),
-        };
-        Some(limit * self.task.speed_share)
+        Some(self.curve.chord_speed_sq(chord, station) * self.task.speed_share)
     }
 
     /// A lower bound of the time [s] between two stations under the chord-error limit; 0 if v² is far below it at
@@ -173,11 +159,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             return 0.0;
         }
         let feed_sq = if self.share.is_some() { f64::INFINITY } else { self.feed_sq * UP };
-        let time = match &self.tip_curve {
-            Some(tip) => tip.chord_time(chord, feed_sq, &tip.station(a.t), &tip.station(b.t)),
-            None => self.curve.chord_time(chord, feed_sq, a, b),
-        };
-        time / self.task.speed_share
+        self.curve.chord_time(chord, feed_sq, a, b) / self.task.speed_share
     }
 
     /// An upper limit of π at a station next to which axis k turns. From the turn on, v_k² is at most 2 A_k times the

@@ -56,16 +56,8 @@ macro_rules! with_capacity {
 impl<const M: usize> Task<'_, M> {
     /// Whether piece `i` is rational, and its degree.
     fn kind(&self, i: usize) -> (bool, usize) {
-        let range = self.problem.offset[i]..self.problem.offset[i + 1];
-        let degree = range.len() - 1;
-        let weights = self.problem.weight.get(range).unwrap_or(&[]);
-        (weights.iter().any(|&weight| weight != weights[0]), degree)
-    }
-
-    #[inline(always)]
-    pub fn hodograph<const C: usize, const R: usize>(&self, i: usize) -> Hodograph<M, C, R> {
-        let range = self.problem.offset[i]..self.problem.offset[i + 1];
-        Hodograph::new(&self.problem.control[range.clone()], self.problem.weight.get(range).unwrap_or(&[]))
+        let weights = self.problem.weights(i);
+        (weights.iter().any(|&weight| weight != weights[0]), self.problem.points(i).len() - 1)
     }
 
     /// The greatest v² between the pieces `i − 1` and `i`.
@@ -88,7 +80,7 @@ fn find_turn_on<const M: usize, const C: usize, const R: usize>(
     axis: usize,
     part: (f64, f64),
 ) -> Option<f64> {
-    task.hodograph::<C, R>(i).find_turn(axis, part)
+    Hodograph::<M, C, R>::new(task.problem.points(i), task.problem.weights(i)).find_turn(axis, part)
 }
 
 /// Backward: fills the greatest x at the end of each interval.
