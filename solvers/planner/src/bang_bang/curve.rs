@@ -39,7 +39,7 @@ use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;
 pub use part::{Axes, Remedy};
 use part::{Cap, Part, SubPiece};
-use pass::{axis_distance, Law, Phase, State, Stuck};
+use pass::{axis_distance, Law, Phase, Stuck};
 use piece::Piece;
 use split::{split, Cut, Limits};
 use store::Store;
@@ -116,7 +116,8 @@ fn coefficients<const M: usize>(task: &Task<M>, i: usize) -> usize {
 fn piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Piece<M, C> {
     let problem = task.problem;
     let speed_sq = problem.tip.map(|tip| (tip.speed.of(i), problem.width[i].powi(2)));
-    Piece::new(problem.points(i), problem.weights(i), speed_sq).with_share(problem.share(i))
+    let share = problem.share(i).copied();
+    Piece { share, ..Piece::new(problem.points(i), problem.weights(i), speed_sq) }
 }
 
 /// The piece of the tip, where it is another one and its chord error is limited.
@@ -164,9 +165,8 @@ fn backward_over<const M: usize, const C: usize>(
         space.subs.push(&sub);
         let phases = space.controllable.len();
         space.offsets.push(phases);
-        let state = State { speed_sq: at.speed_sq };
-        at.speed_sq = match pass::travel(&sub.reversed(), state, None, &mut space.controllable) {
-            Ok(next) if !part.starts_at_rest() => next.speed_sq,
+        at.speed_sq = match pass::travel(&sub.reversed(), at.speed_sq, None, &mut space.controllable) {
+            Ok(speed_sq) if !part.left.stops => speed_sq,
             Ok(_) => 0.0,
             Err(Stuck(x)) => {
                 space.controllable.truncate(phases);
@@ -207,13 +207,12 @@ fn forward_over<const M: usize, const C: usize>(
         if number == first {
             at.speed_sq = at.speed_sq.min(axes_speed_sq(at.tip_sq, sub.tip_share(false)));
         }
-        if part.starts_at_rest() {
+        if part.left.stops {
             at.speed_sq = 0.0;
         }
         space.phases.clear();
-        let state = State { speed_sq: at.speed_sq };
-        let kept = pass::travel(&sub, state, Some(&space.controllable[offset..]), &mut space.phases)
-            .and_then(|next| keeps_limits(&sub, &space.phases).map(|()| next.speed_sq));
+        let kept = pass::travel(&sub, at.speed_sq, Some(&space.controllable[offset..]), &mut space.phases)
+            .and_then(|speed_sq| keeps_limits(&sub, &space.phases).map(|()| speed_sq));
         space.controllable.truncate(offset);
         at.speed_sq = kept.unwrap_or_else(|Stuck(x)| {
             space.requested.push(part.remedy(i, x));

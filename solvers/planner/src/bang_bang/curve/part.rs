@@ -117,11 +117,6 @@ pub struct SubPiece<const M: usize, const C: usize> {
 }
 
 impl Part {
-    /// Whether the plan stops at its left end.
-    pub fn starts_at_rest(&self) -> bool {
-        self.left.stops
-    }
-
     /// The remedy where a pass made no headway at x: a cut there, or in the middle if x is near an end, which is a
     /// cut already. The ends of a part as short as rounding become one cut.
     pub fn remedy(&self, piece: usize, x: f64) -> Remedy {

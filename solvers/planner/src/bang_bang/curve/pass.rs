@@ -60,24 +60,18 @@ pub struct Phase {
 #[derive(Clone, Copy, Debug)]
 pub struct Stuck(pub f64);
 
-/// The state in which a pass enters or leaves a sub-piece.
-#[derive(Clone, Copy, Debug)]
-pub struct State {
-    /// The sum of the axes' velocities squared; v² where the axes are the tool's.
-    pub speed_sq: f64,
-}
-
-/// A pass over the sub-piece from a state: backward under its cap, forward under the phases of K, from the last to
-/// the first. Appends the phases and returns the state at the end.
+/// A pass over the sub-piece from a sum of the axes' velocities squared, v² where the axes are the tool's: backward
+/// under its cap, forward under the phases of K, from the last to the first. Appends the phases and returns that sum
+/// at the end.
 pub fn travel<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
-    state: State,
+    speed_sq: f64,
     controllable: Option<&[Phase]>,
     out: &mut Vec<Phase>,
-) -> Result<State, Stuck> {
+) -> Result<f64, Stuck> {
     // A curve is at rest in its cusps.
     let order = sub.cusp_order(false);
-    let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
+    let pi = if order == 0 { speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
     let mut pass = Pass {
         sub,
@@ -108,7 +102,7 @@ pub fn travel<const M: usize, const C: usize>(
         return Err(Stuck(phase.x0));
     }
     let speed_sq = if sub.cusp_order(true) == 0 { pi * sub.rate_sq(true) } else { 0.0 };
-    Ok(State { speed_sq: speed_sq.max(0.0) })
+    Ok(speed_sq.max(0.0))
 }
 
 /// The distance [mm] of axis k from x0 to x1.

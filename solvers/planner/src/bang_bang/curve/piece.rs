@@ -67,11 +67,6 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed, share: None }
     }
 
-    /// The piece with these factors of the axes in the feed.
-    pub fn with_share(self, share: Option<&[f64; M]>) -> Self {
-        Self { share: share.copied(), ..self }
-    }
-
     /// The square of the speed that the feed limits, over π, if that is not D.
     pub fn feed_rate(&self) -> Option<Polynomial<C>> {
         self.share.map(|share| weighted_speed_sq(&self.g, &share))
