@@ -7,7 +7,7 @@ use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 pub type Control<const D: usize> = [[f64; D]; ORDER];
 
 /// The greatest number of halvings for a bound.
-const DEPTH: u32 = 5;
+pub const DEPTH: u32 = 5;
 
 /// The parts before and after t in [0, 1].
 pub fn split<const D: usize>(control: &Control<D>, t: f64) -> (Control<D>, Control<D>) {
@@ -47,18 +47,9 @@ pub fn derivatives<const D: usize>(control: &Control<D>, t: f64) -> [[f64; D]; 3
     [lerp(&lerp(&c[0], &c[1], t), &lerp(&c[1], &c[2], t), t), slope, second]
 }
 
-/// An upper bound of the distance from a chord, refined until it is below `enough`. The distance from a segment is a
-/// convex function, so that no point is farther than the farthest control point.
+/// An upper bound of the distance from a chord, refined until it is below `enough` by at most `depth` halvings. The distance
+/// from a segment is a convex function, so that no point is farther than the farthest control point.
 pub fn distance_bound<const D: usize>(
-    control: &Control<D>,
-    line: &Polyline<D>,
-    chord: usize,
-    enough: f64,
-) -> f64 {
-    distance_within(control, line, chord, enough, DEPTH)
-}
-
-fn distance_within<const D: usize>(
     control: &Control<D>,
     line: &Polyline<D>,
     chord: usize,
@@ -72,15 +63,11 @@ fn distance_within<const D: usize>(
     let (left, right) = split(control, 0.5);
     [left, right]
         .iter()
-        .fold(0.0, |most, half| most.max(distance_within(half, line, chord, enough, depth - 1)))
+        .fold(0.0, |most, half| most.max(distance_bound(half, line, chord, enough, depth - 1)))
 }
 
 /// Whether the piece is within the bounds of the axes; where its control points are not, its halves are tested.
-pub fn is_inside<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D]) -> bool {
-    is_inside_within(control, bounds, DEPTH)
-}
-
-fn is_inside_within<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D], depth: u32) -> bool {
+pub fn is_inside<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D], depth: u32) -> bool {
     let inside = |point: &[f64; D]| (0..D).all(|k| point[k] >= bounds[k][0] && point[k] <= bounds[k][1]);
     if control.iter().all(inside) {
         return true;
@@ -89,16 +76,12 @@ fn is_inside_within<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D]
         return false;
     }
     let (left, right) = split(control, 0.5);
-    is_inside_within(&left, bounds, depth - 1) && is_inside_within(&right, bounds, depth - 1)
+    is_inside(&left, bounds, depth - 1) && is_inside(&right, bounds, depth - 1)
 }
 
 /// A lower bound of |C'|, refined until it is above `enough`: the least component of the derivative's control points along
 /// the line from end to end.
-pub fn speed_bound<const D: usize>(control: &Control<D>, width: f64, enough: f64) -> f64 {
-    speed_within(control, width, enough, DEPTH)
-}
-
-fn speed_within<const D: usize>(control: &Control<D>, width: f64, enough: f64, depth: u32) -> f64 {
+pub fn speed_bound<const D: usize>(control: &Control<D>, width: f64, enough: f64, depth: u32) -> f64 {
     let way = sub(&control[DEGREE], &control[0]);
     let along = |pair: &[[f64; D]]| dot(&sub(&pair[1], &pair[0]), &way);
     let least = control.windows(2).map(along).fold(f64::INFINITY, f64::min);
@@ -108,7 +91,7 @@ fn speed_within<const D: usize>(control: &Control<D>, width: f64, enough: f64, d
         return bound;
     }
     let (left, right) = split(control, 0.5);
-    let half = |part: &Control<D>| speed_within(part, 0.5 * width, enough, depth - 1);
+    let half = |part: &Control<D>| speed_bound(part, 0.5 * width, enough, depth - 1);
     half(&left).min(half(&right))
 }
 
@@ -136,12 +119,12 @@ mod tests {
         // The farthest point from the chord y = x is that at 1/2, 0.25/√2 away; the slowest is the start.
         let line = Polyline::new(vec![[0.0, 0.0], [1.0, 1.0]], vec![1.0]);
         let exact = 0.25 / 2f64.sqrt();
-        let close = distance_bound(&PARABOLA, &line, 0, 0.0);
+        let close = distance_bound(&PARABOLA, &line, 0, 0.0, DEPTH);
         assert!(close >= exact && close < 1.001 * exact, "{close}");
-        assert!(distance_bound(&PARABOLA, &line, 0, 0.3) <= 0.3);
-        let slow = speed_bound(&PARABOLA, 1.0, 10.0);
+        assert!(distance_bound(&PARABOLA, &line, 0, 0.3, DEPTH) <= 0.3);
+        let slow = speed_bound(&PARABOLA, 1.0, 10.0, DEPTH);
         assert!(slow <= 1.0 && slow > 0.99, "{slow}");
         let cusp = PARABOLA.map(|[x, y]| [(x - 0.5) * (x - 0.5), y * 0.0]);
-        assert!(speed_bound(&cusp, 1.0, 0.01) <= 0.0);
+        assert!(speed_bound(&cusp, 1.0, 0.01, DEPTH) <= 0.0);
     }
 }

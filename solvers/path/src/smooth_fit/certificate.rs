@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::bezier::{distance_bound, is_inside, point_and_slope, speed_bound, split, Control};
+use super::bezier::{distance_bound, is_inside, point_and_slope, speed_bound, split, Control, DEPTH};
 use super::polyline::Polyline;
 use super::spline::ORDER;
 use feedplan_geometry::quadratic::{dot, norm, sub};
@@ -64,7 +64,7 @@ impl Certificate {
             .map(|j| {
                 watch.check_at(j);
                 let (deviation, good) = interval(line, knots, pieces, &foot, j);
-                (deviation, good && is_inside(&pieces[j], bounds))
+                (deviation, good && is_inside(&pieces[j], bounds, DEPTH))
             })
             .collect();
         let (deviation, good) = checked.into_iter().unzip();
@@ -113,7 +113,7 @@ fn interval<const D: usize>(
     j: usize,
 ) -> (f64, bool) {
     let (end, width) = (knots[j + 1], knots[j + 1] - knots[j]);
-    let mut good = speed_bound(&pieces[j], width, LEAST_SPEED) >= LEAST_SPEED;
+    let mut good = speed_bound(&pieces[j], width, LEAST_SPEED, DEPTH) >= LEAST_SPEED;
     let mut deviation = 0.0f64;
     let mut offer = |bound: f64, tolerance: f64| {
         deviation = deviation.max(bound);
@@ -132,12 +132,12 @@ fn interval<const D: usize>(
         } else {
             [rest[0]; ORDER]
         };
-        offer(distance_bound(&part, line, chord, line.tolerance[chord]), line.tolerance[chord]);
+        offer(distance_bound(&part, line, chord, line.tolerance[chord], DEPTH), line.tolerance[chord]);
         offer(norm(&sub(&rest[0], &line.vertex[chord + 1])), line.tolerance_at(chord + 1));
         (start, chord) = (u, chord + 1);
     }
     if end > start {
-        offer(distance_bound(&rest, line, chord, line.tolerance[chord]), line.tolerance[chord]);
+        offer(distance_bound(&rest, line, chord, line.tolerance[chord], DEPTH), line.tolerance[chord]);
     }
     (deviation, good)
 }
