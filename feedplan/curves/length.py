@@ -13,7 +13,6 @@ from feedplan.arguments import one_of
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-from feedplan.progress import Listener
 
 Interpolator = Literal["sarfraz", "newton"]
 INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
@@ -35,21 +34,15 @@ class CurveLength:
 
     `accuracy` is the allowed error of each piece as a share of its length; rounding adds to it. Source:
     Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps; Zhang et al. 2010,
-    section 4.2, for `newton`. `progress` gets the part of the table that is done.
-    Raises InputError for an empty curve and an accuracy that is not possible.
+    section 4.2, for `newton`. Raises InputError for an empty curve and an accuracy that is not possible.
     """
 
-    def __init__(
-        self,
-        curve: CompositeCurve,
-        accuracy: float = 1e-13,
-        progress: Listener | None = None,
-    ) -> None:
+    def __init__(self, curve: CompositeCurve, accuracy: float = 1e-13) -> None:
         if len(curve) == 0:
             raise InputError("the curve is empty: it has no length table")
         if not 1e-16 <= accuracy < 1:
             raise InputError(f"the accuracy of lengths is {accuracy:g}: give a part from 1e-16 to 1")
-        self._table = Native(curve.native, accuracy, progress)
+        self._table = Native(curve.native, accuracy)
 
     @property
     def total(self) -> float:

@@ -23,17 +23,11 @@ pub struct CurveLength {
 impl CurveLength {
     /// Of a curve, which has at least one piece.
     #[new]
-    #[pyo3(signature = (curve, accuracy, progress=None))]
-    fn new(
-        py: Python<'_>,
-        curve: &Curve,
-        accuracy: f64,
-        progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
+    fn new(py: Python<'_>, curve: &Curve, accuracy: f64) -> PyResult<Self> {
         let (axes, width) = (curve.axes(), curve.widths().to_vec());
         with_padded_axes!(axes, M, {
             let pieces = curve.padded::<M>()?;
-            let lengths = InAxes::new(run(py, progress.as_ref(), |watch| pieces.lengths(accuracy, watch))?);
+            let lengths = InAxes::new(run(py, None, |watch| pieces.lengths(accuracy, watch))?);
             py.detach(memory::give_back);
             Ok(Self { axes, lengths, width })
         })

@@ -230,9 +230,8 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
             }
             Measure::Axis(way) => way.place(&self.phase, part),
             Measure::Length { before, total } => {
-                let error = if law.is_along() { JERK_STEP_ERROR } else { STEP_ERROR };
                 let way = if part.from_start { total * part.share } else { total * (1.0 - part.share) };
-                let found = self.path.locate(law, before + way, error * total * step);
+                let found = self.path.locate(law, before + way, self.step_error() * total * step);
                 Located { u: found.u.clamp(u0, u1), miss: found.miss / total, ..found }
             }
         }
@@ -317,11 +316,6 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
             rates.acceleration[way.k] = way.sign * pace.a;
             rates.jerk[way.k] = 0.0;
         }
-    }
-
-    /// C at a place.
-    pub fn point(&self, state: &State) -> [f64; M] {
-        self.sample(state).0
     }
 
     /// Velocity, acceleration and jerk at a place.

@@ -314,7 +314,7 @@ proptest! {
             prop_assert!(phase.p1 != 0.0 || v1 == 0.0, "{v1:e} at rest");
         }
         let a = if phase.law == PhaseLaw::AxisAcceleration { phase.value } else { 0.0 };
-        let way = motion.point(&motion.at_time(t, 1e-3))[0] - piece.point(phase.u0)[0];
+        let way = motion.sample(&motion.at_time(t, 1e-3)).0[0] - piece.point(phase.u0)[0];
         prop_assert!((way - (v0 * t + 0.5 * a * t * t)).abs() <= 2e-8 * (1.0 + way.abs()), "{way}");
     }
 
@@ -335,7 +335,7 @@ proptest! {
             norm(&sub(&found, &expected)) <= 1e-3 * (norm(&expected) + scale)
         };
         let scale = norm(&rates[1].velocity) / phase.duration;
-        prop_assert!(close(slope(motion.point(&before), motion.point(&after)), rates[1].velocity, 0.0));
+        prop_assert!(close(slope(motion.sample(&before).0, motion.sample(&after).0), rates[1].velocity, 0.0));
         prop_assert!(close(slope(rates[0].velocity, rates[2].velocity), rates[1].acceleration, scale));
         prop_assert!(close(slope(rates[0].acceleration, rates[2].acceleration), rates[1].jerk, scale / phase.duration));
     }

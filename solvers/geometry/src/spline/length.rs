@@ -135,16 +135,6 @@ impl<const M: usize> CurveLength<M> {
         Speed::new(&self.h[h[0]..h[1]], &self.omega[omega[0]..omega[1]], self.width[piece])
     }
 
-    /// Number of pieces.
-    pub fn pieces(&self) -> usize {
-        self.width.len()
-    }
-
-    /// Number of rows of all tables.
-    pub fn nodes(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// The length of the curve in mm.
     pub fn total(&self) -> f64 {
         self.starts[self.starts.len() - 1]
@@ -163,7 +153,7 @@ impl<const M: usize> CurveLength<M> {
 
     /// The piece in which a length lies, and the length left within it.
     fn split(&self, length: f64) -> (usize, f64) {
-        let last = self.pieces() - 1;
+        let last = self.width.len() - 1;
         let piece = self.starts[1..=last].partition_point(|&start| start <= length);
         (piece, length - self.starts[piece])
     }
@@ -253,7 +243,7 @@ mod tests {
     fn a_line_is_as_long_as_its_ends_are_apart() {
         let length =
             CurveLength::new(&curve_of(&[[1.0, 2.0], [4.0, 6.0]], &[], 7.0), 1e-14, Watch::default());
-        assert!((length.total() - 5.0).abs() < 1e-15 && length.nodes() == 2);
+        assert!((length.total() - 5.0).abs() < 1e-15 && length.nodes.len() == 2);
         assert!((length.locate(2.0, 1e-15).located.u - 2.8).abs() < 1e-15);
     }
 
@@ -334,7 +324,7 @@ mod tests {
                 let length = CurveLength::new(&curve, accuracy, Watch::default());
                 assert!((length.total() - exact).abs() <= length.error(), "{d:e} {accuracy:e}");
                 assert!(length.error() <= 2.0 * (accuracy + 1e-14) * exact);
-                assert!(length.nodes() < 400, "{}", length.nodes());
+                assert!(length.nodes.len() < 400, "{}", length.nodes.len());
             }
         }
     }
