@@ -118,7 +118,6 @@ impl<const D: usize> Run<'_, D> {
         }
         let part = self.line.part(chords.start, chords.end);
         let (fit, pieces, certificate) = self.refined(&part);
-        out.work += fit.work;
         if certificate.good.iter().all(|&good| good) {
             out.offsets.merge(&Offsets::of(&part, &fit.spline.knots, &pieces, &certificate.foot, self.watch));
             return out.after_stop(|out| self.append_spline(&chords, &fit, &pieces, &certificate, out));

@@ -34,8 +34,6 @@ pub struct Smooth<const D: usize> {
     pub corners: Vec<Range<usize>>,
     /// On which side of the polyline the curve lies, and how far away.
     pub offsets: Offsets,
-    /// The work of the fit: the sum of Newton steps times intervals.
-    pub work: usize,
 }
 
 impl<const D: usize> Smooth<D> {

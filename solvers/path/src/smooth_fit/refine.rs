@@ -34,7 +34,6 @@ pub fn halved<'a, const D: usize>(
     }
     knots.push(fit.spline.knots[count]);
     let mut next = Fit::new(fit.line, knots, long);
-    next.work = fit.work;
     keep_coefficients(&fit.spline, &mut next.spline, &origin);
 
     let mut ranges: Vec<Range<usize>> = Vec::new();

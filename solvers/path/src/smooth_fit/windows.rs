@@ -36,8 +36,6 @@ pub struct Fit<'a, const D: usize> {
     pub spline: Spline<D>,
     /// The long chord on which each coefficient is held, or FREE.
     pub pin: Vec<u32>,
-    /// The sum of Newton steps times intervals.
-    pub work: usize,
 }
 
 impl<'a, const D: usize> Fit<'a, D> {
@@ -59,7 +57,7 @@ impl<'a, const D: usize> Fit<'a, D> {
                 _ => line.point(chord, u),
             });
         }
-        Self { line, spline: Spline { knots, coefficient }, pin, work: 0 }
+        Self { line, spline: Spline { knots, coefficient }, pin }
     }
 
     /// Solves the problem in ranges of intervals that are far from each other; other coefficients stay as they are.
@@ -91,15 +89,14 @@ impl<'a, const D: usize> Fit<'a, D> {
 
     fn solve_windows(&mut self, windows: &[Window], watch: Watch) {
         let each = watch.each(windows.len());
-        let solved: Vec<(Vec<[f64; D]>, usize)> = windows
+        let solved: Vec<Vec<[f64; D]>> = windows
             .par_iter()
             .map_init(Band::<D>::default, |band, window| {
                 each.advance(1);
                 self.window(window, band)
             })
             .collect();
-        for (window, (x, work)) in windows.iter().zip(solved) {
-            self.work += work;
+        for (window, x) in windows.iter().zip(solved) {
             for i in window.keep.clone() {
                 if let Some(x) = x.get(i - window.intervals.start) {
                     self.spline.coefficient[i] = *x;
@@ -108,8 +105,8 @@ impl<'a, const D: usize> Fit<'a, D> {
         }
     }
 
-    /// The coefficients of the basis functions on the intervals of a window, and the work that they took.
-    fn window(&self, window: &Window, band: &mut Band<D>) -> (Vec<[f64; D]>, usize) {
+    /// The coefficients of the basis functions on the intervals of a window.
+    fn window(&self, window: &Window, band: &mut Band<D>) -> Vec<[f64; D]> {
         let Window { intervals, hold, .. } = window;
         let (first, end) = (intervals.start, intervals.end);
         let count = self.spline.coefficient.len();
@@ -121,7 +118,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         let fixed: Vec<bool> = (first..end + DEGREE).map(held).collect();
         let given = &self.spline.coefficient[first..end + DEGREE];
         if fixed.iter().all(|&fixed| fixed) {
-            return (given.to_vec(), 0);
+            return given.to_vec();
         }
         let knots = &self.spline.knots;
         let origin = given[given.len() / 2];
@@ -143,7 +140,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         let (energy, pull) = (first..end).map(|j| pace.energy(&around(knots, j))).unzip();
         let mut problem =
             Problem { energy, pull, rows, start, x, fixed, unit: (first..end).map(unit).collect() };
-        let iterations = problem.solve(band);
+        problem.solve(band);
         let moved = problem.x.iter().zip(&problem.fixed).zip(given).map(|((x, &fixed), given)| {
             if fixed {
                 *given
@@ -151,7 +148,7 @@ impl<'a, const D: usize> Fit<'a, D> {
                 std::array::from_fn(|k| x[k] + origin[k])
             }
         });
-        (moved.collect(), iterations * (end - first))
+        moved.collect()
     }
 }
 
