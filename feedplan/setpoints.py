@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,14 @@ from numpy.typing import NDArray
 from feedplan._solvers import Sampler
 from feedplan.arguments import is_whole, number, one_of, positive, shown, whole
 from feedplan.constraints.problem import Problem
-from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
-from feedplan.curves.length import Interpolator as Interpolator
 from feedplan.errors import InputError
 from feedplan.events import Events, TimedEvents
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 from feedplan.units import counted
+
+Interpolator = Literal["sarfraz", "newton"]
+INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
 
 # Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
 MAX_CHUNK = 20_000_000

@@ -82,18 +82,17 @@ class Trajectory:
 
         Raises InputError for a length that is not on the path."""
         lengths = within(s, "length", self.length, self._problem.unit)
-        places = self._lengths.locate(np.atleast_1d(lengths))
-        return self.sampler.along(places.piece, places.u)[0].reshape(lengths.shape)
+        return self.sampler.along(*self._lengths.locate(np.atleast_1d(lengths)))[0].reshape(lengths.shape)
 
     def speed(self, s: ArrayLike) -> Array:
         """v(s): the speed of the tool [mm/s] at one length or at lengths (n,) [mm]. Raises as `time`."""
         lengths = within(s, "length", self.length, self._problem.unit)
-        places = self._lengths.locate(np.atleast_1d(lengths))
-        velocity = self.sampler.along(places.piece, places.u)[2]
+        piece, u = self._lengths.locate(np.atleast_1d(lengths))
+        velocity = self.sampler.along(piece, u)[2]
         speed = np.linalg.norm(velocity, axis=1)
         if self._problem.joints is not None:
             # The joints' speed by that of the parameter, and so the tool's.
-            joints = self._problem.curve.evaluate(places.piece, places.u, 1)[1]
-            ratio = speed_square(self._problem, places.piece, places.u) / (joints**2).sum(axis=1)
+            joints = self._problem.curve.evaluate(piece, u, 1)[1]
+            ratio = speed_square(self._problem, piece, u) / (joints**2).sum(axis=1)
             speed = speed * np.sqrt(ratio)
         return np.asarray(speed.reshape(lengths.shape))

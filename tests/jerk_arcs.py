@@ -49,7 +49,7 @@ def constant_jerk(
             if finished:
                 v1, a1 = (0.0, 0.0) if abs(v1) < 1e-9 else (v1, a1)
             whole = crosses or finished
-            u1 = float(curve.width[piece]) if whole else float(table.locate([s1], 1e-14).u[0])
+            u1 = float(curve.width[piece]) if whole else float(table.locate([s1], 1e-14)[1][0])
             p0, p1 = v**2 / square(curve, piece, u), v1**2 / square(curve, piece, u1)
             rows.append((piece, PhaseLaw.PATH_JERK, NO_AXIS, jerk, u, u1, p0, p1, time, a, a1))
             s, v, a, u = s1, v1, a1, u1

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, get_args
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import CurveLength as Native
-from feedplan.arguments import one_of
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-
-Interpolator = Literal["sarfraz", "newton"]
-INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
-
-
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Places on a curve (n,): `piece` and local `u`; `iterations` that the search took (0 at an end) and the
-    remaining `miss` of the length [mm]."""
-
-    piece: NDArray[np.uint32]
-    u: NDArray[np.float64]
-    iterations: NDArray[np.uint32]
-    miss: NDArray[np.float64]
 
 
 class CurveLength:
     """The length of a curve as a function of the place on it, tabulated to a proven error.
 
     `accuracy` is the allowed error of each piece as a share of its length; rounding adds to it. Source:
-    Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps; Zhang et al. 2010,
-    section 4.2, for `newton`. Raises InputError for an empty curve and an accuracy that is not possible.
+    Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps. Raises InputError
+    for an empty curve and an accuracy that is not possible.
     """
 
     def __init__(self, curve: CompositeCurve, accuracy: float = 1e-13) -> None:
@@ -59,12 +41,8 @@ class CurveLength:
         return self._table.lengths(*places(piece, u))
 
     def locate(
-        self, lengths: ArrayLike, tolerance: float = 1e-12, interpolator: Interpolator = "sarfraz"
-    ) -> Places:
-        """The places at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an end gives that end.
-
-        `sarfraz` finds each by itself, in parallel; `newton` finds each from the one before.
-        """
-        one_of(interpolator, "interpolator", INTERPOLATORS)
-        wanted = floats(lengths, "lengths", 1)
-        return Places(*self._table.locate(wanted, tolerance, interpolator == "newton"))
+        self, lengths: ArrayLike, tolerance: float = 1e-12
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+        """The pieces and the parameters u at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an
+        end gives that end."""
+        return self._table.locate(floats(lengths, "lengths", 1), tolerance)

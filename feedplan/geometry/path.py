@@ -371,8 +371,7 @@ class Path:
         if not is_whole(order, 0, 2):
             raise InputError(f"the derivative by length is of order {shown(order)}: give 0, 1 or 2")
         lengths = within(s, "length", self.length, "mm")
-        places = self.lengths.locate(np.atleast_1d(lengths))
-        values = self.curve.evaluate(places.piece, places.u, order)
+        values = self.curve.evaluate(*self.lengths.locate(np.atleast_1d(lengths)), order)
         row = 0 if lengths.ndim == 0 else slice(None)
         if order == 0:
             return np.asarray(values[0][row])

@@ -63,7 +63,7 @@ fn spline(criterion: &mut Criterion) {
         group.bench_function(format!("place at a length to 1e-9 mm, {name}"), |bencher| {
             bencher.iter(|| {
                 let step = length.total() / SPANS as f64;
-                (0..SPANS).map(|i| length.locate(i as f64 * step, 1e-9).located.u).fold(0.0, f64::max)
+                (0..SPANS).map(|i| length.locate(i as f64 * step, 1e-9).1).fold(0.0, f64::max)
             });
         });
     }

@@ -61,33 +61,22 @@ impl CurveLength {
         Ok(PyArray1::from_vec(py, found))
     }
 
-    /// Pieces, parameters, iterations and misses at m lengths.
+    /// Pieces and parameters at m lengths.
     #[allow(clippy::type_complexity)]
     fn locate<'py>(
         &self,
         py: Python<'py>,
         lengths: PyReadonlyArray1<'py, f64>,
         tolerance: f64,
-        newton: bool,
-    ) -> PyResult<(
-        Bound<'py, PyArray1<u32>>,
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray1<u32>>,
-        Bound<'py, PyArray1<f64>>,
-    )> {
+    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
         let wanted = lengths.as_slice()?;
         let found = with_padded_axes!(self.axes, M, {
             let kernel = self.lengths.get::<Kernel<M>>()?;
-            run(py, None, |_| match newton {
-                true => kernel.locate_in_order(wanted, tolerance),
-                false => kernel.locate_all(wanted, tolerance),
-            })
+            run(py, None, |_| kernel.locate_all(wanted, tolerance))
         })?;
         Ok((
-            PyArray1::from_iter(py, found.iter().map(|place| place.piece as u32)),
-            PyArray1::from_iter(py, found.iter().map(|place| place.located.u)),
-            PyArray1::from_iter(py, found.iter().map(|place| place.located.iterations)),
-            PyArray1::from_iter(py, found.iter().map(|place| place.located.miss)),
+            PyArray1::from_iter(py, found.iter().map(|&(piece, _)| piece as u32)),
+            PyArray1::from_iter(py, found.iter().map(|&(_, u)| u)),
         ))
     }
 }

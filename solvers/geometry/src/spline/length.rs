@@ -10,8 +10,7 @@ use super::speed::{Coefficients, Speed};
 use super::{CompositeCurve, Piece};
 use crate::arc_length::{quadrature, tabulate, Length, Node, QuadraticSpeed, Table};
 use crate::instances;
-use crate::inverse_length::{self, Located};
-use crate::newton;
+use crate::inverse_length;
 use crate::tolerance::CUSP;
 use crate::watch::Watch;
 
@@ -21,13 +20,6 @@ instances! {
         /// See `CurveLength::new`.
         fn lengths(&self, accuracy: f64, watch: Watch) -> CurveLength<M> = CurveLength::new;
     }
-}
-
-/// A place on a curve: its piece, its parameter, and how it was found.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    pub piece: usize,
-    pub located: Located,
 }
 
 /// The integrand |C'| of a piece's table.
@@ -151,20 +143,12 @@ impl<const M: usize> CurveLength<M> {
         self.starts[piece] + on_table!(self, piece, table, table.integral(u))
     }
 
-    /// The piece in which a length lies, and the length left within it.
-    fn split(&self, length: f64) -> (usize, f64) {
+    /// The piece and the parameter at a length, within `tolerance` mm; a length beyond either end gives that end.
+    pub fn locate(&self, length: f64, tolerance: f64) -> (usize, f64) {
         let last = self.width.len() - 1;
         let piece = self.starts[1..=last].partition_point(|&start| start <= length);
-        (piece, length - self.starts[piece])
-    }
-
-    /// The place at a length, within `tolerance` mm; a length beyond either end gives that end.
-    pub fn locate(&self, length: f64, tolerance: f64) -> Place {
-        let (piece, rest) = self.split(length);
-        Place {
-            piece,
-            located: on_table!(self, piece, table, inverse_length::locate(&table, rest, tolerance)),
-        }
+        let rest = length - self.starts[piece];
+        (piece, on_table!(self, piece, table, inverse_length::locate(&table, rest, tolerance)).u)
     }
 
     /// Lengths up to many places, in parallel.
@@ -178,26 +162,8 @@ impl<const M: usize> CurveLength<M> {
     }
 
     /// The places at many lengths, in parallel.
-    pub fn locate_all(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
+    pub fn locate_all(&self, lengths: &[f64], tolerance: f64) -> Vec<(usize, f64)> {
         lengths.par_iter().with_min_len(1024).map(|&length| self.locate(length, tolerance)).collect()
-    }
-
-    /// The places at many lengths in increasing order by Newton–Raphson, each found from the one before.
-    pub fn locate_in_order(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
-        let mut places = Vec::with_capacity(lengths.len());
-        let (mut at, mut from) = (usize::MAX, (0.0, 0.0));
-        for &length in lengths {
-            let (piece, rest) = self.split(length);
-            if piece != at || rest < from.1 {
-                from = (0.0, 0.0);
-                at = piece;
-            }
-            let (located, sum) =
-                on_table!(self, piece, table, newton::advance(&table, from, rest - from.1, tolerance));
-            from = (located.u, sum);
-            places.push(Place { piece, located });
-        }
-        places
     }
 }
 
@@ -244,7 +210,7 @@ mod tests {
         let length =
             CurveLength::new(&curve_of(&[[1.0, 2.0], [4.0, 6.0]], &[], 7.0), 1e-14, Watch::default());
         assert!((length.total() - 5.0).abs() < 1e-15 && length.nodes.len() == 2);
-        assert!((length.locate(2.0, 1e-15).located.u - 2.8).abs() < 1e-15);
+        assert!((length.locate(2.0, 1e-15).1 - 2.8).abs() < 1e-15);
     }
 
     #[test]
@@ -265,8 +231,8 @@ mod tests {
         let length = CurveLength::new(&quarter, 1e-14, Watch::default());
         assert!((length.total() - FRAC_PI_2).abs() < 1e-15);
         for i in 0..=40 {
-            let place = length.locate(FRAC_PI_2 * i as f64 / 40.0, 1e-15);
-            let [x, y] = derivatives(&quarter.piece(0), place.located.u)[0];
+            let (_, u) = length.locate(FRAC_PI_2 * i as f64 / 40.0, 1e-15);
+            let [x, y] = derivatives(&quarter.piece(0), u)[0];
             assert!((y.atan2(x) - FRAC_PI_2 * i as f64 / 40.0).abs() < 2e-15);
         }
     }
@@ -302,7 +268,7 @@ mod tests {
                 }
                 for i in 0..=20 {
                     let s = length.total() * i as f64 / 20.0;
-                    let u = length.locate(s, accuracy).located.u;
+                    let (_, u) = length.locate(s, accuracy);
                     assert!((exact(u) - s).abs() <= length.error() + accuracy);
                 }
             }
@@ -346,7 +312,7 @@ mod tests {
         curve.push(&[[1.0, 1.0], [2.0, 1.0]], &[], 1.0);
         let length = CurveLength::new(&curve, 1e-13, Watch::default());
         assert_eq!((length.total(), length.length(0, 0.5)), (1.0, 0.0));
-        assert_eq!(length.locate(0.25, 1e-12).piece, 1);
+        assert_eq!(length.locate(0.25, 1e-12).0, 1);
     }
 
     fn pieces() -> impl Strategy<Value = (Vec<[f64; 3]>, Vec<f64>)> {
@@ -385,8 +351,8 @@ mod tests {
         fn the_place_at_a_length_has_that_length((control, weights) in pieces(), part in 0.0..1.0f64) {
             let length = CurveLength::new(&curve_of(&control, &weights, 2.0), 1e-13, Watch::default());
             let s = part * length.total();
-            let place = length.locate(s, 1e-11);
-            prop_assert!((length.length(place.piece, place.located.u) - s).abs() <= 1e-11);
+            let (piece, u) = length.locate(s, 1e-11);
+            prop_assert!((length.length(piece, u) - s).abs() <= 1e-11);
         }
     }
 }
