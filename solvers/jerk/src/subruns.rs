@@ -48,6 +48,8 @@ const BESIDE: f64 = 1e-4;
 /// A jump of the acceleration that third differences of setpoints show as less than this part of the limit of jerk is
 /// rounding: half of what an audit can tell.
 const UNSEEN: f64 = 5e-7;
+/// Chains that are planned together.
+const TOGETHER: usize = 64;
 /// The share of this cutting in the work of a plan.
 const CUTTING: f64 = 0.1;
 
@@ -76,27 +78,24 @@ pub fn over_subruns<const M: usize>(
     jerk: &[f64; M],
     plan: impl Fn(&Subrun, &Limits<M>, Watch) -> Result<JerkProfile, Fault> + Sync,
 ) -> Result<JerkProfile, Fault> {
-    over_chains(problem, jerk, |chain, limits, watch| {
-        chain
-            .subruns
-            .par_iter()
-            .map(|subrun| plan(subrun, limits, watch.part(subrun.parts.len() as f64)))
-            .collect()
+    over_chains(problem, jerk, |chains, limits, watch| {
+        let subruns = chains.par_iter().flat_map(|chain| chain.subruns);
+        subruns.map(|subrun| plan(subrun, limits, watch.part(subrun.parts.len() as f64))).collect()
     })
 }
 
-/// The same with a `plan` of the subruns of a chain. Its watch counts a part of a piece.
+/// The same with a `plan` of the subruns of some chains in a row. Its watch counts a part of a piece.
 pub fn over_chains<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
-    plan: impl Fn(Chain, &Limits<M>, Watch) -> Result<Vec<JerkProfile>, Fault> + Sync,
+    plan: impl Fn(&[Chain], &Limits<M>, Watch) -> Result<Vec<JerkProfile>, Fault> + Sync,
 ) -> Result<JerkProfile, Fault> {
     let limits = checked(problem, jerk)?;
     let subruns = subruns(problem);
     let turns = turns(problem, &limits, &subruns);
     let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
     let planned: Result<Vec<Vec<JerkProfile>>, Fault> =
-        chains(&subruns, &turns).into_par_iter().map(|chain| plan(chain, &limits, watch)).collect();
+        chains(&subruns, &turns).par_chunks(TOGETHER).map(|chains| plan(chains, &limits, watch)).collect();
     let mut planned = planned?.into_iter().flatten();
     let (mut kept, mut runs, mut lower_bound) = (vec![], vec![0], vec![]);
     for run in subruns.chunk_by(|a, b| a.run == b.run) {

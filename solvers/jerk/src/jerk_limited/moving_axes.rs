@@ -2,7 +2,7 @@
 //! programs move two axes of three, or three of five.
 
 use super::profile::Plan;
-use super::windows;
+use super::windows::Rough;
 use crate::path_problem::{Effort, Fault, Geometry, Limits, PathPoint, PathPoints, Problem};
 
 /// A path by K of its axes.
@@ -26,28 +26,74 @@ impl<const K: usize> Geometry<K> for MovingAxes<'_, K> {
     }
 }
 
-/// The plan of least time. The axes that do not move by `moves` are at rest on the whole path.
-pub fn plan<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    moves: &[bool; M],
-    effort: &Effort,
-) -> Result<Plan, Fault> {
-    match moves.iter().filter(|&&moves| moves).count() {
-        0..=2 => plan_by::<G, M, 2>(problem, moves, effort),
-        3 => plan_by::<G, M, 3>(problem, moves, effort),
-        4 => plan_by::<G, M, 4>(problem, moves, effort),
-        5 => plan_by::<G, M, 5>(problem, moves, effort),
-        6 => plan_by::<G, M, 6>(problem, moves, effort),
-        _ => plan_by::<G, M, M>(problem, moves, effort),
+/// What is to be done with a problem by the axes that move.
+trait Work {
+    type Done;
+
+    fn on<G: Geometry<K>, const K: usize>(self, problem: &Problem<G, K>) -> Self::Done;
+}
+
+struct Roughly<'a>(&'a Effort<'a>);
+
+impl Work for Roughly<'_> {
+    type Done = Result<Rough, Fault>;
+
+    fn on<G: Geometry<K>, const K: usize>(self, problem: &Problem<G, K>) -> Self::Done {
+        Rough::new(problem, self.0)
     }
 }
 
-/// The plan by K axes, all that move among them.
-fn plan_by<G: Geometry<M>, const M: usize, const K: usize>(
+struct Finely<'a>(Rough, f64, &'a Effort<'a>);
+
+impl Work for Finely<'_> {
+    type Done = Result<Plan, Fault>;
+
+    fn on<G: Geometry<K>, const K: usize>(self, problem: &Problem<G, K>) -> Self::Done {
+        self.0.plan(problem, self.1, self.2)
+    }
+}
+
+/// The rough plan. The axes that do not move by `moves` are at rest on the whole path.
+pub fn rough<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     moves: &[bool; M],
     effort: &Effort,
+) -> Result<Rough, Fault> {
+    work(problem, moves, Roughly(effort))
+}
+
+/// The plan of least time from a rough one, with parts of the grid that lose `greatest` at most, in s.
+pub fn plan<G: Geometry<M>, const M: usize>(
+    problem: &Problem<G, M>,
+    moves: &[bool; M],
+    rough: Rough,
+    greatest: f64,
+    effort: &Effort,
 ) -> Result<Plan, Fault> {
+    work(problem, moves, Finely(rough, greatest, effort))
+}
+
+fn work<G: Geometry<M>, W: Work, const M: usize>(
+    problem: &Problem<G, M>,
+    moves: &[bool; M],
+    work: W,
+) -> W::Done {
+    match moves.iter().filter(|&&moves| moves).count() {
+        0..=2 => by::<G, W, M, 2>(problem, moves, work),
+        3 => by::<G, W, M, 3>(problem, moves, work),
+        4 => by::<G, W, M, 4>(problem, moves, work),
+        5 => by::<G, W, M, 5>(problem, moves, work),
+        6 => by::<G, W, M, 6>(problem, moves, work),
+        _ => by::<G, W, M, M>(problem, moves, work),
+    }
+}
+
+/// The work by K axes, all that move among them.
+fn by<G: Geometry<M>, W: Work, const M: usize, const K: usize>(
+    problem: &Problem<G, M>,
+    moves: &[bool; M],
+    work: W,
+) -> W::Done {
     let mut order: [usize; M] = std::array::from_fn(|axis| axis);
     order.sort_by_key(|&axis| !moves[axis]);
     let by = |all: &[f64; M]| -> [f64; K] { std::array::from_fn(|i| all[order[i]]) };
@@ -75,5 +121,5 @@ fn plan_by<G: Geometry<M>, const M: usize, const K: usize>(
         caps: problem.caps,
         ends: problem.ends,
     };
-    windows::plan(&own, effort)
+    work.on(&own)
 }

@@ -7,11 +7,16 @@
 //! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
 //! the acceleration goes on (`turns`).
 
+use std::iter;
+use std::mem::take;
+
 use rayon::prelude::*;
 
 use super::held::{caps_between, moving, stretches, Between, Stretch};
 use super::moving_axes;
+use super::refinement;
 use super::turns::{lower, Line};
+use super::windows::Rough;
 use crate::arc_length_path::{ArcLengthPath, Junction, Part};
 use crate::jerk_profile::JerkProfile;
 use crate::path_problem::{self, Effort, End, Limits, SpeedCap};
@@ -48,8 +53,8 @@ pub fn plan<const M: usize>(
     jerk: &[f64; M],
     effort: &Effort,
 ) -> Result<JerkProfile, Fault> {
-    over_chains(problem, jerk, |chain, limits, watch| {
-        Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.chain(&chain)
+    over_chains(problem, jerk, |chains, limits, watch| {
+        Task::new(problem, limits, &Effort { watch, ..*effort }).chains(chains)
     })
 }
 
@@ -62,25 +67,80 @@ struct Strokes<'a, const M: usize> {
     accelerations: Vec<f64>,
 }
 
+/// A path between two ends before its plan.
+struct Looked {
+    junctions: Vec<Junction>,
+    caps: Vec<SpeedCap>,
+    /// That of the stretches.
+    resolution: f64,
+    stretches: Vec<LookedStretch>,
+}
+
+struct LookedStretch {
+    stretch: Stretch,
+    /// Known of those that do not hold their feed.
+    rough: Option<Result<Rough, path_problem::Fault>>,
+    phases: Option<JerkProfile>,
+}
+
+/// A chain before its plan.
+struct LookedChain<'a, const M: usize> {
+    strokes: Strokes<'a, M>,
+    /// The greatest accelerations at the ends of its subruns, in mm/s².
+    greatest: Vec<f64>,
+    /// Its subruns but lines, with their numbers in it.
+    looked: Vec<(usize, Looked)>,
+}
+
 pub struct Task<'a, const M: usize> {
     pub problem: &'a Problem<'a, M>,
     pub limits: Limits<M>,
     pub effort: &'a Effort<'a>,
+    /// The greatest loss of an interval, in s, on paths that are planned roughly together (`refinement`).
+    loss: f64,
+}
+
+impl LookedStretch {
+    fn rough(&self) -> Option<&Rough> {
+        self.rough.as_ref()?.as_ref().ok()
+    }
+}
+
+impl<'a, const M: usize> Task<'a, M> {
+    pub fn new(problem: &'a Problem<'a, M>, limits: &Limits<M>, effort: &'a Effort<'a>) -> Self {
+        Self { problem, limits: *limits, effort, loss: f64::INFINITY }
+    }
 }
 
 impl<const M: usize> Task<'_, M> {
-    /// The profiles of a chain of subruns; unplanned if the deadline has passed. Between them the tool turns back with
-    /// the greatest accelerations that all lines allow. Other subruns are planned first, with what accelerations are
-    /// the best for them; the lines beside them take the same. Two of those in a row are planned again, with at most the
-    /// lesser of both, until they meet.
-    fn chain(&self, chain: &Chain) -> Result<Vec<JerkProfile>, Fault> {
-        let count = chain.subruns.len();
-        if self.effort.expired() {
-            return Ok(vec![JerkProfile::unplanned(); count]);
-        }
-        let Strokes { paths, lines, mut accelerations } = self.strokes(chain)?;
+    /// The profiles of the subruns of some chains; unplanned after the deadline. All are planned roughly first, which shows
+    /// how short the intervals are to be for the least time in all.
+    pub fn chains(&self, chains: &[Chain]) -> Result<Vec<JerkProfile>, Fault> {
+        let look = |chain| (!self.effort.expired()).then(|| self.look_at_chain(chain)).transpose();
+        let looked: Vec<Option<LookedChain<M>>> = chains.par_iter().map(look).collect::<Result<_, _>>()?;
+        let paths = looked.iter().flatten().flat_map(|chain| &chain.looked);
+        let roughs = paths.flat_map(|(_, own)| &own.stretches).filter_map(LookedStretch::rough);
+        let loss = refinement::greatest(roughs.map(|rough| &rough.losses));
+        let task = Task { loss, ..*self };
+        let plan = |(chain, looked): (&Chain, Option<_>)| match looked {
+            Some(looked) => task.chain(chain, looked),
+            None => Ok(vec![JerkProfile::unplanned(); chain.subruns.len()]),
+        };
+        let planned: Vec<Vec<JerkProfile>> =
+            chains.par_iter().zip(looked).map(plan).collect::<Result<_, _>>()?;
+        Ok(planned.into_iter().flatten().collect())
+    }
+
+    /// A chain with rough plans. Between its subruns the tool is to turn back with the greatest accelerations that all lines
+    /// allow; other subruns take what accelerations are the best for them, and the lines beside them the same.
+    fn look_at_chain<'b>(&self, chain: &Chain<'b>) -> Result<LookedChain<'b, M>, Fault>
+    where
+        Self: 'b,
+    {
+        let mut strokes = self.strokes(chain)?;
+        let Strokes { paths, lines, accelerations } = &mut strokes;
         let greatest = accelerations.clone();
-        for i in 1..count {
+        for i in 1..lines.len() {
             let most = BELOW * accelerations[i];
             accelerations[i] = match [lines[i - 1], lines[i]] {
                 [None, None] => most,
@@ -89,26 +149,41 @@ impl<const M: usize> Task<'_, M> {
                 _ => accelerations[i],
             };
         }
-        let plan = |i: usize, accelerations: &[f64]| {
-            let subrun = &chain.subruns[i];
-            let watch = self.effort.watch.part(subrun.parts.len() as f64);
-            let effort = Effort { watch, ..*self.effort };
-            let ends =
-                [0, 1].map(|end| end_of(subrun.ends[end], [accelerations[i + end], greatest[i + end]]));
-            Task { effort: &effort, problem: self.problem, limits: self.limits }.plan(&paths[i], ends, 0)
+        let look = |i: usize| {
+            let ends = ends_of(chain, i, accelerations, &greatest);
+            lines[i].is_none().then(|| (i, self.of_subrun(chain, i, |own| own.look(&paths[i], ends))))
+        };
+        let looked = (0..lines.len()).into_par_iter().filter_map(look).collect();
+        Ok(LookedChain { strokes, greatest, looked })
+    }
+
+    /// The profiles of a chain of subruns. Two subruns in a row that are no lines are
+    /// planned again, with at most the lesser acceleration of both, until they meet.
+    fn chain(&self, chain: &Chain, looked: LookedChain<M>) -> Result<Vec<JerkProfile>, Fault> {
+        let count = chain.subruns.len();
+        let LookedChain { strokes: Strokes { paths, lines, mut accelerations }, greatest, looked } = looked;
+        let plan = |i: usize, accelerations: &[f64], looked: Option<Looked>| {
+            let ends = ends_of(chain, i, accelerations, &greatest);
+            self.of_subrun(chain, i, |own| {
+                let looked = looked.unwrap_or_else(|| own.look(&paths[i], ends));
+                own.plan(&paths[i], ends, looked, 0)
+            })
         };
         let mut planned = vec![JerkProfile::default(); count];
-        let mut open: Vec<usize> = (0..count).filter(|&i| lines[i].is_none()).collect();
+        let mut open: Vec<(usize, Option<Looked>)> =
+            looked.into_iter().map(|(i, looked)| (i, Some(looked))).collect();
         for round in 0.. {
             if open.is_empty() {
                 break;
             }
-            let again: Vec<JerkProfile> =
-                open.par_iter().map(|&i| plan(i, &accelerations)).collect::<Result<_, _>>()?;
-            for (&i, phases) in open.iter().zip(again) {
+            let again: Vec<(usize, JerkProfile)> = open
+                .into_par_iter()
+                .map(|(i, looked)| Ok((i, plan(i, &accelerations, looked)?)))
+                .collect::<Result<_, Fault>>()?;
+            for (i, phases) in again {
                 planned[i] = phases;
             }
-            open.clear();
+            open = vec![];
             for i in 1..count {
                 if lines[i - 1].is_some()
                     || lines[i].is_some()
@@ -118,11 +193,10 @@ impl<const M: usize> Task<'_, M> {
                 }
                 let both = [planned[i - 1].end_acceleration(1), planned[i].end_acceleration(0)];
                 accelerations[i] = if round < ROUNDS { both[0].min(both[1]) } else { 0.0 };
-                open.extend(
-                    [0, 1].into_iter().filter(|&side| both[side] > accelerations[i]).map(|side| i - 1 + side),
-                );
+                let sides = [0, 1].into_iter().filter(|&side| both[side] > accelerations[i]);
+                open.extend(sides.map(|side| (i - 1 + side, None)));
             }
-            open.dedup();
+            open.dedup_by_key(|(i, _)| *i);
         }
         for i in 0..count {
             if lines[i].is_none() && !planned[i].phases.is_empty() {
@@ -153,7 +227,7 @@ impl<const M: usize> Task<'_, M> {
                     let fastest = s_curve::cross(&line.segment, line.ends([greatest[i], greatest[i + 1]]));
                     planned[i].lower_bound = vec![fastest.iter().map(|section| section.duration).sum()];
                 } else if (i..i + 2).any(|turn| accelerations[turn] == 0.0 && greatest[turn] > 0.0) {
-                    planned[i].lower_bound = plan(i, &greatest)?.lower_bound;
+                    planned[i].lower_bound = plan(i, &greatest, None)?.lower_bound;
                 }
             }
         }
@@ -177,16 +251,47 @@ impl<const M: usize> Task<'_, M> {
     /// The profile of a subrun that rests at its ends, or moves as it says; unplanned if the deadline has passed.
     pub fn subrun(&self, subrun: &Subrun) -> Result<JerkProfile, Fault> {
         let own = Chain { subruns: std::slice::from_ref(subrun), turns: &[] };
-        Ok(self.chain(&own)?.remove(0))
+        Ok(self.chains(&[own])?.remove(0))
+    }
+
+    /// Does work on a subrun of a chain, with its part of the watch.
+    fn of_subrun<T>(&self, chain: &Chain, i: usize, work: impl FnOnce(&Task<M>) -> T) -> T {
+        let watch = self.effort.watch.part(chain.subruns[i].parts.len() as f64);
+        work(&Task { effort: &Effort { watch, ..*self.effort }, ..*self })
+    }
+
+    /// A path between two ends with rough plans.
+    fn look(&self, path: &ArcLengthPath<M>, ends: [End; 2]) -> Looked {
+        let junctions = path.junctions(&self.limits.jerk);
+        let caps = path.caps(&junctions);
+        let stretches = stretches(self.problem, path, &self.limits, &junctions, ends);
+        let planned = stretches.iter().filter(|stretch| stretch.held.is_none());
+        let share = planned.map(|stretch| stretch.ends[1] - stretch.ends[0]).sum::<f64>() / path.total();
+        let resolution = (self.effort.resolution / (1.0 + FINER * (1.0 / share - 1.0)).sqrt())
+            .max(LEAST.min(self.effort.resolution));
+        let mut looked = Looked { junctions, caps, resolution, stretches: vec![] };
+        let look = |stretch: Stretch| {
+            let rough = stretch.held.is_none().then(|| {
+                self.on_stretch(path, &stretch, &looked, |_, problem, moves, effort| {
+                    moving_axes::rough(problem, moves, effort)
+                })
+            });
+            LookedStretch { stretch, rough, phases: None }
+        };
+        looked.stretches = stretches.into_par_iter().map(look).collect();
+        looked
     }
 
     /// The profile of a path between two ends, after this number of cuts.
-    fn plan(&self, path: &ArcLengthPath<M>, ends: [End; 2], cuts: u32) -> Result<JerkProfile, Fault> {
-        let junctions = path.junctions(&self.limits.jerk);
-        let caps = path.caps(&junctions);
+    fn plan(
+        &self,
+        path: &ArcLengthPath<M>,
+        ends: [End; 2],
+        mut looked: Looked,
+        cuts: u32,
+    ) -> Result<JerkProfile, Fault> {
         let moving = ends.iter().any(|end| matches!(end, End::Moving { .. }));
-        let own = stretches(self.problem, path, &self.limits, &junctions, ends);
-        match self.stretches(path, own, &junctions, &caps) {
+        match self.stretches(path, &mut looked) {
             // The deadline came before the first iteration of all windows.
             Ok(planned) if self.effort.expired() && planned.iter().all(|own| own.excess.is_empty()) => {
                 Ok(JerkProfile::unplanned())
@@ -205,7 +310,7 @@ impl<const M: usize> Task<'_, M> {
             Err(path_problem::Fault::Input(what)) => {
                 Err(Fault::Input { piece: Some(path.parts[0].piece), what })
             }
-            Err(path_problem::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &caps),
+            Err(path_problem::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &looked.caps),
             Err(path_problem::Fault::NoPlan { s }) if cuts < CUTS => self.cut(path, s, cuts),
             Err(path_problem::Fault::NoPlan { s }) => {
                 let part = path.part(s);
@@ -218,41 +323,35 @@ impl<const M: usize> Task<'_, M> {
     fn stretches(
         &self,
         path: &ArcLengthPath<M>,
-        own: Vec<Stretch>,
-        junctions: &[Junction],
-        caps: &[SpeedCap],
+        looked: &mut Looked,
     ) -> Result<Vec<JerkProfile>, path_problem::Fault> {
-        let planned = own.iter().filter(|stretch| stretch.held.is_none());
-        let share = planned.map(|stretch| stretch.ends[1] - stretch.ends[0]).sum::<f64>() / path.total();
-        let resolution = (self.effort.resolution / (1.0 + FINER * (1.0 / share - 1.0)).sqrt())
-            .max(LEAST.min(self.effort.resolution));
-        let effort = Effort { resolution, ..*self.effort };
-        let mut all: Vec<(Stretch, Option<JerkProfile>)> = own.into_iter().map(|own| (own, None)).collect();
+        let mut all = take(&mut looked.stretches);
         loop {
-            let plan = |(stretch, phases): &(Stretch, Option<JerkProfile>)| match phases {
-                None => self.stretch(path, stretch, &effort, junctions, caps).map(Some),
-                Some(_) => Ok(None),
+            let plan = |LookedStretch { stretch, rough, phases }: &mut LookedStretch| {
+                if phases.is_none() {
+                    *phases = Some(self.stretch(path, stretch, rough.take(), looked)?);
+                }
+                Ok(())
             };
-            let planned: Vec<_> = all.par_iter().map(plan).collect();
+            let planned: Vec<_> = all.par_iter_mut().map(plan).collect();
             let mut failed = vec![];
             for (i, planned) in planned.into_iter().enumerate() {
                 match planned {
-                    Ok(Some(phases)) => all[i].1 = Some(phases),
-                    Ok(None) => {}
+                    Ok(()) => {}
                     Err(path_problem::Fault::NoPlan { .. }) if all.len() > 1 => failed.push(i),
                     Err(fault) => return Err(fault),
                 }
             }
             if failed.is_empty() {
-                return Ok(all.into_iter().filter_map(|(_, phases)| phases).collect());
+                return Ok(all.into_iter().filter_map(|own| own.phases).collect());
             }
             // Where the end of a stretch at its feed is too near, it is joined with the next ones.
             for i in failed.into_iter().rev() {
                 let joined = i.saturating_sub(2)..(i + 3).min(all.len());
-                let (first, last) = (all[joined.start].0, all[joined.end - 1].0);
+                let (first, last) = (all[joined.start].stretch, all[joined.end - 1].stretch);
                 let ends = [first.ends[0], last.ends[1]];
-                let whole = Stretch { ends, states: [first.states[0], last.states[1]], held: None };
-                all.splice(joined, [(whole, None)]);
+                let stretch = Stretch { ends, states: [first.states[0], last.states[1]], held: None };
+                all.splice(joined, [LookedStretch { stretch, rough: None, phases: None }]);
             }
         }
     }
@@ -261,51 +360,69 @@ impl<const M: usize> Task<'_, M> {
         &self,
         path: &ArcLengthPath<M>,
         stretch: &Stretch,
-        effort: &Effort,
-        junctions: &[Junction],
-        caps: &[SpeedCap],
+        rough: Option<Result<Rough, path_problem::Fault>>,
+        looked: &Looked,
     ) -> Result<JerkProfile, path_problem::Fault> {
-        let Stretch { ends, states, held } = *stretch;
-        let watch = effort.watch.part((ends[1] - ends[0]) / path.total());
+        let Stretch { ends, held, .. } = *stretch;
         let mut phases = JerkProfile::default();
         if let Some(feed) = held {
             phases.push_held(path, ends, feed);
             phases.lower_bound.push((ends[1] - ends[0]) / feed);
-            watch.advance(1);
-            self.kinks(path, junctions, |_| feed * feed, ends, &mut phases);
+            self.effort.watch.part((ends[1] - ends[0]) / path.total()).advance(1);
+            self.kinks(path, looked, |_| feed * feed, ends, &mut phases);
             return Ok(phases);
         }
+        self.on_stretch(path, stretch, looked, |own, problem, moves, effort| {
+            let mut loss = self.loss;
+            let rough = rough.unwrap_or_else(|| {
+                let rough = moving_axes::rough(problem, moves, effort)?;
+                loss = refinement::greatest(iter::once(&rough.losses));
+                Ok(rough)
+            });
+            let plan = rough.and_then(|rough| moving_axes::plan(problem, moves, rough, loss, effort));
+            let plan = plan.map_err(|fault| match fault {
+                path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
+                fault => fault,
+            })?;
+            phases.push_profile(&own.path, &self.limits.jerk, &plan.profile);
+            // The phases are kept until all stretches of the subrun are planned.
+            phases.phases.shrink_to_fit();
+            phases.stopped = !plan.converged && effort.expired();
+            phases.lower_bound.push(plan.lower_bound);
+            if plan.iterations > 0.0 {
+                phases.excess.push(plan.excess);
+            }
+            self.kinks(path, looked, |s| plan.profile.at(own.within(s))[0], ends, &mut phases);
+            Ok(phases)
+        })
+    }
+
+    /// Does work on a stretch as a problem of its own, by those axes that move, with its effort.
+    fn on_stretch<T>(
+        &self,
+        path: &ArcLengthPath<M>,
+        &Stretch { ends, states, .. }: &Stretch,
+        looked: &Looked,
+        work: impl FnOnce(&Between<M>, &path_problem::Problem<Between<M>, M>, &[bool; M], &Effort) -> T,
+    ) -> T {
         let own = Between::new(path, ends);
         let within = |cap: &SpeedCap| SpeedCap { s: own.within(cap.s), ..*cap };
-        let caps: Vec<SpeedCap> = caps_between(caps, ends).iter().map(within).collect();
+        let caps: Vec<SpeedCap> = caps_between(&looked.caps, ends).iter().map(within).collect();
         let problem =
             path_problem::Problem { geometry: &own, limits: self.limits, caps: &caps, ends: states };
-        let moves = moving(self.problem, path, ends);
         // Short intervals leave room below the limits for the rounding of such lengths.
         let few_digits = ends[1] - ends[0] < FEW_DIGITS * path.total();
-        let resolution = if few_digits { FINER_THERE } else { 1.0 } * effort.resolution;
-        let plan = moving_axes::plan(&problem, &moves, &Effort { resolution, watch, ..*effort });
-        let plan = plan.map_err(|fault| match fault {
-            path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
-            fault => fault,
-        })?;
-        phases.push_profile(&own.path, &self.limits.jerk, &plan.profile);
-        // The phases are kept until all stretches of the subrun are planned.
-        phases.phases.shrink_to_fit();
-        phases.stopped = !plan.converged && effort.expired();
-        phases.lower_bound.push(plan.lower_bound);
-        if plan.iterations > 0.0 {
-            phases.excess.push(plan.excess);
-        }
-        self.kinks(path, junctions, |s| plan.profile.at(own.within(s))[0], ends, &mut phases);
-        Ok(phases)
+        let resolution = if few_digits { FINER_THERE } else { 1.0 } * looked.resolution;
+        let watch = self.effort.watch.part((ends[1] - ends[0]) / path.total());
+        let effort = Effort { resolution, watch, ..*self.effort };
+        work(&own, &problem, &moving(self.problem, path, ends), &effort)
     }
 
     /// Adds the pieces of the junctions between two lengths whose jump limits the speed; w is its square at a length.
     fn kinks(
         &self,
         path: &ArcLengthPath<M>,
-        junctions: &[Junction],
+        Looked { junctions, .. }: &Looked,
         w: impl Fn(f64) -> f64,
         [from, to]: [f64; 2],
         phases: &mut JerkProfile,
@@ -379,7 +496,7 @@ impl<const M: usize> Task<'_, M> {
         let path = ArcLengthPath::new(self.problem, parts);
         match self.line(&path, [0.0; 2])? {
             Some(line) => Ok(self.along_line(&path, &line, [0.0; 2])),
-            None => self.plan(&path, [End::Rest; 2], cuts),
+            None => self.plan(&path, [End::Rest; 2], self.look(&path, [End::Rest; 2]), cuts),
         }
     }
 
@@ -396,7 +513,8 @@ impl<const M: usize> Task<'_, M> {
         let possible = |speeds: [f64; 2]| {
             let ends = speeds.map(|speed| end_of(speed, [0.0; 2]));
             let problem = path_problem::Problem { geometry: path, limits: self.limits, caps, ends };
-            moving_axes::plan(&problem, &moves, &effort).is_ok()
+            let rough = moving_axes::rough(&problem, &moves, &effort);
+            rough.and_then(|rough| moving_axes::plan(&problem, &moves, rough, f64::INFINITY, &effort)).is_ok()
         };
         // The end is at fault where the start alone can be met.
         let at = usize::from(speeds[0] == 0.0 || (speeds[1] > 0.0 && possible([speeds[0], 0.0])));
@@ -417,6 +535,12 @@ impl<const M: usize> Task<'_, M> {
             Fault::End { piece: parts[parts.len() - 1].piece, reachable: low }
         })
     }
+}
+
+/// The ends of a subrun of a chain with these accelerations at its turns, in mm/s², where the bound is for all up to the
+/// greatest.
+fn ends_of(chain: &Chain, i: usize, accelerations: &[f64], greatest: &[f64]) -> [End; 2] {
+    [0, 1].map(|end| end_of(chain.subruns[i].ends[end], [accelerations[i + end], greatest[i + end]]))
 }
 
 /// The end of a path at a speed in mm/s; at rest with an acceleration of at most this, in mm/s², where the bound is for

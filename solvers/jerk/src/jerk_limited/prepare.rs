@@ -65,20 +65,10 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         Ok(prepared)
     }
 
-    /// The same problem with each interval in a number of equal parts; with the same first plan, where that is valid.
-    pub fn refined(&self, parts: &[u32], effort: &Effort<'a>) -> Self {
-        let grid = self.grid.refined(parts);
-        let mut fine = Self::on(self.problem, grid, [self.ends, self.bound_ends], self.slopes, effort);
-        if !self.x.is_empty() {
-            let counts = parts.iter().map(|&parts| parts as usize);
-            fine.x = hermite::prolong(&self.x, counts, &fine.grid.lengths());
-            fine.used =
-                fine.each(|rows, x| rows.utilisation(x).into_iter().map(initial_plan::kept).collect());
-        }
-        if fine.x.is_empty() || fine.used.iter().any(|&used| used > 1.0) {
-            fine.begin();
-        }
-        fine
+    /// What a plan on a finer grid starts from.
+    pub fn start(self) -> Start {
+        let Self { grid, ends, bound_ends, x, slopes, .. } = self;
+        Start { grid, ends: [ends, bound_ends], x, slopes }
     }
 
     fn on(
@@ -165,6 +155,36 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         self.take(range.clone(), &mut window.rows);
         let stations = &self.grid.stations[range.start..=range.end];
         window.check.sample(self.problem.geometry, stations, &self.grid.pieces[range], &window.rows);
+    }
+}
+
+/// A grid, the ends for the plan and for the lower bound, and a valid plan.
+pub struct Start {
+    pub grid: Grid,
+    ends: [[WindowEnd; 2]; 2],
+    x: Vec<f64>,
+    slopes: Slopes,
+}
+
+impl Start {
+    /// The problem with each interval of the grid in a number of equal parts; with the same first plan, where that is valid.
+    pub fn refined<'a, G: Geometry<M>, const M: usize>(
+        &self,
+        problem: &'a Problem<'a, G, M>,
+        parts: &[u32],
+        effort: &Effort<'a>,
+    ) -> Prepared<'a, G, M> {
+        let mut fine = Prepared::on(problem, self.grid.refined(parts), self.ends, self.slopes, effort);
+        if !self.x.is_empty() {
+            let counts = parts.iter().map(|&parts| parts as usize);
+            fine.x = hermite::prolong(&self.x, counts, &fine.grid.lengths());
+            fine.used =
+                fine.each(|rows, x| rows.utilisation(x).into_iter().map(initial_plan::kept).collect());
+        }
+        if fine.x.is_empty() || fine.used.iter().any(|&used| used > 1.0) {
+            fine.begin();
+        }
+        fine
     }
 }
 

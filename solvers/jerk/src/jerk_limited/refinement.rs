@@ -11,14 +11,17 @@ use super::hermite;
 use super::intersample_check::IntersampleCheck;
 use feedplan_geometry::lanes::eight::Lanes;
 
+/// Intervals of an even grid of the resolution in one of the coarse grid.
+pub const COARSE: u32 = 3;
 /// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
 const LOSS: f64 = 0.067;
-/// It is lowered by this factor until the grid loses no more in all than the even grid of the resolution.
+/// It is lowered by this factor until the grid loses no more in all than the even grid, at most so many times.
 const LOWER: f64 = 0.93;
+const TIMES: i32 = 255;
 /// A grid whose loss is at most this part of the time, over the square of the resolution, is fine enough.
 const LITTLE: f64 = 0.003;
 /// The most parts of an interval.
-const MOST: f64 = 8.0;
+const MOST: u32 = 8;
 /// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
 const GAP: f64 = 0.45;
 /// A limit counts as used where the rough plan uses more than this part of it.
@@ -45,17 +48,50 @@ pub fn tolerance(resolution: f64) -> f64 {
     GAP * LOSS / (resolution * resolution)
 }
 
-/// The number of parts in which each coarse interval is to be split. `losses` are those of the intervals, in s, and `time` is the
-/// time on all of them. The even grid of the resolution has `even` parts in each.
-pub fn parts(losses: &[f64], time: f64, resolution: f64, even: u32) -> Vec<u32> {
-    let split = |most: f64| move |loss: &f64| (loss / most).cbrt().ceil().clamp(1.0, MOST);
-    let unit = time / (resolution * resolution);
-    let allowed = (losses.iter().sum::<f64>() / f64::from(even * even)).max(LITTLE * unit);
-    let mut most = LOSS * unit / losses.len() as f64;
-    while losses.iter().map(|loss| loss / split(most)(loss).powi(2)).sum::<f64>() > allowed {
-        most *= LOWER;
+/// The losses of a path's intervals on the coarse grid.
+#[derive(Clone, Debug, Default)]
+pub struct Losses {
+    /// In s.
+    pub each: Vec<f64>,
+    /// The time over the square of the resolution, in s.
+    pub unit: f64,
+}
+
+/// The greatest loss of a part, in s, for paths that are to lose no more in all than on even grids. The least number of
+/// intervals for a loss in all has the same loss everywhere.
+pub fn greatest<'a>(paths: impl Iterator<Item = &'a Losses> + Clone) -> f64 {
+    let paths = paths.filter(|path| path.unit > 0.0);
+    let sum = |of: fn(&Losses) -> f64| paths.clone().map(of).sum::<f64>();
+    let allowed = sum(|path| path.even().max(LITTLE * path.unit));
+    let first = LOSS * sum(|path| path.unit) / sum(|path| path.each.len() as f64);
+    let lowered = |times: i32| first * LOWER.powi(times);
+    let fine = |times: i32| {
+        let lost = |loss: &f64| loss / f64::from(parts(*loss, lowered(times)).pow(2));
+        paths.clone().flat_map(|path| &path.each).map(lost).sum::<f64>() <= allowed
+    };
+    let (mut low, mut high) = (0, TIMES);
+    while low < high {
+        let middle = (low + high) / 2;
+        (low, high) = if fine(middle) { (low, middle) } else { (middle + 1, high) };
     }
-    losses.iter().map(split(most)).map(|parts| parts as u32).collect()
+    lowered(low)
+}
+
+/// The number of parts in which an interval is to be split so that each loses this much at most, in s.
+fn parts(loss: f64, greatest: f64) -> u32 {
+    1 + (1..MOST).map(|parts| u32::from(loss > greatest * f64::from(parts.pow(3)))).sum::<u32>()
+}
+
+impl Losses {
+    /// The loss of the even grid, in s.
+    fn even(&self) -> f64 {
+        self.each.iter().sum::<f64>() / f64::from(COARSE * COARSE)
+    }
+
+    /// The numbers of parts in which the intervals are to be split for a greatest loss of a part, in s.
+    pub fn parts(&self, greatest: f64) -> Vec<u32> {
+        self.each.iter().map(|&loss| parts(loss, greatest)).collect()
+    }
 }
 
 impl RoughPlan {
@@ -97,7 +133,7 @@ mod tests {
     use crate::path_problem::{self, End, Limits, Problem};
     use feedplan_geometry::watch::Watch;
 
-    /// The losses of a path on an even grid of this resolution, and the time.
+    /// The losses of a path on an even grid of this resolution, and the time in s.
     fn losses(turn: f64, resolution: f64) -> (Vec<f64>, f64) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
@@ -122,34 +158,58 @@ mod tests {
         for turn in [0.2, 1.0, 2.0] {
             let (losses, time) = losses(turn, 16.0 / 3.0);
             let counts = [16.0, 48.0, 144.0].map(|resolution| {
-                let parts = parts(&losses, time, resolution, 1);
-                parts.iter().sum::<u32>() as f64 / parts.len() as f64
+                let greatest = LOSS * time / (resolution * resolution) / losses.len() as f64;
+                let all = losses.iter().map(|&loss| parts(loss, greatest));
+                all.sum::<u32>() as f64 / losses.len() as f64
             });
             // The number goes with the power 2/3 of the resolution, where not with 0: 3^(2/3) = 2.1.
             assert!(counts[1] > 1.4 * counts[0] && counts[2] > 1.4 * counts[1], "{counts:?}");
         }
     }
 
+    fn lost(path: &Losses, parts: &[u32]) -> f64 {
+        path.each.iter().zip(parts).map(|(loss, &parts)| loss / f64::from(parts * parts)).sum()
+    }
+
+    fn alone(path: &Losses) -> Vec<u32> {
+        path.parts(greatest(std::iter::once(path)))
+    }
+
     #[test]
     fn a_grid_loses_no_more_than_the_even_one() {
-        let even = |losses: &[f64]| losses.iter().sum::<f64>() / 9.0;
-        let lost = |losses: &[f64], parts: &[u32]| {
-            losses.iter().zip(parts).map(|(loss, &parts)| loss / f64::from(parts * parts)).sum::<f64>()
-        };
         // By hand: thirds of all lose 1/9; a loss in one of eight places only is split there.
         let (all, one) = ([1e-3; 8], std::array::from_fn::<_, 8, _>(|n| if n == 3 { 8e-3 } else { 0.0 }));
         for losses in [all, one] {
-            let parts = parts(&losses, 50.0, 16.0, 3);
-            assert!(lost(&losses, &parts) <= even(&losses) * (1.0 + 1e-12), "{parts:?}");
+            let path = Losses { each: losses.to_vec(), unit: 50.0 / 256.0 };
+            let parts = alone(&path);
+            assert!(lost(&path, &parts) <= path.even() * (1.0 + 1e-12), "{parts:?}");
             let expected = losses.map(|loss| if loss > 0.0 { 3 } else { 1 });
             assert_eq!(parts, expected);
         }
         for turn in [0.2, 1.0, 2.0] {
-            let (losses, time) = losses(turn, 16.0 / 3.0);
-            let parts = parts(&losses, time, 16.0, 3);
-            assert!(lost(&losses, &parts) <= even(&losses).max(LITTLE * time / 256.0));
+            let (each, time) = losses(turn, 16.0 / 3.0);
+            let path = Losses { each, unit: time / 256.0 };
+            let parts = alone(&path);
+            assert!(lost(&path, &parts) <= path.even().max(LITTLE * path.unit));
             assert!(parts.iter().sum::<u32>() < 3 * parts.len() as u32);
         }
+    }
+
+    #[test]
+    fn paths_together_need_fewer_intervals_for_the_same_loss() {
+        let [easy, hard] = [0.2, 2.0].map(|turn| {
+            let (each, time) = losses(turn, 16.0 / 3.0);
+            Losses { each, unit: time / 256.0 }
+        });
+        // A path without a rough plan has no losses, and does not count.
+        let none = Losses { each: vec![0.0; 1000], unit: 0.0 };
+        let greatest = greatest([&none, &easy, &hard].into_iter());
+        let paths = [&easy, &hard];
+        let together = paths.map(|path| path.parts(greatest));
+        let count = |parts: &[Vec<u32>; 2]| parts.concat().iter().sum::<u32>();
+        let loss = |parts: &[Vec<u32>; 2]| lost(&easy, &parts[0]) + lost(&hard, &parts[1]);
+        let allowed: f64 = paths.map(|path| path.even().max(LITTLE * path.unit)).iter().sum();
+        assert!(loss(&together) <= allowed && count(&together) < count(&paths.map(alone)));
     }
 
     #[test]

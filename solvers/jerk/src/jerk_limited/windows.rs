@@ -20,9 +20,9 @@ use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point;
 use super::lower_bound::{self, Part, Planned};
-use super::prepare::{Prepared, PREPARING};
+use super::prepare::{Prepared, Start, PREPARING};
 use super::profile::{Plan, Profile};
-use super::refinement::{self, RoughPlan};
+use super::refinement::{self, Losses, RoughPlan, COARSE};
 use super::relaxed::Relaxed;
 use super::rest_ramp;
 use super::window::{ramps, Window, WindowReport};
@@ -39,8 +39,6 @@ const REACH: (f64, usize) = (11.0, 80);
 const EASE: usize = 20;
 /// Least travel time from cut to cut, in the same stop times.
 const LONG: f64 = 36.0;
-/// Intervals of an even grid in one of the grid of rough plans.
-const COARSE: u32 = 3;
 /// No part of an interval is shorter than this part of the path: arc lengths have no digits for less.
 const SHORTEST: f64 = rest_ramp::SHORTEST / 16.0;
 /// The share of the rough plans in the work.
@@ -54,42 +52,79 @@ const BLENDED: f64 = 1.0 + 5e-7;
 
 /// The plan of least time.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
-    let fine = Effort { watch: effort.watch.part(1.0 - ROUGH), ..*effort };
-    let (prepared, sections) = refined(problem, effort, &fine)?;
-    if prepared.x.is_empty() {
-        return Err(Fault::NoPlan { s: prepared.grid.stations[0] });
-    }
-    Run::new(&prepared, &fine).plan(&sections)
+    let rough = Rough::new(problem, effort)?;
+    let greatest = refinement::greatest(std::iter::once(&rough.losses));
+    rough.plan(problem, greatest, effort)
 }
 
-/// The problem on the grid that rough plans ask for, for the effort `fine`; with the sections of the path.
-fn refined<'a, G: Geometry<M>, const M: usize>(
-    problem: &'a Problem<'a, G, M>,
-    effort: &Effort<'a>,
-    fine: &Effort<'a>,
-) -> Result<(Prepared<'a, G, M>, Vec<Section>), Fault> {
-    let coarse = Effort {
-        resolution: effort.resolution / f64::from(COARSE),
-        // A window has more intervals on the grid that follows.
-        window: effort.window / 2,
-        watch: effort.watch.part(ROUGH),
-        ..*effort
-    };
-    let rough = Prepared::new(problem, &coarse)?;
-    let run = Run::new(&rough, &coarse);
-    let mut sections = if rough.x.is_empty() { vec![] } else { run.sections() };
-    run.roughly(&mut sections, effort.resolution);
-    let parts = run.parts(&mut sections, effort.resolution);
-    let prepared = rough.refined(&parts, fine);
-    if !prepared.x.is_empty() {
-        let run = Run::new(&prepared, fine);
+/// A path planned roughly, on a coarse grid.
+pub struct Rough {
+    start: Start,
+    /// Empty where no first plan was found.
+    sections: Vec<Section>,
+    pub losses: Losses,
+}
+
+impl Rough {
+    /// For the plan of a problem with this effort.
+    pub fn new<G: Geometry<M>, const M: usize>(
+        problem: &Problem<G, M>,
+        effort: &Effort,
+    ) -> Result<Self, Fault> {
+        let coarse = Effort {
+            resolution: effort.resolution / f64::from(COARSE),
+            // A window has more intervals on the grid that follows.
+            window: effort.window / 2,
+            watch: effort.watch.part(ROUGH),
+            ..*effort
+        };
+        let prepared = Prepared::new(problem, &coarse)?;
+        let run = Run::new(&prepared, &coarse);
+        let mut sections = if prepared.x.is_empty() { vec![] } else { run.sections() };
+        run.roughly(&mut sections, effort.resolution);
+        let losses = run.losses(&mut sections, effort.resolution);
+        Ok(Self { start: prepared.start(), sections, losses })
+    }
+
+    /// The plan of least time on a grid whose parts lose `greatest` at most, in s.
+    pub fn plan<G: Geometry<M>, const M: usize>(
+        self,
+        problem: &Problem<G, M>,
+        greatest: f64,
+        effort: &Effort,
+    ) -> Result<Plan, Fault> {
+        let effort = Effort { watch: effort.watch.part(1.0 - ROUGH), ..*effort };
+        let parts = self.parts(greatest, &effort);
+        let Self { start, mut sections, .. } = self;
+        let prepared = start.refined(problem, &parts, &effort);
+        if prepared.x.is_empty() {
+            return Err(Fault::NoPlan { s: prepared.grid.stations[0] });
+        }
+        let run = Run::new(&prepared, &effort);
         if sections.is_empty() {
             sections = run.sections();
         } else {
             run.refine(&mut sections, &parts);
         }
+        run.plan(&sections)
     }
-    Ok((prepared, sections))
+
+    /// In how many parts each interval of the coarse grid is to be split.
+    fn parts(&self, greatest: f64, effort: &Effort) -> Vec<u32> {
+        let stations = &self.start.grid.stations;
+        let mut parts = self.losses.parts(greatest);
+        if self.sections.is_empty() {
+            parts.fill(COARSE);
+        }
+        for Section { core, .. } in self.sections.iter().filter(|section| section.rough.is_none()) {
+            parts[core.clone()].fill(if effort.expired() { 1 } else { COARSE });
+        }
+        let shortest = SHORTEST * stations[stations.len() - 1];
+        for (parts, pair) in parts.iter_mut().zip(stations.windows(2)) {
+            *parts = (*parts).min(((pair[1] - pair[0]) / shortest) as u32).max(1);
+        }
+        parts
+    }
 }
 
 /// Some neighbouring intervals that are solved as one window.
@@ -245,32 +280,18 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         });
     }
 
-    /// In how many parts each interval of the coarse grid is to be split.
-    fn parts(&self, sections: &mut [Section], resolution: f64) -> Vec<u32> {
-        let (mut losses, mut time) = (vec![0.0; self.stations.len() - 1], 0.0);
-        for Section { range, core, rough } in sections.iter_mut() {
+    /// The losses by the rough plans; 0 where there are none.
+    fn losses(&self, sections: &mut [Section], resolution: f64) -> Losses {
+        let (mut each, mut time) = (vec![0.0; self.stations.len() - 1], 0.0);
+        for Section { range, core, rough } in sections {
             if let Some(rough) = rough {
-                losses[core.clone()].copy_from_slice(
-                    &take(&mut rough.losses)[core.start - range.start..core.end - range.start],
-                );
+                let own = core.start - range.start..core.end - range.start;
+                each[core.clone()].copy_from_slice(&take(&mut rough.losses)[own]);
                 time +=
                     core.clone().map(|n| duration(&rough.x, n - range.start, self.length(n))).sum::<f64>();
             }
         }
-        let by_loss = refinement::parts(&losses, time, resolution, COARSE);
-        let mut parts = vec![COARSE; losses.len()];
-        for Section { core, rough, .. } in sections.iter() {
-            if rough.is_some() {
-                parts[core.clone()].copy_from_slice(&by_loss[core.clone()]);
-            } else if self.effort.expired() {
-                parts[core.clone()].fill(1);
-            }
-        }
-        let shortest = SHORTEST * self.stations.last().copied().unwrap_or(0.0);
-        for (n, parts) in parts.iter_mut().enumerate() {
-            *parts = (*parts).min((self.length(n) / shortest) as u32).max(1);
-        }
-        parts
+        Losses { each, unit: time / (resolution * resolution) }
     }
 
     /// Takes sections of a coarse grid whose intervals were split into these numbers of parts.

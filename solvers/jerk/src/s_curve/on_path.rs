@@ -64,7 +64,7 @@ pub fn plan<const M: usize>(
         let path = ArcLengthPath::new(problem, &subrun.parts);
         match quickest(problem, &path, subrun, limits, (cuttings, look_ahead), watch)? {
             Some(own) => Ok(along(&path, limits, &own.sections)),
-            None => Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.subrun(subrun),
+            None => Task::new(problem, limits, &Effort { watch, ..*effort }).subrun(subrun),
         }
     })
 }
@@ -104,7 +104,7 @@ pub fn of_sections<const M: usize>(
             }
             None => {
                 let effort = Effort { watch, ..Effort::default() };
-                Task { problem, limits: *limits, effort: &effort }.subrun(subrun)
+                Task::new(problem, limits, &effort).subrun(subrun)
             }
         }
     })
