@@ -331,7 +331,7 @@ mod tests {
                 space.state.dual = vec![Lanes::ZERO; rows.blocks.len() * layout.all()];
                 for (n, p) in both_sides(station) {
                     let dual = layout.of_mut(&mut space.state.dual, n / LANES, p);
-                    for row in [2, layout.speed()].into_iter().filter(|row| keeps || *row > 2) {
+                    for row in [0, layout.speed()].into_iter().filter(|row| keeps || *row > 0) {
                         dual[row].values_mut()[n % LANES] = 4.0 * random().abs() * rows.h(n);
                     }
                 }

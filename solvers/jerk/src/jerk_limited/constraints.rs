@@ -61,22 +61,25 @@ pub struct Constraints {
     pub acceleration: Vec<Sides>,
     /// 1/J of each axis.
     pub per_jerk: Vec<f64>,
+    /// Whether the acceleration has rows: on most windows it stays far below its limits.
+    pub accelerates: bool,
 }
 
-/// Indices of the rows at one collocation point: for each axis the upper and the lower limit of its acceleration and of its
-/// jerk, then speed, then w ≥ 0.
-#[derive(Clone, Copy, Debug)]
+/// Indices of the rows at one collocation point: for each axis the upper and the lower limit of its jerk, then speed, then
+/// w ≥ 0, then for each axis the upper and the lower limit of its acceleration, if it has rows.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct RowLayout {
     axes: usize,
+    accelerates: bool,
 }
 
 impl RowLayout {
-    /// Rows of an axis.
-    pub const OF_AXIS: usize = 4;
+    /// Both limits of one axis.
+    pub const PAIR: usize = 2;
 
     #[inline(always)]
     pub const fn speed(self) -> usize {
-        Self::OF_AXIS * self.axes
+        Self::PAIR * self.axes
     }
 
     #[inline(always)]
@@ -84,9 +87,15 @@ impl RowLayout {
         self.speed() + 1
     }
 
+    /// The first row of acceleration.
+    #[inline(always)]
+    pub const fn acceleration(self) -> usize {
+        self.speed() + 2
+    }
+
     #[inline(always)]
     pub const fn count(self) -> usize {
-        self.speed() + 2
+        self.acceleration() + if self.accelerates { Self::PAIR * self.axes } else { 0 }
     }
 
     /// Rows of an interval, and of a block.
@@ -104,6 +113,19 @@ impl RowLayout {
     #[inline(always)]
     pub fn of_mut(self, all: &mut [Lanes], block: usize, p: usize) -> &mut [Lanes] {
         &mut all[(block * COUNT + p) * self.count()..][..self.count()]
+    }
+
+    /// The pairs of jerk and of acceleration among the rows at a collocation point.
+    #[inline(always)]
+    pub fn pairs(self, rows: &[Lanes]) -> [std::slice::ChunksExact<'_, Lanes>; 2] {
+        [&rows[..self.speed()], &rows[self.acceleration()..]].map(|rows| rows.chunks_exact(Self::PAIR))
+    }
+
+    #[inline(always)]
+    pub fn pairs_mut(self, rows: &mut [Lanes]) -> [std::slice::ChunksExactMut<'_, Lanes>; 2] {
+        let (jerk, rest) = rows.split_at_mut(self.speed());
+        let acceleration = &mut rest[self.acceleration() - self.speed()..];
+        [jerk, acceleration].map(|rows| rows.chunks_exact_mut(Self::PAIR))
     }
 }
 
@@ -133,6 +155,7 @@ impl Constraints {
             q: vec![],
             acceleration: Sides::of(&limits.acceleration).to_vec(),
             per_jerk: limits.jerk.map(|j| 1.0 / j).to_vec(),
+            accelerates: true,
         }
     }
 
@@ -144,7 +167,7 @@ impl Constraints {
 
     #[inline(always)]
     pub fn layout(&self) -> RowLayout {
-        RowLayout { axes: self.axes() }
+        RowLayout { axes: self.axes(), accelerates: self.accelerates }
     }
 
     /// q', q'', q''' of each axis at collocation point p of a block.
@@ -271,6 +294,7 @@ impl Constraints {
         station_cap: impl Fn(usize) -> f64,
     ) {
         self.clear();
+        self.accelerates = true;
         for (n, &piece) in pieces.iter().enumerate() {
             let (start, end) = (stations[n], stations[n + 1]);
             let h = end - start;
@@ -297,6 +321,7 @@ impl Constraints {
         let whole = if range.start.is_multiple_of(LANES) { range.len() / LANES } else { 0 };
         let (first, q) = (range.start / LANES, COUNT * self.axes());
         self.clear();
+        self.accelerates = others.accelerates;
         self.blocks.extend_from_slice(&others.blocks[first..][..whole]);
         self.q.extend_from_slice(&others.q[first * q..][..whole * q]);
         self.count = whole * LANES;
@@ -305,21 +330,31 @@ impl Constraints {
         }
     }
 
-    /// Acceleration and jerk/√w of an axis at collocation point p of a block, over A and J.
+    /// The acceleration of an axis at collocation point p of a block, over A.
     #[inline(always)]
-    pub fn axis<S: Simd>(
+    fn acceleration<S: Simd>(
+        &self,
+        block: usize,
+        p: usize,
+        k: usize,
+        [w, w1, _]: [Register<S>; 3],
+    ) -> Register<S> {
+        let [q1, q2, _] = self.q(block, p)[k];
+        let tight = self.blocks[block].points[p].acceleration;
+        (q2 * w + q1 * (w1 * 0.5)) * self.acceleration[k].per_mean * tight
+    }
+
+    /// The jerk/√w of an axis at collocation point p of a block, over J.
+    #[inline(always)]
+    pub fn jerk_of<S: Simd>(
         &self,
         block: usize,
         p: usize,
         k: usize,
         [w, w1, w2]: [Register<S>; 3],
-    ) -> [Register<S>; 2] {
-        let own = &self.blocks[block];
+    ) -> Register<S> {
         let [q1, q2, q3] = self.q(block, p)[k];
-        [
-            (q2 * w + q1 * (w1 * 0.5)) * self.acceleration[k].per_mean * own.points[p].acceleration,
-            (q3 * w + q2 * (w1 * 1.5) + q1 * (w2 * 0.5)) * self.per_jerk[k] * own.jerk,
-        ]
+        (q3 * w + q2 * (w1 * 1.5) + q1 * (w2 * 0.5)) * self.per_jerk[k] * self.blocks[block].jerk
     }
 
     /// The slacks at collocation point p of a block, with w^(−1/2) = `pace` and the last row as given.
@@ -334,17 +369,19 @@ impl Constraints {
         out: &mut [Lanes],
     ) {
         let (simd, layout) = (pace.simd(), self.layout());
-        let (rows, rest) = out.split_at_mut(layout.speed());
-        for (k, rows) in rows.chunks_exact_mut(RowLayout::OF_AXIS).enumerate() {
-            let [a, j] = self.axis(block, p, k, motion);
+        let [jerk, acceleration] = layout.pairs_mut(out);
+        for (k, rows) in jerk.enumerate() {
+            let j = self.jerk_of(block, p, k, motion);
+            (rows[0], rows[1]) = ((pace - j).into(), (pace + j).into());
+        }
+        for (k, rows) in acceleration.enumerate() {
+            let a = self.acceleration(block, p, k, motion);
             let [up, down] = self.acceleration[k].most;
             rows[0] = (Register::all(simd, up) - a).into();
             rows[1] = (Register::all(simd, down) + a).into();
-            rows[2] = (pace - j).into();
-            rows[3] = (pace + j).into();
         }
-        rest[0] = (Lanes::ONE - motion[0] * self.blocks[block].points[p].speed).into();
-        rest[1] = last.into();
+        out[layout.speed()] = (Lanes::ONE - motion[0] * self.blocks[block].points[p].speed).into();
+        out[layout.positive()] = last.into();
     }
 
     /// The change of the slacks for a step with this motion.
@@ -358,14 +395,18 @@ impl Constraints {
         last: Register<S>,
         out: &mut [Lanes],
     ) {
-        let (rows, rest) = out.split_at_mut(self.layout().speed());
-        for (k, rows) in rows.chunks_exact_mut(RowLayout::OF_AXIS).enumerate() {
-            let [a, j] = self.axis(block, p, k, motion);
-            (rows[0], rows[1]) = ((-a).into(), a.into());
-            (rows[2], rows[3]) = ((pace - j).into(), (pace + j).into());
+        let layout = self.layout();
+        let [jerk, acceleration] = layout.pairs_mut(out);
+        for (k, rows) in jerk.enumerate() {
+            let j = self.jerk_of(block, p, k, motion);
+            (rows[0], rows[1]) = ((pace - j).into(), (pace + j).into());
         }
-        rest[0] = (-(motion[0] * self.blocks[block].points[p].speed)).into();
-        rest[1] = last.into();
+        for (k, rows) in acceleration.enumerate() {
+            let a = self.acceleration(block, p, k, motion);
+            (rows[0], rows[1]) = ((-a).into(), a.into());
+        }
+        out[layout.speed()] = (-(motion[0] * self.blocks[block].points[p].speed)).into();
+        out[layout.positive()] = last.into();
     }
 
     /// Σ weight ∇s ∇sᵀ over the linear parts of the rows at collocation point p of a block.
@@ -379,17 +420,11 @@ impl Constraints {
         let tight_jerk = jerk * jerk;
         let mut m = [Register::all(simd, 0.0); 6];
         m[0] = weight[layout.speed()].load(simd) * point.speed * point.speed;
-        for ((k, weight), q) in weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(self.q(block, p)) {
+        let [jerks, accelerations] = layout.pairs(weight);
+        for ((weight, q), per) in jerks.zip(self.q(block, p)).zip(&self.per_jerk) {
             let [q1, q2, q3] = q.map(|q| q.load(simd));
             let (half, more) = (q1 * 0.5, q2 * 1.5);
-            let per = self.acceleration[k].per_mean;
-            let both = (weight[0].load(simd) + weight[1]) * tight * (per * per);
-            let (b2, b1) = (both * q2, both * half);
-            m[0] += b2 * q2;
-            m[1] += b2 * half;
-            m[3] += b1 * half;
-            let per = self.per_jerk[k];
-            let both = (weight[2].load(simd) + weight[3]) * tight_jerk * (per * per);
+            let both = (weight[0].load(simd) + weight[1]) * tight_jerk * (per * per);
             let (b0, b1) = (both * q3, both * more);
             m[0] += b0 * q3;
             m[1] += b0 * more;
@@ -397,6 +432,17 @@ impl Constraints {
             m[3] += b1 * more;
             m[4] += b1 * half;
             m[5] += both * half * half;
+        }
+        for ((weight, q), Sides { per_mean: per, .. }) in
+            accelerations.zip(self.q(block, p)).zip(&self.acceleration)
+        {
+            let [q1, q2, _] = q.map(|q| q.load(simd));
+            let half = q1 * 0.5;
+            let both = (weight[0].load(simd) + weight[1]) * tight * (per * per);
+            let (b2, b1) = (both * q2, both * half);
+            m[0] += b2 * q2;
+            m[1] += b2 * half;
+            m[3] += b1 * half;
         }
         m
     }
@@ -416,15 +462,18 @@ impl Constraints {
         let zero = Register::all(simd, 0.0);
         let mut g = [-(aim[layout.speed()].load(simd) * point.speed), zero, zero];
         let mut jerk = zero;
-        for ((k, aim), &[q1, q2, q3]) in
-            aim.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(self.q(block, p))
-        {
-            let a = (aim[1].load(simd) - aim[0]) * point.acceleration * self.acceleration[k].per_mean;
-            let j = (aim[3].load(simd) - aim[2]) * own.jerk * self.per_jerk[k];
-            g[0] += a * q2 + j * q3;
-            g[1] += a * q1 * 0.5 + j * q2 * 1.5;
+        let [jerks, accelerations] = layout.pairs(aim);
+        for ((aim, &[q1, q2, q3]), per_jerk) in jerks.zip(self.q(block, p)).zip(&self.per_jerk) {
+            let j = (aim[1].load(simd) - aim[0]) * own.jerk * *per_jerk;
+            g[0] += j * q3;
+            g[1] += j * q2 * 1.5;
             g[2] += j * q1 * 0.5;
-            jerk += aim[2].load(simd) + aim[3];
+            jerk += aim[0].load(simd) + aim[1];
+        }
+        for ((aim, &[q1, q2, _]), limit) in accelerations.zip(self.q(block, p)).zip(&self.acceleration) {
+            let a = (aim[1].load(simd) - aim[0]) * point.acceleration * limit.per_mean;
+            g[0] += a * q2;
+            g[1] += a * q1 * 0.5;
         }
         (g, jerk)
     }
@@ -448,7 +497,7 @@ impl Constraints {
                 let v = motion[0].max(zero).sqrt();
                 worst[0] = (motion[0] * block.points[p].speed).max(worst[0]);
                 for (k, limit) in self.acceleration.iter().enumerate() {
-                    let [a, j] = self.axis(b, p, k, motion);
+                    let (a, j) = (self.acceleration(b, p, k, motion), self.jerk_of(b, p, k, motion));
                     let [per_up, per_down] = limit.per_most;
                     worst[1] = (a * per_up).max(-a * per_down).max(worst[1]);
                     worst[2] = (j * v).abs().max(worst[2]);

@@ -3,7 +3,7 @@
 use fearless_simd::Simd;
 
 use super::columns::Columns;
-use super::constraints::{Constraints, RowLayout};
+use super::constraints::Constraints;
 use super::forms::{fall, pace, Local};
 use super::hermite::{combine, AT_NODES, COUNT, WEIGHTS};
 use super::model::Model;
@@ -75,13 +75,12 @@ impl Model for Exact {
             form[0] += last;
             form[1] += last * inwards;
             form[3] += last * inwards * inwards;
-            for ((k, weight), &[q1, q2, q3]) in
-                weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(rows.q(block, p))
-            {
+            let [jerks, _] = layout.pairs(weight);
+            for ((weight, &[q1, q2, q3]), per_jerk) in jerks.zip(rows.q(block, p)).zip(&rows.per_jerk) {
                 // The slope of w^(−1/2) adds to the two rows of an axis's jerk.
-                let [up, down] = [weight[2].load(simd), weight[3].load(simd)];
+                let [up, down] = [weight[0].load(simd), weight[1].load(simd)];
                 let (both, turn) = (up + down, (up - down) * fall);
-                let turn = turn * own.jerk * rows.per_jerk[k];
+                let turn = turn * own.jerk * *per_jerk;
                 form[0] += both * fall * fall + turn * q3 * 2.0;
                 form[1] += turn * q2 * 1.5;
                 form[2] += turn * q1 * 0.5;

@@ -185,7 +185,7 @@ impl IntersampleCheck {
     ) -> Vec<f64> {
         let (x, layout) = (Columns::new(x), rows.layout());
         let zero = Register::all(simd, 0.0);
-        let mut multipliers = vec![zero; layout.positive()];
+        let mut multipliers = vec![zero; layout.count()];
         let mut out = Vec::with_capacity(rows.blocks.len() * LANES);
         for (b, (block, used)) in self.blocks.iter().zip(used.chunks(LANES)).enumerate() {
             let h = rows.blocks[b].h.load(simd);
@@ -209,12 +209,12 @@ impl IntersampleCheck {
                 for (k, (sum, own)) in multipliers.iter_mut().zip(layout.of(dual, b, p)).enumerate() {
                     let own = own.load(simd);
                     // Those of jerk are of the jerk over √w.
-                    *sum += if k < layout.speed() && k % RowLayout::OF_AXIS >= 2 { own * pace } else { own };
+                    *sum += if k < layout.speed() { own * pace } else { own };
                 }
             }
             let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
             let mut loss = zero;
-            for ((axis, q), own) in axes.zip(multipliers.chunks_exact(RowLayout::OF_AXIS)) {
+            for (k, (axis, q)) in axes.enumerate() {
                 let Axis { velocity, acceleration: most, per_jerk } = axis;
                 let [mut a, mut j] = [zero; 2];
                 for i in 0..SAMPLES {
@@ -226,9 +226,14 @@ impl IntersampleCheck {
                     caps[i] = caps[i].max(first * first);
                 }
                 let (a, j) = (a * most.per_mean, j * jerk_factor * *per_jerk);
-                loss += (acceleration * most.most[0] - a).max(zero) * own[0];
-                loss += (acceleration * most.most[1] + a).max(zero) * own[1];
-                loss += (jerk - j).max(zero) * own[2] + (jerk + j).max(zero) * own[3];
+                let pair = |first: usize| &multipliers[first + RowLayout::PAIR * k..][..RowLayout::PAIR];
+                let own = pair(0);
+                loss += (jerk - j).max(zero) * own[0] + (jerk + j).max(zero) * own[1];
+                if rows.accelerates {
+                    let own = pair(layout.acceleration());
+                    loss += (acceleration * most.most[0] - a).max(zero) * own[0];
+                    loss += (acceleration * most.most[1] + a).max(zero) * own[1];
+                }
             }
             let mut mean = zero;
             for (i, cap) in caps.iter().enumerate() {
@@ -375,11 +380,11 @@ mod tests {
             }
             let [up, down] = axis.acceleration.most;
             let one = |_: f64| 1.0;
-            sum += over(4 * k, &one) * (up * most[1] - a).max(0.0);
-            sum += over(4 * k + 1, &one) * (down * most[1] + a).max(0.0);
+            sum += over(layout.acceleration() + 2 * k, &one) * (up * most[1] - a).max(0.0);
+            sum += over(layout.acceleration() + 2 * k + 1, &one) * (down * most[1] + a).max(0.0);
             let pace = |w: f64| 1.0 / w.sqrt();
-            sum += over(4 * k + 2, &pace) * (most[2] - j).max(0.0);
-            sum += over(4 * k + 3, &pace) * (most[2] + j).max(0.0);
+            sum += over(2 * k, &pace) * (most[2] - j).max(0.0);
+            sum += over(2 * k + 1, &pace) * (most[2] + j).max(0.0);
         }
         let speed: f64 = (0..SAMPLES).map(|i| MEAN[i] * caps[i] * combine(&BASES[i][0], &u)).sum();
         sum + over(layout.speed(), &|_| 1.0) * (most[0].powi(2) - speed).max(0.0)

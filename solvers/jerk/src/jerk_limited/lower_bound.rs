@@ -325,11 +325,9 @@ fn excess(rows: &Constraints, dual: &[Lanes]) -> f64 {
 /// c less the multipliers of jerk at collocation point p of intervals of length h.
 pub(super) fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> Lanes {
     let mut rest = h.map(|h| MASS[p] * h);
-    for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
-        for row in &of_axis[2..] {
-            for (rest, own) in rest.values_mut().iter_mut().zip(row.values()) {
-                *rest -= own;
-            }
+    for row in &dual[..layout.speed()] {
+        for (rest, own) in rest.values_mut().iter_mut().zip(row.values()) {
+            *rest -= own;
         }
     }
     rest
@@ -352,14 +350,11 @@ pub(super) fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
             let dual = layout.of_mut(out, b, p);
             let [at, tight_at] = [&own.points[p], &tight.points[p]];
             scale(&mut dual[layout.speed()], &tight_at.speed, &at.speed);
-            for of_axis in dual[..layout.speed()].chunks_exact_mut(RowLayout::OF_AXIS) {
-                let (acceleration, jerk) = of_axis.split_at_mut(2);
-                for row in acceleration {
-                    scale(row, &tight_at.acceleration, &at.acceleration);
-                }
-                for row in jerk {
-                    scale(row, &tight.jerk, &own.jerk);
-                }
+            for row in &mut dual[..layout.speed()] {
+                scale(row, &tight.jerk, &own.jerk);
+            }
+            for row in &mut dual[layout.acceleration()..] {
+                scale(row, &tight_at.acceleration, &at.acceleration);
             }
             dual[layout.positive()] = rest(&own.h, dual, layout, p).map(|rest| rest.max(0.0));
         }
@@ -420,8 +415,8 @@ pub(super) fn lagrangian_on<S: Simd>(
             fastest += cost * pace(most);
             moves = [moves[0] + cost * rise, moves[1] + cost * drop];
             let mut jerk = zero;
-            for of_axis in dual[..layout.speed()].chunks_exact(RowLayout::OF_AXIS) {
-                jerk += of_axis[2].load(simd) + of_axis[3];
+            for row in &dual[..layout.speed()] {
+                jerk += row.load(simd);
             }
             // The Lagrangian is bounded below in y only if the multipliers of jerk add up to its cost at most; the multiplier
             // of a chord adds to the cost.
@@ -436,10 +431,13 @@ pub(super) fn lagrangian_on<S: Simd>(
             let most = cost * jerk.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
             let fit = Register::all(simd, 1.0).min(most);
             let mut fixed = -dual[layout.speed()].load(simd);
-            for (limit, of_axis) in rows.acceleration.iter().zip(dual.chunks_exact_mut(RowLayout::OF_AXIS)) {
+            for row in &mut dual[..layout.speed()] {
+                *row = (*row * fit).into();
+            }
+            let [_, accelerations] = layout.pairs(dual);
+            for (limit, pair) in rows.acceleration.iter().zip(accelerations) {
                 let [up, down] = limit.most;
-                fixed += -(of_axis[0].load(simd) * up + of_axis[1].load(simd) * down);
-                (of_axis[2], of_axis[3]) = ((of_axis[2] * fit).into(), (of_axis[3] * fit).into());
+                fixed += -(pair[0].load(simd) * up + pair[1].load(simd) * down);
             }
             let last = (cost - jerk * fit).max(zero);
             let [w, w1, w2] = motion(p, per_h, &u);

@@ -62,15 +62,15 @@ pub fn rough<G: Geometry<M>, const M: usize>(
     work(problem, moves, Roughly(effort))
 }
 
-/// The plan of least time from a rough one, with parts of the grid that lose `greatest` at most, in s.
+/// The plan of least time from a rough one, on a grid for a price of an interval in s.
 pub fn plan<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     moves: &[bool; M],
     rough: Rough,
-    greatest: f64,
+    price: f64,
     effort: &Effort,
 ) -> Result<Plan, Fault> {
-    work(problem, moves, Finely(rough, greatest, effort))
+    work(problem, moves, Finely(rough, price, effort))
 }
 
 fn work<G: Geometry<M>, W: Work, const M: usize>(

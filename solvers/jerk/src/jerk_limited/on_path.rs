@@ -96,8 +96,8 @@ pub struct Task<'a, const M: usize> {
     pub problem: &'a Problem<'a, M>,
     pub limits: Limits<M>,
     pub effort: &'a Effort<'a>,
-    /// The greatest loss of an interval, in s, on paths that are planned roughly together (`refinement`).
-    loss: f64,
+    /// The price of an interval, in s, on paths that are planned roughly together (`refinement`).
+    price: f64,
 }
 
 impl LookedStretch {
@@ -108,7 +108,7 @@ impl LookedStretch {
 
 impl<'a, const M: usize> Task<'a, M> {
     pub fn new(problem: &'a Problem<'a, M>, limits: &Limits<M>, effort: &'a Effort<'a>) -> Self {
-        Self { problem, limits: *limits, effort, loss: f64::INFINITY }
+        Self { problem, limits: *limits, effort, price: f64::INFINITY }
     }
 }
 
@@ -120,8 +120,8 @@ impl<const M: usize> Task<'_, M> {
         let looked: Vec<Option<LookedChain<M>>> = chains.par_iter().map(look).collect::<Result<_, _>>()?;
         let paths = looked.iter().flatten().flat_map(|chain| &chain.looked);
         let roughs = paths.flat_map(|(_, own)| &own.stretches).filter_map(LookedStretch::rough);
-        let loss = refinement::greatest(roughs.map(|rough| &rough.losses));
-        let task = Task { loss, ..*self };
+        let price = refinement::price(roughs.map(|rough| &rough.losses));
+        let task = Task { price, ..*self };
         let plan = |(chain, looked): (&Chain, Option<_>)| match looked {
             Some(looked) => task.chain(chain, looked),
             None => Ok(vec![JerkProfile::unplanned(); chain.subruns.len()]),
@@ -373,13 +373,13 @@ impl<const M: usize> Task<'_, M> {
             return Ok(phases);
         }
         self.on_stretch(path, stretch, looked, |own, problem, moves, effort| {
-            let mut loss = self.loss;
+            let mut price = self.price;
             let rough = rough.unwrap_or_else(|| {
                 let rough = moving_axes::rough(problem, moves, effort)?;
-                loss = refinement::greatest(iter::once(&rough.losses));
+                price = refinement::price(iter::once(&rough.losses));
                 Ok(rough)
             });
-            let plan = rough.and_then(|rough| moving_axes::plan(problem, moves, rough, loss, effort));
+            let plan = rough.and_then(|rough| moving_axes::plan(problem, moves, rough, price, effort));
             let plan = plan.map_err(|fault| match fault {
                 path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
                 fault => fault,

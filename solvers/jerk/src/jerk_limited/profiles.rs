@@ -54,7 +54,7 @@ pub fn relaxed_times(rows: &Constraints, x: &[f64]) -> Vec<f64> {
                 let motion = motion(p, h.inverse(), &x.local(b, h, block.live));
                 let mut y = pace(motion[0]);
                 for k in 0..rows.axes() {
-                    y = y.max(rows.axis(b, p, k, motion)[1].abs());
+                    y = y.max(rows.jerk_of(b, p, k, motion).abs());
                 }
                 time += y * h * MASS[p];
             }

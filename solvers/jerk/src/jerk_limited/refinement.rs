@@ -2,9 +2,8 @@
 //!
 //! The optimum uses some limit fully at each place. A cubic spline cannot: within an interval the use of that limit varies,
 //! and the interval loses about Σ λ (greatest use − mean use) of time (`IntersampleCheck::losses`). The loss falls with the
-//! square of its length h, also where the jerk changes from one limit to another, as λ is small there. For the least
-//! number of intervals with a given loss in all, each is split into parts of the same loss: their number goes with the cube
-//! root of its loss.
+//! square of its length h, also where the jerk changes from one limit to another, as λ is small there. The least number of
+//! intervals for a loss in all has one price of an interval: each is split into one part more where that saves more.
 
 use super::constraints::Constraints;
 use super::hermite;
@@ -13,8 +12,8 @@ use feedplan_geometry::lanes::eight::Lanes;
 
 /// Intervals of an even grid of the resolution in one of the coarse grid.
 pub const COARSE: u32 = 3;
-/// The greatest loss of a part, as a part of the mean time of the coarse intervals, times the square of the resolution.
-const LOSS: f64 = 0.067;
+/// The greatest price of an interval, as a part of the mean time of the coarse intervals, times the square of the resolution.
+const PRICE: f64 = 0.05;
 /// It is lowered by this factor until the grid loses no more in all than the even grid, at most so many times.
 const LOWER: f64 = 0.93;
 const TIMES: i32 = 255;
@@ -22,10 +21,12 @@ const TIMES: i32 = 255;
 const LITTLE: f64 = 0.003;
 /// The most parts of an interval.
 const MOST: u32 = 8;
-/// Complementarity gap of the rough plan, as a part of the time: this part of `LOSS` over the square of the resolution.
-const GAP: f64 = 0.45;
+/// Complementarity gap of the rough plan, as a part of the time, times the square of the resolution.
+const GAP: f64 = 0.03;
 /// A limit counts as used where the rough plan uses more than this part of it.
 const USED: f64 = 0.97;
+/// An acceleration above this part of its limit is near to it: that of the plan may be greater.
+const NEAR: f64 = 0.9;
 /// Peaks that exceed the collocation points by more than this factor still move.
 const FIRM: f64 = 1.05;
 /// Peaks are taken to exceed the collocation points of parts by this multiple of what is expected.
@@ -41,11 +42,13 @@ pub struct RoughPlan {
     /// By what factors the uses of the limits of speed, acceleration and jerk between the collocation points exceed those at
     /// them; 1 where such a peak would move on a finer grid.
     pub peaks: Vec<[f32; 3]>,
+    /// Whether the acceleration comes near to a limit, so that it needs rows.
+    pub accelerates: bool,
 }
 
-/// The complementarity gap of a rough plan: a part of what its grid may lose.
+/// The complementarity gap of a rough plan.
 pub fn tolerance(resolution: f64) -> f64 {
-    GAP * LOSS / (resolution * resolution)
+    GAP / (resolution * resolution)
 }
 
 /// The losses of a path's intervals on the coarse grid.
@@ -57,13 +60,12 @@ pub struct Losses {
     pub unit: f64,
 }
 
-/// The greatest loss of a part, in s, for paths that are to lose no more in all than on even grids. The least number of
-/// intervals for a loss in all has the same loss everywhere.
-pub fn greatest<'a>(paths: impl Iterator<Item = &'a Losses> + Clone) -> f64 {
+/// The price of an interval in s with which paths lose no more in all than on even grids.
+pub fn price<'a>(paths: impl Iterator<Item = &'a Losses> + Clone) -> f64 {
     let paths = paths.filter(|path| path.unit > 0.0);
     let sum = |of: fn(&Losses) -> f64| paths.clone().map(of).sum::<f64>();
     let allowed = sum(|path| path.even().max(LITTLE * path.unit));
-    let first = LOSS * sum(|path| path.unit) / sum(|path| path.each.len() as f64);
+    let first = PRICE * sum(|path| path.unit) / sum(|path| path.each.len() as f64);
     let lowered = |times: i32| first * LOWER.powi(times);
     let fine = |times: i32| {
         let lost = |loss: &f64| loss / f64::from(parts(*loss, lowered(times)).pow(2));
@@ -77,9 +79,10 @@ pub fn greatest<'a>(paths: impl Iterator<Item = &'a Losses> + Clone) -> f64 {
     lowered(low)
 }
 
-/// The number of parts in which an interval is to be split so that each loses this much at most, in s.
-fn parts(loss: f64, greatest: f64) -> u32 {
-    1 + (1..MOST).map(|parts| u32::from(loss > greatest * f64::from(parts.pow(3)))).sum::<u32>()
+/// The number of parts in which an interval is to be split at a price of an interval, in s.
+fn parts(loss: f64, price: f64) -> u32 {
+    let of = |parts: u32| 1.0 / f64::from(parts * parts);
+    1 + (1..MOST).map(|parts| u32::from(loss * (of(parts) - of(parts + 1)) > price)).sum::<u32>()
 }
 
 impl Losses {
@@ -88,9 +91,9 @@ impl Losses {
         self.each.iter().sum::<f64>() / f64::from(COARSE * COARSE)
     }
 
-    /// The numbers of parts in which the intervals are to be split for a greatest loss of a part, in s.
-    pub fn parts(&self, greatest: f64) -> Vec<u32> {
-        self.each.iter().map(|&loss| parts(loss, greatest)).collect()
+    /// The numbers of parts in which the intervals are to be split at a price of an interval, in s.
+    pub fn parts(&self, price: f64) -> Vec<u32> {
+        self.each.iter().map(|&loss| parts(loss, price)).collect()
     }
 }
 
@@ -106,7 +109,8 @@ impl RoughPlan {
             .zip(rows.utilisation(&x))
             .map(|(used, at)| std::array::from_fn(|i| peak(used[i], at[i]) as f32))
             .collect();
-        Self { x, losses, peaks }
+        let accelerates = rows.accelerates || used.iter().any(|used| used[1] > NEAR);
+        Self { x, losses, peaks, accelerates }
     }
 
     /// The same on intervals that were split into numbers of parts with these lengths. Between collocation points that are
@@ -158,8 +162,8 @@ mod tests {
         for turn in [0.2, 1.0, 2.0] {
             let (losses, time) = losses(turn, 16.0 / 3.0);
             let counts = [16.0, 48.0, 144.0].map(|resolution| {
-                let greatest = LOSS * time / (resolution * resolution) / losses.len() as f64;
-                let all = losses.iter().map(|&loss| parts(loss, greatest));
+                let price = PRICE * time / (resolution * resolution) / losses.len() as f64;
+                let all = losses.iter().map(|&loss| parts(loss, price));
                 all.sum::<u32>() as f64 / losses.len() as f64
             });
             // The number goes with the power 2/3 of the resolution, where not with 0: 3^(2/3) = 2.1.
@@ -172,7 +176,16 @@ mod tests {
     }
 
     fn alone(path: &Losses) -> Vec<u32> {
-        path.parts(greatest(std::iter::once(path)))
+        path.parts(price(std::iter::once(path)))
+    }
+
+    #[test]
+    fn one_part_more_must_save_its_price_by_hand() {
+        // Of a loss of 36 s two parts save 27 s, the third one 5 s, the fourth 1.75 s.
+        for (price, known) in [(30.0, 1), (20.0, 2), (6.0, 2), (4.0, 3), (1.8, 3), (1.7, 4), (0.0, MOST)] {
+            assert_eq!(parts(36.0, price), known, "{price} s");
+        }
+        assert_eq!(parts(0.0, 0.0), 1);
     }
 
     #[test]
@@ -203,9 +216,9 @@ mod tests {
         });
         // A path without a rough plan has no losses, and does not count.
         let none = Losses { each: vec![0.0; 1000], unit: 0.0 };
-        let greatest = greatest([&none, &easy, &hard].into_iter());
+        let price = price([&none, &easy, &hard].into_iter());
         let paths = [&easy, &hard];
-        let together = paths.map(|path| path.parts(greatest));
+        let together = paths.map(|path| path.parts(price));
         let count = |parts: &[Vec<u32>; 2]| parts.concat().iter().sum::<u32>();
         let loss = |parts: &[Vec<u32>; 2]| lost(&easy, &parts[0]) + lost(&hard, &parts[1]);
         let allowed: f64 = paths.map(|path| path.even().max(LITTLE * path.unit)).iter().sum();
@@ -218,6 +231,7 @@ mod tests {
         let mut plan = RoughPlan {
             x: vec![1.0, 0.0, 2.0, 0.5, 3.0, 0.0, 3.0, 0.0],
             losses: vec![],
+            accelerates: true,
             peaks: vec![[1.0, 1.25, 1.5], [1.0, 1.0, 1.9], [1.0; 3]],
         };
         plan.refine(&parts, &[0.6, 0.1, 0.1, 0.1, 0.2, 0.2]);

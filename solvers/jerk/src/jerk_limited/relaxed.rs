@@ -11,7 +11,7 @@
 use fearless_simd::Simd;
 
 use super::columns::Columns;
-use super::constraints::{Constraints, RowLayout};
+use super::constraints::Constraints;
 use super::forms::{fall, motion, pace, project, Local};
 use super::hermite::{COUNT, MASS};
 use super::model::Model;
@@ -91,7 +91,7 @@ impl Model for Relaxed {
                 let motion = motion(p, per_h, &u);
                 let mut least = pace(motion[0]);
                 for k in 0..rows.axes() {
-                    least = least.max(rows.axis(b, p, k, motion)[1].abs());
+                    least = least.max(rows.jerk_of(b, p, k, motion).abs());
                 }
                 // Half-way to the chord at most.
                 let room = Register::all(simd, 1.0) - motion[0] * block.points[p].speed;
@@ -160,12 +160,11 @@ impl Model for Relaxed {
             let limit = weight[layout.speed()].load(simd) * chord;
             let mut cross = [last + limit * chord, last * fall + limit * own.points[p].speed, zero, zero];
             form[0] += last * fall * fall + dual[layout.positive()] * fall * pace * pace * 1.5;
-            for ((k, weight), &[q1, q2, q3]) in
-                weight.chunks_exact(RowLayout::OF_AXIS).enumerate().zip(rows.q(block, p))
-            {
-                let [up, down] = [weight[2].load(simd), weight[3].load(simd)];
+            let [jerks, _] = layout.pairs(weight);
+            for ((weight, &[q1, q2, q3]), per_jerk) in jerks.zip(rows.q(block, p)).zip(&rows.per_jerk) {
+                let [up, down] = [weight[0].load(simd), weight[1].load(simd)];
                 let (both, turn) = (up + down, down - up);
-                let turn = turn * own.jerk * rows.per_jerk[k];
+                let turn = turn * own.jerk * *per_jerk;
                 cross[0] += both;
                 cross[1] += turn * q3;
                 cross[2] += turn * q2 * 1.5;

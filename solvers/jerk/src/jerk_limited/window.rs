@@ -70,6 +70,7 @@ impl Window {
     ) -> WindowReport {
         let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
+        self.rows.accelerates = rough.is_none_or(|rough| rough.accelerates);
         let far = inside(x);
         let mut attempts = vec![];
         if let Some(RoughPlan { x: near, peaks, .. }) = rough {
@@ -79,14 +80,21 @@ impl Window {
             let own = Effort { barrier: NEAR_BARRIER, ..*effort };
             attempts.extend(NEAR.map(|part| (blend(&far, near, part), own)));
         }
-        attempts.push((far, *effort));
+        attempts.push((far.clone(), *effort));
         let mut times = vec![0; self.rows.count()];
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             let Some((y, report)) = self.attempt(ends, attempts, space, &mut verdict.iterations) else {
                 break;
             };
-            let holds = self.tighten(&y, &mut times);
+            let used = self.check.utilisation(&self.rows, &y);
             let stopped = report.outcome == Outcome::Stopped;
+            let accelerates = used.iter().any(|used| used[1] > HELD);
+            if accelerates && !self.rows.accelerates && !stopped && round < ROUNDS {
+                self.rows.accelerates = true;
+                attempts = vec![(far.clone(), *effort)];
+                continue;
+            }
+            let holds = self.tighten(&used, &mut times);
             if holds {
                 if report.time < best {
                     improved = y;
@@ -104,7 +112,7 @@ impl Window {
                 }
                 verdict.converged = !stopped && time <= report.time * (1.0 + CHEAP * effort.tolerance);
             }
-            if stopped || verdict.converged {
+            if stopped || verdict.converged || round == ROUNDS {
                 break;
             }
             attempts = self.starts(&ends, x, &y, effort);
@@ -113,18 +121,28 @@ impl Window {
         verdict
     }
 
-    /// The optimum at the collocation points, roughly, from a valid plan; None where it is not found.
+    /// The optimum at the collocation points, roughly, from a valid plan; None where it is not found. The acceleration has rows
+    /// only if it comes near to its limits without.
     pub fn rough(
-        &self,
+        &mut self,
         ends: [WindowEnd; 2],
         x: &[f64],
         effort: &Effort,
         space: &mut InteriorPoint<Exact>,
     ) -> Option<RoughPlan> {
-        let (starts, mut spent) = coarse::starts(&self.rows, ends, inside(x), effort, space);
-        let (y, report) = self.attempt(ends, starts, space, &mut spent)?;
-        let found = report.outcome != Outcome::Stopped;
-        found.then(|| RoughPlan::new(&self.rows, &self.check, y, &space.state.dual))
+        self.rows.accelerates = false;
+        loop {
+            let (starts, mut spent) = coarse::starts(&self.rows, ends, inside(x), effort, space);
+            let (y, report) = self.attempt(ends, starts, space, &mut spent)?;
+            if report.outcome == Outcome::Stopped {
+                return None;
+            }
+            let plan = RoughPlan::new(&self.rows, &self.check, y, &space.state.dual);
+            if self.rows.accelerates || !plan.accelerates {
+                return Some(plan);
+            }
+            self.rows.accelerates = true;
+        }
     }
 
     /// Solves from the first start that leads to a plan; `spent` counts the iterations of all.
@@ -187,11 +205,10 @@ impl Window {
         self.check.utilisation(&self.rows, x).as_flattened().iter().all(|&used| used <= most)
     }
 
-    /// Tightens the limits where x exceeds them between the collocation points, and counts how often; false if x
-    /// exceeds any.
-    fn tighten(&mut self, x: &[f64], times: &mut [i32]) -> bool {
+    /// Tightens the limits of intervals that exceed them between the collocation points, and counts how often; false if one
+    /// does.
+    fn tighten(&mut self, all: &[[f64; 3]], times: &mut [i32]) -> bool {
         let mut holds = true;
-        let all = self.check.utilisation(&self.rows, x);
         for (n, (times, used)) in times.iter_mut().zip(all).enumerate() {
             if used.iter().all(|&used| used <= HELD) {
                 continue;
@@ -232,4 +249,49 @@ fn ways_back(ends: &[WindowEnd; 2], x: Vec<f64>) -> Vec<Vec<f64>> {
 /// A plan strictly within all limits, from one that keeps them.
 fn inside(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| INSIDE * x).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::prepare::Prepared;
+    use super::super::profiles::Winding;
+    use super::*;
+    use crate::path_problem::{self, End, Problem};
+    use feedplan_geometry::watch::Watch;
+
+    /// The time of a winding path in s, within this acceleration in mm/s², and whether the acceleration has rows at the end;
+    /// by a rough plan that says what it finds, or this.
+    fn planned(acceleration: f64, says: Option<bool>) -> (f64, bool) {
+        let limits =
+            Limits { velocity: [[250.0; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };
+        let problem = Problem { geometry: &Winding::new(1.0), limits, caps: &[], ends: [End::Rest; 2] };
+        let prepared = Prepared::new(&problem, &path_problem::Effort::default()).expect("a first plan");
+        let mut window = Window::new(&limits);
+        prepared.fill(0..prepared.grid.pieces.len(), &mut window);
+        window.rows.drop_at_ends(&prepared.ends);
+        let (barrier, watch) = (1.0, Watch::default());
+        let effort =
+            Effort { tolerance: 1e-7, max_iterations: 400, deadline: None, barrier, warm: false, watch };
+        let mut space = InteriorPoint::default();
+        let mut rough = window.rough(prepared.ends, &prepared.x, &effort, &mut space).expect("a rough plan");
+        assert_eq!(rough.accelerates, window.rows.accelerates);
+        rough.accelerates = says.unwrap_or(rough.accelerates);
+        let mut x = prepared.x.clone();
+        let report = window.improve(prepared.ends, &mut x, Some(&rough), &effort, &mut space);
+        assert!(report.converged && window.holds(&x, HELD));
+        (window.time(&prepared.ends, &x), window.rows.accelerates)
+    }
+
+    #[test]
+    fn the_acceleration_has_rows_where_it_needs_them() {
+        for (acceleration, needs) in [(20_000.0, false), (1000.0, true)] {
+            let (time, rows) = planned(acceleration, None);
+            assert_eq!(rows, needs, "{acceleration} mm/s²");
+            for says in [false, true] {
+                let (other, rows) = planned(acceleration, Some(says));
+                assert!((other / time - 1.0).abs() < 1e-6, "{other} and {time} s for {acceleration} mm/s²");
+                assert_eq!(rows, needs || says);
+            }
+        }
+    }
 }

@@ -53,8 +53,8 @@ const BLENDED: f64 = 1.0 + 5e-7;
 /// The plan of least time.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let rough = Rough::new(problem, effort)?;
-    let greatest = refinement::greatest(std::iter::once(&rough.losses));
-    rough.plan(problem, greatest, effort)
+    let price = refinement::price(std::iter::once(&rough.losses));
+    rough.plan(problem, price, effort)
 }
 
 /// A path planned roughly, on a coarse grid.
@@ -86,15 +86,15 @@ impl Rough {
         Ok(Self { start: prepared.start(), sections, losses })
     }
 
-    /// The plan of least time on a grid whose parts lose `greatest` at most, in s.
+    /// The plan of least time on a grid for a price of an interval, in s.
     pub fn plan<G: Geometry<M>, const M: usize>(
         self,
         problem: &Problem<G, M>,
-        greatest: f64,
+        price: f64,
         effort: &Effort,
     ) -> Result<Plan, Fault> {
         let effort = Effort { watch: effort.watch.part(1.0 - ROUGH), ..*effort };
-        let parts = self.parts(greatest, &effort);
+        let parts = self.parts(price, &effort);
         let Self { start, mut sections, .. } = self;
         let prepared = start.refined(problem, &parts, &effort);
         if prepared.x.is_empty() {
@@ -110,9 +110,9 @@ impl Rough {
     }
 
     /// In how many parts each interval of the coarse grid is to be split.
-    fn parts(&self, greatest: f64, effort: &Effort) -> Vec<u32> {
+    fn parts(&self, price: f64, effort: &Effort) -> Vec<u32> {
         let stations = &self.start.grid.stations;
-        let mut parts = self.losses.parts(greatest);
+        let mut parts = self.losses.parts(price);
         if self.sections.is_empty() {
             parts.fill(COARSE);
         }
@@ -455,6 +455,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         }
         window.rows.drop_at_ends(&ends);
         let verdict = window.improve(ends, &mut y, rough.as_ref(), &effort, exact);
+        loose.accelerates = window.rows.accelerates;
         let part = (proves && !self.effort.expired()).then(|| {
             let planned =
                 Planned { rows: loose, tight: &window.rows, ends: bound_ends, at_ends, x: &y, solved: exact };
