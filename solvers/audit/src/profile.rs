@@ -13,7 +13,8 @@ use super::parallel;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{self, PhaseMotion, State};
 use super::phase_order::PhaseOrder;
-use super::phases::{Phases, SPEED_CUBIC};
+use super::phases::{Phases, FEED, PATH_JERK};
+use super::speed_by_length::is_same_speed;
 use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
@@ -42,6 +43,9 @@ const MOST_HALVINGS: u32 = 200;
 /// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
 
+/// One of so many phases is looked at before all others: of what they use of the limits most phases use less.
+const FIRST: usize = 16;
+
 /// What is measured on which path.
 pub struct Audited<'a, const M: usize> {
     /// One more entry than the path has pieces.
@@ -61,13 +65,19 @@ pub fn audit_profile<'a, const M: usize>(
     let phases = of.phases;
     let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
         let mut columns = columns();
-        let good = |i: usize| phases.has_good_numbers(i, columns.count());
-        let (mut is_good, mut last) = (block.start > 0 && good(block.start - 1), None);
-        let begun = phases.runs.partition_point(|&first| first < block.start as i64);
+        let (first, count) = (block.start, columns.count());
+        let good = |i: usize| phases.has_good_numbers(i, count);
+        for i in block.clone().step_by(FIRST) {
+            of.phase(i, &mut columns, &mut None, tally);
+        }
+        let (mut is_good, mut last) = (first > 0 && good(first - 1), None);
+        let begun = phases.runs.partition_point(|&begin| begin < first as i64);
         let mut runs = phases.runs[begun..].iter().peekable();
         for i in block {
             tell(seen, i);
-            let was_good = std::mem::replace(&mut is_good, of.phase(i, &mut columns, &mut last, tally));
+            let is_known = (i - first).is_multiple_of(FIRST);
+            let found = if is_known { good(i) } else { of.phase(i, &mut columns, &mut last, tally) };
+            let was_good = std::mem::replace(&mut is_good, found);
             // Of runs without a phase several begin at once.
             let mut begins = false;
             while runs.next_if_eq(&&(i as i64)).is_some() {
@@ -178,7 +188,7 @@ impl<const M: usize> Audited<'_, M> {
     /// The time of a phase that cannot change the tally, where eight places of it and a bound of what lies between show that.
     fn at_once(&self, i: usize, columns: &mut Columns<M>, tally: &Tally<M>) -> Option<f64> {
         let (phases, piece) = (self.phases, self.phases.piece[i] as usize);
-        if phases.kind[i] != SPEED_CUBIC || !columns.are_axes() {
+        if !columns.are_axes() || phases.kind[i] == PATH_JERK || !phases.is_by_length(i, columns) {
             return None;
         }
         let curve = columns.curve(piece).clone();
@@ -189,6 +199,7 @@ impl<const M: usize> Audited<'_, M> {
             u: [phases.u0[i], phases.u1[i]],
             p: [phases.p0[i], phases.p1[i]],
             a: [phases.a0[i], phases.a1[i]],
+            held_sq: (phases.kind[i] == FEED).then(|| phases.value[i]),
         };
         let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
         let places = Places { curve: &curve, columns, limits: self.limits, feeds, feeds_along };
@@ -229,9 +240,7 @@ impl<const M: usize> Audited<'_, M> {
             let Some(look) = look else { continue };
             let (v, slope) = (look.place.pace.v, look.station.slope);
             let speeds = [v, slope * p.sqrt()];
-            // The rounding of the velocities is at least twice this part of them: it hides a smaller step.
-            let is_hidden = (speeds[1] - v).abs() <= 0.5 * ROUNDINGS * EPS * v;
-            let rounding = match is_hidden {
+            let rounding = match is_same_speed(v, speeds[1]) {
                 true => [f64::INFINITY; M],
                 false => look.velocity_rounding(self.phases.piece[i] as usize, columns),
             };

@@ -7,7 +7,7 @@
 use fearless_simd::{dispatch, Level};
 
 use super::quadrature::{integral, MOST_HALVINGS};
-use super::EPS;
+use super::{EPS, ROUNDINGS};
 
 /// A bracket of floating-point numbers cannot be halved more often than this.
 const MOST_STEPS: u32 = 1100;
@@ -112,6 +112,11 @@ impl SpeedByLength {
         let a = Bounds([a, j * per, (j1 + j * a * per * per) * per]);
         [v, a, Bounds([j, j1, j2])]
     }
+}
+
+/// Whether a recorded speed is the same as another one: the rounding of the velocities is at least twice this part of them.
+pub fn is_same_speed(speed: f64, recorded: f64) -> bool {
+    (recorded - speed).abs() <= 0.5 * ROUNDINGS * EPS * speed
 }
 
 /// Bounds of the size of a function and of its first two derivatives.

@@ -4,7 +4,8 @@
 //! the lengths up to all of them by the polynomial through them, v² by the length gives speed, acceleration and jerk along the path,
 //! the derivatives of C those of all axes. Where no place uses more of a limit than was found before, nor a parabola between two of
 //! them and the polynomial half-way, nothing needs to be looked at closer. As in `by_length`, of which these are fewer places,
-//! `bulge` bounds what lies between two: where that is much above both, and where more of a limit is used, `by_length` looks.
+//! `bulge` bounds what lies between two: where that is much above both, both halves are looked at instead. Where more of a limit is
+//! used, `by_length` looks.
 
 use fearless_simd::{dispatch, Level};
 
@@ -12,7 +13,7 @@ use crate::bulge::{bulge, Known};
 use crate::chord::chord_error;
 use crate::columns::{Columns, RATES};
 use crate::curve::Curve;
-use crate::speed_by_length::{Pace, SpeedByLength};
+use crate::speed_by_length::{is_same_speed, Pace, SpeedByLength};
 use crate::{Check, Limits, Tally, FEEDS};
 
 use super::by_length::WIDE;
@@ -116,7 +117,7 @@ const LOWEST: Weights = weights([0, 2, 5, 7]);
 /// The lowest rule counts by this share, as the others can agree by chance, and an integral is good where none is off by more than this
 /// part.
 const CHANCE: f64 = 3e-3;
-const RULES_AGREE: f64 = 1e-9;
+const RULES_AGREE: f64 = 3e-8;
 
 /// The longest interval between two places, in parts of the phase.
 const LONGEST: f64 = SHARES[4] - SHARES[3];
@@ -127,12 +128,43 @@ const SLOW_SQ: f64 = 1e-4;
 /// Where |C'| is below this share of its size the piece has no direction to speak of.
 const STILL: f64 = 1e-6;
 
-/// A phase on which v² is a cubic polynomial of the length: u, p and the acceleration along the path at both ends.
+/// A part of a phase is halved so often at most: all places of one look cost as much as some five of `by_length`.
+const MOST_HALVINGS: u32 = 4;
+
+/// A phase on which v² is a cubic polynomial of the length: u, p and the acceleration along the path at both ends; and where v² is
+/// constant, its value, of which p is another record.
 #[derive(Clone, Copy)]
 pub struct Phase {
     pub u: [f64; 2],
     pub p: [f64; 2],
     pub a: [f64; 2],
+    pub held_sq: Option<f64>,
+}
+
+/// The speed on a phase, and its length.
+type Law = (SpeedByLength, f64);
+
+/// What eight places of a part show: that it changes nothing, with its time and its length; that fewer of it may show that, with the
+/// law if the length is known; or that it has to be looked at closer.
+enum Found {
+    Nothing([f64; 2]),
+    Open(Option<Law>),
+    More,
+}
+
+impl Phase {
+    /// The speed where the squares of |C'| at both ends and the length are known; nothing next to rest, and where both records of
+    /// a speed that is held differ by more than rounding.
+    fn speed(&self, square: [f64; 2], length: f64) -> Option<SpeedByLength> {
+        let recorded = [square[0] * self.p[0], square[1] * self.p[1]];
+        let is_held = |sq: f64| recorded.iter().all(|recorded| is_same_speed(sq.sqrt(), recorded.sqrt()));
+        let [from, to] = match self.held_sq {
+            Some(sq) if !is_held(sq) => return None,
+            Some(sq) => [sq; 2],
+            None => recorded,
+        };
+        (from.min(to) > SLOW_SQ * from.max(to)).then(|| SpeedByLength::cubic([from, to], self.a, length))
+    }
 }
 
 /// What holds on the piece of a phase.
@@ -147,19 +179,68 @@ pub struct Places<'a, 'b, const M: usize> {
 impl<const M: usize> Places<'_, '_, M> {
     /// The time of a phase that cannot change the tally, by its law.
     pub fn time(&self, phase: &Phase, tally: &Tally<M>) -> Option<f64> {
-        dispatch!(Level::new(), _simd => self.time_in_vectors(phase, tally))
+        self.part(phase, (phase.u, 0.0), (None, MOST_HALVINGS), tally).map(|[time, _]| time)
+    }
+
+    /// The time and the length of a part of a phase, so far from the start of that, where it cannot change the tally.
+    fn part(
+        &self,
+        phase: &Phase,
+        (u, before): ([f64; 2], f64),
+        (law, halvings): (Option<Law>, u32),
+        tally: &Tally<M>,
+    ) -> Option<[f64; 2]> {
+        let (law, halvings) = match dispatch!(Level::new(), _simd => self.in_vectors(phase, (u, before), law, tally))
+        {
+            Found::Nothing(found) => return Some(found),
+            Found::Open(law) => (law, halvings.checked_sub(1)?),
+            Found::More => return None,
+        };
+        let law = match law {
+            Some(law) => law,
+            None => {
+                let length = self.length(phase.u, MOST_HALVINGS)?;
+                let [from, to] = self.curve.speeds(phase.u, &[1.0; M]);
+                (phase.speed([from * from, to * to], length)?, length)
+            }
+        };
+        let middle = 0.5 * (u[0] + u[1]);
+        let [time, length] = self.part(phase, ([u[0], middle], before), (Some(law), halvings), tally)?;
+        let rest = ([middle, u[1]], before + length);
+        let [more_time, more_length] = self.part(phase, rest, (Some(law), halvings), tally)?;
+        Some([time + more_time, length + more_length])
+    }
+
+    /// The length between two parameters.
+    fn length(&self, [from, to]: [f64; 2], halvings: u32) -> Option<f64> {
+        let width = to - from;
+        let (length, is_good) = integral(&self.curve.speeds(each(|i| from + SHARES[i] * width), &[1.0; M]));
+        if is_good {
+            return Some(length * width);
+        }
+        let (middle, halvings) = (0.5 * (from + to), halvings.checked_sub(1)?);
+        Some(self.length([from, middle], halvings)? + self.length([middle, to], halvings)?)
     }
 
     #[inline(always)]
-    fn time_in_vectors(&self, phase: &Phase, tally: &Tally<M>) -> Option<f64> {
-        let width = phase.u[1] - phase.u[0];
-        let [c1, c2, c3] = self.curve.derivatives_at_each(&each(|i| phase.u[0] + SHARES[i] * width));
+    fn in_vectors(
+        &self,
+        phase: &Phase,
+        (u, before): ([f64; 2], f64),
+        law: Option<Law>,
+        tally: &Tally<M>,
+    ) -> Found {
+        let width = u[1] - u[0];
+        let [c1, c2, c3] = self.curve.derivatives_at_each(&each(|i| u[0] + SHARES[i] * width));
         let square = inner(&c1, &c1);
         let slope = each(|i| square[i].sqrt());
         let slopes = [least(&slope), greatest(&slope)];
         let (whole, is_good) = integral(&slope);
-        if !is_good || slopes[0] <= STILL * self.curve.size_lengths()[0] {
-            return None;
+        if slopes[0] <= STILL * self.curve.size_lengths()[0] {
+            return Found::More;
+        }
+        if !is_good {
+            return Found::Open(law);
         }
         // The motion along the path.
         let mut way = [0.0; PLACES];
@@ -169,24 +250,22 @@ impl<const M: usize> Places<'_, '_, M> {
             }
         }
         let length = whole * width;
-        let square_of = |side: usize| square[side * (PLACES - 1)] * phase.p[side];
-        let [from, to] = [square_of(0), square_of(1)];
-        if from.min(to) <= SLOW_SQ * from.max(to) {
-            return None;
-        }
-        let speed = SpeedByLength::cubic([from, to], phase.a, length);
-        let SpeedByLength::Cubic { c, .. } = speed else { return None };
-        let per_whole = 1.0 / whole;
-        let x = each(|i| way[i] * per_whole);
+        let law = law.or_else(|| Some((phase.speed([square[0], square[PLACES - 1]], length)?, length)));
+        let Some((speed @ SpeedByLength::Cubic { c, .. }, total)) = law else { return Found::More };
+        let per_total = 1.0 / total;
+        let x = each(|i| (before + way[i] * width) * per_total);
         let v = each(|i| (c[0] + x[i] * (c[1] + x[i] * (c[2] + x[i] * c[3]))).sqrt());
-        let (per_slope, per_bend) = (0.5 / length, 0.5 / (length * length));
+        let (per_slope, per_bend) = (0.5 * per_total, 0.5 * per_total * per_total);
         let a = each(|i| per_slope * (c[1] + x[i] * (2.0 * c[2] + x[i] * (3.0 * c[3]))));
         let j = each(|i| per_bend * v[i] * (2.0 * c[2] + 6.0 * c[3] * x[i]));
         let time = match integral(&each(|i| slope[i] / v[i])) {
             (time, true) => time * width,
             // The time of a speed that changes fast takes more places than anything else.
-            _ => Some(speed.time(length)).filter(|time| time.is_finite())?,
+            _ => speed.time(before + length) - speed.time(before),
         };
+        if !time.is_finite() {
+            return Found::More;
+        }
         // The derivatives by the length; see `Station`.
         let per = each(|i| 1.0 / slope[i]);
         let first: [Lanes; M] = axes(|k| each(|i| c1[k][i] * per[i]));
@@ -216,7 +295,7 @@ impl<const M: usize> Places<'_, '_, M> {
             paces: [&pace(0), &pace(PLACES - 1)],
             way: length,
         };
-        let bulge = bulge(self.curve.bounds(), &speed, &known)?;
+        let Some(bulge) = bulge(self.curve.bounds(), &speed, &known) else { return Found::Open(law) };
         // The rates of the axes.
         let (moves, judged) = (self.curve.derivative_size(), if self.limits.judges_jerk { 3 } else { 2 });
         let (square, mixed) = (each(|i| v[i] * v[i]), each(|i| 3.0 * v[i] * a[i]));
@@ -236,8 +315,10 @@ impl<const M: usize> Places<'_, '_, M> {
                     _ => each(|i| q1[i] * j[i] + q2[i] * mixed[i] + q3[i] * cube[i]),
                 };
                 let off = bulge.rates[row] * per_least[k];
-                if !is_below(&rate, |rate| rate * per.of(k, rate), off, worst[k]) {
-                    return None;
+                match is_below(&rate, |rate| rate * per.of(k, rate), off, worst[k]) {
+                    Some(true) => {}
+                    Some(false) => return Found::More,
+                    None => return Found::Open(law),
                 }
             }
         }
@@ -254,43 +335,44 @@ impl<const M: usize> Places<'_, '_, M> {
                 let square = inner::<M>(&counted, &counted);
                 speed = each(|i| square[i].sqrt() * v[i]);
             }
-            if !is_below(&speed, |v| v * per, bulge.rates[0] * per, worst) {
-                return None;
+            match is_below(&speed, |v| v * per, bulge.rates[0] * per, worst) {
+                Some(true) => {}
+                Some(false) => return Found::More,
+                None => return Found::Open(law),
             }
         }
         if self.limits.chord_tolerance.is_finite() {
-            // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
-            let greater = |of: &Lanes, i: usize| of[i].max(of[(i + 1).min(PLACES - 1)]);
-            let errors = each(|i| {
-                let fastest = (greater(&v, i) + bulge.rates[0]).min(bulge.most_speed);
-                chord_error(fastest * self.limits.period, greater(&curvatures, i) + bulge.curvature)
-            });
             let known = worst(Check::Chord) * self.limits.chord_tolerance;
-            let mut are_low = true;
-            for i in 0..PLACES {
-                are_low &= errors[i] <= known;
-            }
-            if !are_low {
-                return None;
+            let most = |fastest: f64, curvature: f64| {
+                let fastest = (fastest + bulge.rates[0]).min(bulge.most_speed);
+                chord_error(fastest * self.limits.period, curvature + bulge.curvature)
+            };
+            // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
+            let greater = |of: &Lanes, i: usize| of[i].max(of[i + 1]);
+            let is_low = |i: usize| most(greater(&v, i), greater(&curvatures, i)) <= known;
+            let is_all_low = most(bulge.most_speed, curvature) <= known;
+            if !is_all_low && !(0..PLACES - 1).all(is_low) {
+                return Found::Open(law);
             }
         }
-        Some(time)
+        Found::Nothing([time, length])
     }
 }
 
 /// Whether the uses of a limit at the places are no more than the `worst`, and those between, which are off the straight line from
 /// place to place by no more than `off`: by that bound, or by a parabola through two places and the polynomial half-way between
-/// those; see `peak`.
+/// those; see `peak`. None where only that of the places is known.
 #[inline(always)]
-fn is_below(rate: &Lanes, use_of: impl Fn(f64) -> f64, off: f64, worst: f64) -> bool {
+fn is_below(rate: &Lanes, use_of: impl Fn(f64) -> f64, off: f64, worst: f64) -> Option<bool> {
     let used = each(|i| use_of(rate[i]));
-    let mut are_certain = true;
+    let (mut are_certain, mut are_below) = (true, true);
     for i in 0..PLACES {
         are_certain &= used[i].abs() + off <= worst;
+        are_below &= used[i].abs() <= worst;
     }
     let is_narrow = off <= WIDE;
-    if are_certain || !is_narrow {
-        return are_certain;
+    if are_certain || !are_below || !is_narrow {
+        return if are_below && !are_certain { None } else { Some(are_below) };
     }
     let (mut middle, mut last) = ([0.0; PLACES], 0.0);
     for j in 0..PLACES {
@@ -302,13 +384,12 @@ fn is_below(rate: &Lanes, use_of: impl Fn(f64) -> f64, off: f64, worst: f64) -> 
     let (between, doubt) = (each(|i| use_of(middle[i])), use_of(last).abs());
     let next = each(|i| used[(i + 1).min(PLACES - 1)]);
     let bend = each(|i| 2.0 * between[i] - used[i] - next[i]);
-    let (mut are_below, mut are_far_below) = (true, true);
+    let mut are_far_below = true;
     for i in 0..PLACES {
-        are_below &= used[i].abs() <= worst;
         are_far_below &= between[i].abs() + 1.5 * bend[i].abs() + doubt <= worst;
     }
-    if are_far_below || !are_below {
-        return are_below;
+    if are_far_below {
+        return Some(true);
     }
     let (most, per_worst) = (worst - doubt, 1.0 / worst);
     for i in 0..PLACES {
@@ -316,19 +397,13 @@ fn is_below(rate: &Lanes, use_of: impl Fn(f64) -> f64, off: f64, worst: f64) -> 
         let top = (between[i] + slope * slope / (8.0 * bend[i])).abs() + bend[i] * bend[i] * per_worst;
         are_below &= (top <= most) | (slope.abs() >= 2.0 * bend[i].abs());
     }
-    are_below
+    are_below.then_some(true)
 }
 
 /// The integral over the phase, its width being 1, and whether the rules agree.
 #[inline(always)]
 fn integral(f: &Lanes) -> (f64, bool) {
-    let by = |weights: Lanes| {
-        let mut sum = 0.0;
-        for i in 0..PLACES {
-            sum += weights[i] * f[i];
-        }
-        sum
-    };
+    let by = |weights: Lanes| joined(each(|i| weights[i] * f[i]), |a, b| a + b);
     let rule = |of: &Weights| each(|i| of.up_to[i][PLACES - 1]);
     let whole = by(rule(&ALL));
     let [lower, lowest] = [&LOWER, &LOWEST].map(|of| (by(rule(of)) - whole).abs());
@@ -367,12 +442,25 @@ fn inner<const M: usize>(a: &[Lanes; M], b: &[Lanes; M]) -> Lanes {
 
 #[inline(always)]
 fn least(lanes: &Lanes) -> f64 {
-    lanes.iter().fold(f64::INFINITY, |least, &number| least.min(number))
+    joined(*lanes, |a, b| if b < a { b } else { a })
 }
 
 #[inline(always)]
 fn greatest(lanes: &Lanes) -> f64 {
-    lanes.iter().fold(0.0, |most, &number| number.max(most))
+    joined(*lanes, |a, b| if b > a { b } else { a })
+}
+
+/// All numbers as one, by halves: in their order each would wait for the one before.
+#[inline(always)]
+fn joined(mut lanes: Lanes, join: impl Fn(f64, f64) -> f64) -> f64 {
+    let mut count = PLACES;
+    while count > 1 {
+        count /= 2;
+        for i in 0..count {
+            lanes[i] = join(lanes[i], lanes[i + count]);
+        }
+    }
+    lanes[0]
 }
 
 #[cfg(test)]
@@ -456,7 +544,7 @@ mod tests {
         let (feeds, feeds_along) = ([fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY], [true; FEEDS]);
         let columns = Columns::new(&path, &limits, None);
         let places = Places { curve: &curve, columns: &columns, limits: &limits, feeds, feeds_along };
-        (places.time(&Phase { u, p, a }, &tally), motion.time(), most)
+        (places.time(&Phase { u, p, a, held_sq: None }, &tally), motion.time(), most)
     }
 
     #[test]
@@ -473,6 +561,24 @@ mod tests {
         let control = [0.0, 0.0, 1.0, 0.1, 2.0, 0.1, 3.0, 0.0];
         let (found, time, _) = look(&control, [[0.5, 0.6], [0.3, 1.0], [4.5, 4.5]], &|_, _| 10.0);
         assert!((found.unwrap() / time - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_phase_that_eight_places_leave_open_is_looked_at_by_halves() {
+        let control = [0.0, 0.0, 1.0, 1.0, 2.0, -1.0, 3.0, 0.0];
+        let (found, time, _) = look(&control, [[0.1, 2.9], [1.0, 1.2], [0.1, 0.05]], &|_, _| 3.0);
+        assert!((found.unwrap() / time - 1.0).abs() < 1e-8);
+        for broken in [Check::Velocity, Check::Acceleration, Check::Jerk, Check::Feed, Check::Chord] {
+            let worst = |check, _| if check == broken { 0.999 } else { 3.0 };
+            assert_eq!(look(&control, [[0.1, 2.9], [1.0, 1.2], [0.1, 0.05]], &worst).0, None, "{broken:?}");
+        }
+    }
+
+    #[test]
+    fn a_speed_that_is_held_has_both_records_of_it() {
+        let phase = |p: f64| Phase { u: [0.0, 1.0], p: [4.0, p], a: [0.0; 2], held_sq: Some(16.0) };
+        assert!(phase(1.0).speed([4.0, 16.0], 3.0).is_some());
+        assert!(phase(1.0 + 1e-13).speed([4.0, 16.0], 3.0).is_none());
     }
 
     #[test]
