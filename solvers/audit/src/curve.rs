@@ -312,6 +312,11 @@ impl<const M: usize> Curve<M> {
         })
     }
 
+    /// No part of the piece that is as long as a step of u is farther from its chord than this.
+    pub fn sagitta(&self, step: f64) -> f64 {
+        0.125 * self.bounds()[0] * step * step
+    }
+
     /// For each axis what the rounding of C' is relative to.
     #[inline]
     pub fn derivative_size(&self) -> [f64; M] {

@@ -107,7 +107,8 @@ pub fn offer_travel<const M: usize>(
     // Most positions change nothing, and a product is had sooner than a share.
     let (middle, half, known) =
         (0.5 * (least + most), 0.5 * (most - least), tally.get(Check::Travel, axis).ratio);
-    if known >= 0.0 && (q - middle).abs() < known * half {
+    let is_passed = (q - middle).abs() < known * half || (half == f64::INFINITY && q >= least && q <= most);
+    if known >= 0.0 && is_passed {
         return;
     }
     let bound = if q < 0.5 * (least + most) { least } else { most };
@@ -205,30 +206,44 @@ fn piece_to_moves<'a, const M: usize>(
         return;
     }
     let curve = path.curve::<M>(piece);
-    let (width, places) = (curve.width(), PLACES * curve.turns());
+    let (width, turns) = (curve.width(), curve.turns());
+    let places = PLACES * turns;
     let rounding = ROUNDINGS * EPS * curve.magnitude();
     near.start_at(followers, piece);
-    let mut off = |t: f64, most: f64, tally: &Tally<M>| {
+    let off = |t: f64, most: f64, near: &mut Neighbours<M>, tally: &mut Tally<M>| {
         let [first, nearest] = enough(settled(tally), tolerance, rounding);
-        near.distance(&curve.at(t * width), [first.min(most), nearest]) - rounding
+        let value = near.distance(&curve.at(t * width), [first.min(most), nearest]) - rounding;
+        tally.offer(Check::Deviation, 0, value, tolerance, time, line);
+        tally.samples += 1;
+        (value, near.here())
     };
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
-    for i in 0..=places {
+    let mut look = |i: usize, near: &mut Neighbours<M>, tally: &mut Tally<M>| {
         let t = i as f64 / places as f64;
         // Where it comes near its tolerance the piece is looked at again.
-        let value = off(t, NEAR * tolerance, tally);
-        tally.offer(Check::Deviation, 0, value, tolerance, time, line);
-        if value > worst {
-            (worst, worst_t) = (value, t);
+        let found = off(t, NEAR * tolerance, near, tally);
+        if found.0 > worst {
+            (worst, worst_t) = (found.0, t);
         }
+        found
+    };
+    // Between two places neither the chords of piece and move are farther apart than those are, nor both from their chords than this.
+    let sagitta = curve.sagitta(width / PLACES as f64);
+    let mut before = look(0, near, tally);
+    for i in (0..places).step_by(turns) {
+        let here = look(i + turns, near, tally);
+        let most = before.0.max(here.0) + sagitta + near.sagitta(before.1, here.1);
+        let is_settled = most <= settled(tally) * tolerance;
+        if !is_settled {
+            (i + 1..i + turns).for_each(|i| _ = look(i, near, tally));
+        }
+        before = here;
     }
-    tally.samples += places as u64 + 1;
     if worst >= NEAR * tolerance {
         let step = 1.0 / (places * PLACES) as f64;
         for i in 0..=2 * PLACES {
             let t = (worst_t + (i as f64 - PLACES as f64) * step).clamp(0.0, 1.0);
-            let value = off(t, f64::INFINITY, tally);
-            tally.offer(Check::Deviation, 0, value, tolerance, time, line);
+            off(t, f64::INFINITY, near, tally);
         }
     }
 }
@@ -286,7 +301,7 @@ impl<const M: usize> Follow<'_, M> {
         if programmed.is_straight() {
             let (to, away_there) = at(self, places, tally);
             // The chord between both places is no farther from the move than its ends are, and the piece from its chord than this.
-            let sagitta = 0.125 * self.close.curves.get(to.piece).bounds()[0] * (to.u - from.u).powi(2);
+            let sagitta = self.close.curves.get(to.piece).sagitta(to.u - from.u);
             let most = away.max(away_there) + sagitta;
             if from.piece == to.piece && most <= settled(tally) * allowed(self.path, to.piece) {
                 tally.samples += 2;
@@ -428,6 +443,31 @@ mod tests {
             follow.measure((&programmed, 1), (0, 0), 0.0, &mut tally);
             let ratio = tally.get(Check::Deviation, 0).ratio;
             assert!((ratio - found).abs() < 1e-12, "{known}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn places_between_others_are_measured_where_a_bound_leaves_open_what_is_there() {
+        // Along a straight move, up to 0.276 beside it, which the control points are 0.8 beside.
+        let pieces = Pieces {
+            axes: 2,
+            stride: 2,
+            control: &[0.0, 0.0, 1.0, 0.8, 2.0, 0.0, 3.0, 0.0, 4.0, 0.0, 5.0, 0.0],
+            weights: &[],
+            offsets: &[0, 6],
+            width: &[5.0],
+        };
+        let path = Followed { tolerance: &[1.0], ..Followed::of_one(pieces) };
+        let program = Programmed::of_lines(&[0.0, 0.0], &[5.0, 0.0], &[1]);
+        let most =
+            (0..=1000).map(|i| pieces.curve::<2>(0).at(5.0 * f64::from(i) / 1000.0)[1]).fold(0.0, f64::max);
+        for (known, found, places) in [(0.27, most, 9..41), (0.5, 0.5, 9..10)] {
+            let mut tally = Tally::<2>::default();
+            tally.offer(Check::Deviation, 0, known, 1.0, 0.0, 0);
+            piece_to_moves(&path, &program, (&[(0, 0)], &mut Neighbours::default()), (0, 0.0), &mut tally);
+            let ratio = tally.get(Check::Deviation, 0).ratio;
+            assert!((ratio - found).abs() < 1e-4, "{known}: {ratio} instead of {found}");
+            assert!(places.contains(&(tally.samples as usize)), "{known}: {}", tally.samples);
         }
     }
 

@@ -7,6 +7,9 @@ use super::nearest::Place;
 /// First and last piece that follow a move.
 pub type Followers = (usize, usize);
 
+/// One of the moves by its row, and on splines the place on it.
+pub type Here = (usize, Option<Place>);
+
 /// A move, and on splines the place that was nearest last.
 type Near<'a, const M: usize> = (usize, Move<'a, M>, Option<Place>);
 
@@ -61,6 +64,24 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         })
     }
 
+    /// Where the distance found last is from.
+    pub fn here(&self) -> Here {
+        (self.nearest, self.moves.get(self.nearest).and_then(|(_, _, place)| *place))
+    }
+
+    /// How far the moves may be from the chord between two of these places; infinite where both are not on one straight move or one
+    /// piece of a spline.
+    pub fn sagitta(&mut self, from: Here, to: Here) -> f64 {
+        let on = self.moves.get(from.0).filter(|_| from.0 == to.0);
+        match (on, from.1, to.1, &mut self.close) {
+            (Some((_, programmed, _)), ..) if programmed.is_straight() => 0.0,
+            (Some(_), Some(from), Some(to), Some(close)) if from.piece == to.piece => {
+                close.curves.get(to.piece).sagitta(to.u - from.u)
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Distance of `q` from the nearest move, or from the first that is within the first of `enough`; see `Move::distance_from` for
     /// the second. A NaN if there is one.
     pub fn distance(&mut self, q: &[f64; M], enough: [f64; 2]) -> f64 {
@@ -91,6 +112,7 @@ impl<'a, const M: usize> Neighbours<'a, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curve::Pieces;
 
     /// Along X from 0 to 4, along Y to (4, 4), and back to the start of that by a half circle.
     const PROGRAM: Programmed = Programmed {
@@ -113,5 +135,44 @@ mod tests {
         assert_eq!(near.straight_beside([[2.0, 0.0], [4.0, 2.0]].into_iter(), 0.2), None);
         assert_eq!(near.straight_beside([[2.0, 2.0]].into_iter(), 0.2), None, "an arc is not straight");
         assert_eq!(near.straight_beside([[f64::NAN, 0.0]].into_iter(), 0.2), None);
+    }
+
+    #[test]
+    fn a_straight_move_is_its_chord_and_between_moves_and_on_arcs_nothing_is_known() {
+        let mut near = Neighbours::<2>::default();
+        near.replace(&PROGRAM, 0..3);
+        let [on_x, on_y, on_arc] = [[1.0, 0.1], [4.1, 1.0], [1.9, 2.0]].map(|q| {
+            near.distance(&q, [0.0; 2]);
+            near.here()
+        });
+        assert_eq!([near.sagitta(on_x, on_x), near.sagitta(on_x, on_y)], [0.0, f64::INFINITY]);
+        assert_eq!(near.sagitta(on_arc, on_arc), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_piece_of_a_spline_is_as_far_from_its_chord_as_its_second_derivative_lets_it() {
+        // Two parabolas: y = x²/4 from (0, 0) to (2, 1), and on to (4, 0).
+        let splines = Pieces {
+            axes: 2,
+            stride: 2,
+            control: &[0.0, 0.0, 1.0, 0.0, 2.0, 1.0, 2.0, 1.0, 3.0, 2.0, 4.0, 0.0],
+            weights: &[],
+            offsets: &[0, 3, 6],
+            width: &[2.0, 2.0],
+        };
+        let program = Programmed {
+            spline_move: &[0],
+            spline_pieces: &[0, 2],
+            splines,
+            ..Programmed::of_lines(&[0.0, 0.0], &[4.0, 0.0], &[1])
+        };
+        let mut near = Neighbours::<2>::default();
+        near.replace(&program, 0..1);
+        let [from, to, beyond] = [[0.5, 0.0625], [1.5, 0.5625], [3.0, 1.25]].map(|q| {
+            near.distance(&q, [1e-12; 2]);
+            near.here()
+        });
+        assert!((near.sagitta(from, to) - 0.125 * 0.5).abs() < 1e-9);
+        assert_eq!(near.sagitta(to, beyond), f64::INFINITY);
     }
 }
