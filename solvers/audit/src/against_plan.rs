@@ -121,22 +121,20 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let stops = |piece: usize| !are_axes && path.runs.binary_search(&(piece as i64)).is_ok();
         let known = tally.get(Check::Feed, 0).ratio;
         let mut chord_start = tips[0];
+        let is_flat = !has_chord || self.is_flat([before, row], &tips, tally);
+        let columns = &mut self.columns;
         for piece in from.piece..=to.piece {
             let (is_first, is_last) = (piece == from.piece, piece == to.piece);
             let (feeds, axes) = (columns.feeds(piece), columns.chord_axes(piece));
-            let curve = columns.curve(piece);
             let start = if is_first { from.u } else { 0.0 };
-            let end = if is_last { to.u } else { curve.width() };
-            let last = if is_first { tips[0] } else { curve.at(0.0) };
-            let next = if is_last { tips[1] } else { curve.at(end) };
+            let end = if is_last { to.u } else { path.width[piece] };
+            let last = if is_first { tips[0] } else { path.start(piece) };
+            let next = if is_last { tips[1] } else { path.end(piece) };
             if !is_first && stops(piece) {
                 chord_start = last;
             }
-            // Between two places of one piece no chord is farther from it than this.
-            let sagitta = 0.125 * curve.bounds()[0] * (end - start) * (end - start);
-            let is_flat =
-                is_first && is_last && tally.is_passed(Check::Chord, 0, sagitta, limits.chord_tolerance);
-            if has_chord && end > start && !is_flat {
+            if end > start && !is_flat {
+                let curve = columns.curve(piece);
                 let chord_end = if !is_last && stops(piece + 1) { next } else { tips[1] };
                 let counted = |point: &[f64; M]| -> [f64; M] { vector_of(|k| axes[k] * point[k]) };
                 let chord = Segment::new(&counted(&chord_start), &counted(&chord_end));
@@ -180,6 +178,23 @@ impl<'a, const M: usize> Comparison<'a, M> {
             }
             tally.offer(Check::Chord, 0, certain, limit, time, line);
         }
+    }
+
+    /// Whether the path between two setpoints that are on one piece or on neighbours is no farther from the chord than was found: on
+    /// each piece it is no farther from its own chord than the sagitta, and that no farther than where both pieces meet.
+    fn is_flat(&self, [before, row]: [&Row<M>; 2], tips: &[[f64; M]; 2], tally: &Tally<M>) -> bool {
+        let (path, (from, to)) = (&self.plan.path, (before.nearest.place, row.nearest.place));
+        let sagitta = |bend: f64, way: f64| 0.125 * bend * way * way;
+        let most = match to.piece.checked_sub(from.piece) {
+            Some(0) => sagitta(row.nearest.bend, to.u - from.u),
+            Some(1) if self.columns.are_axes() => {
+                let ends = [(before, path.width[from.piece] - from.u), (row, to.u)];
+                let [first, last] = ends.map(|(row, way)| sagitta(row.nearest.bend, way));
+                first.max(last) + Segment::new(&tips[0], &tips[1]).distance_sq(&path.start(to.piece)).sqrt()
+            }
+            _ => f64::INFINITY,
+        };
+        tally.is_passed(Check::Chord, 0, most, self.limits.chord_tolerance)
     }
 
     /// The part by which the chord error of the tool of joints may exceed the tolerance where it gains speed: the speed limit of the
@@ -254,5 +269,46 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let at_end = path.width[to.piece] - to.u <= PLACE_TOLERANCE;
         let begin = if at_start { from.piece.max(1) } else { from.piece + 1 };
         begin..=(to.piece + usize::from(at_end)).min(path.len() - 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::{Followed, Pieces};
+    use crate::rows::Nearest;
+
+    #[test]
+    fn the_path_around_a_corner_is_as_far_from_the_chord_as_the_corner_and_the_sagittas() {
+        let pieces = Pieces {
+            axes: 2,
+            stride: 2,
+            control: &[0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0],
+            weights: &[],
+            offsets: &[0, 2, 4],
+            width: &[1.0, 1.0],
+        };
+        let path = Followed { moves: &[0, 0, 1, 1], ..Followed::of_one(pieces) };
+        let limits = Limits { chord_tolerance: 1.0, ..Limits::none() };
+        let plan = Plan { path, profile: None, program: None, joints: None };
+        let comparison = Comparison::new(&plan, &limits);
+        let row = |q: [f64; 2], piece: usize, u: f64, bend: f64| Row {
+            t: 0.0,
+            q,
+            velocity: None,
+            acceleration: None,
+            line: 1,
+            nearest: Nearest { place: Place { piece, u }, bend, ..Nearest::default() },
+        };
+        // The corner is 0.1/√2 off the chord, and each piece up to 0.00125 off its own where it is bent by 1/mm.
+        for (bend, off) in [(0.0, 0.1 / 2.0_f64.sqrt()), (1.0, 0.1 / 2.0_f64.sqrt() + 0.00125)] {
+            let (before, after) = (row([0.9, 0.0], 0, 0.9, bend), row([1.0, 0.1], 1, 0.1, bend));
+            for (known, is_flat) in [(off - 1e-9, false), (off + 1e-9, true)] {
+                let mut tally = Tally::default();
+                tally.offer(Check::Chord, 0, known, 1.0, 0.0, 1);
+                assert_eq!(comparison.is_flat([&before, &after], &[before.q, after.q], &tally), is_flat);
+                assert!(!comparison.is_flat([&after, &before], &[after.q, before.q], &tally));
+            }
+        }
     }
 }

@@ -32,8 +32,10 @@ pub struct Nearest<const M: usize> {
     /// How far u went to it from the place of the setpoint before, and how far it goes to the next one if that step changes as this one.
     pub step: f64,
     pub next_step: f64,
-    /// Greatest coordinate of the piece, in mm.
+    /// Greatest coordinate of the piece that the search began on, in mm, and the greatest second derivative by u of the tool's path on
+    /// that of the place, in 1/mm.
     pub magnitude: f64,
+    pub bend: f64,
     /// Distance from the path, and along it from where the profile is at that time, in mm.
     pub off: f64,
     pub late: f64,
@@ -52,6 +54,7 @@ impl<const M: usize> Default for Nearest<M> {
             step: 0.0,
             next_step: 0.0,
             magnitude: 0.0,
+            bend: f64::INFINITY,
             off: 0.0,
             late: 0.0,
             allowed: PLACE_TOLERANCE,

@@ -201,9 +201,9 @@ impl<'a, const M: usize> Finder<'a, M> {
             _ => step,
         };
         let late = if found.error.is_finite() { found.error } else { 0.0 };
-        let off = found.distance - rounding;
+        let (off, bend) = (found.distance - rounding, self.columns().curve(place.piece).bounds()[0]);
         let mut nearest =
-            Nearest { place, step, next_step, magnitude, off, late, allowed, ..Nearest::default() };
+            Nearest { place, step, next_step, magnitude, bend, off, late, allowed, ..Nearest::default() };
         if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
             nearest.velocity = here.velocity;
