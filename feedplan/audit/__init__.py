@@ -35,9 +35,9 @@ FEED_SHARE = 0.004
 # How far the audit of setpoints from files is before what is recorded of them is compared.
 RECORDED_SHARE = 0.8
 
-# Setpoints that are computed, audited and written at once: 16 times the 4096 of one native task, so that all
-# processors finish together.
-CHUNK = 65_536
+# Setpoints that are computed, audited and written at once: 16 times the 1024 of one native task, so that all
+# processors finish together, and few enough that their memory is used again.
+CHUNK = 16_384
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ use super::vectors::{inner, length};
 use super::{tell, Limits, Seen, PLACE_TOLERANCE};
 
 /// Setpoints a thread takes at a time.
-pub const BLOCK: usize = 4096;
+pub const BLOCK: usize = 2048;
 
 /// After so many consecutive setpoints off the path the others of their block get the place of the last one: the verdict is
 /// clear, and a search for each would take very long.

@@ -43,7 +43,7 @@ use feedplan_planner::phases::{Phase, Phases};
 const STANDSTILL: f64 = 1e-6;
 
 /// Setpoints computed by one task.
-const BLOCK: usize = 4096;
+const BLOCK: usize = 1024;
 
 /// How the place at the next setpoint is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
