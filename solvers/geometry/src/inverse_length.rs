@@ -37,18 +37,26 @@ pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
     from.u + (d0 * rise * mixed + width * theta * theta * theta) / (1.0 + (omega - 3.0) * mixed)
 }
 
-/// The u with S(u) = s within `tolerance`; beyond either end that end.
-pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located {
+/// The u with S(u) = s within `tolerance`; beyond either end that end. Rows that are `known` beside those of the table may be nearer to
+/// it on both sides.
+pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64, known: &[Node]) -> Located {
     let first = table.panel(|node| node.sum <= s);
     let start = table.nodes[first];
     let (mut low, mut high) = (start, table.nodes[first + 1]);
+    let panel = high.u - low.u;
+    for row in known {
+        if low.sum < row.sum && row.sum <= s {
+            low = *row;
+        } else if s <= row.sum && row.sum < high.sum {
+            high = *row;
+        }
+    }
     if s <= low.sum {
         return Located { u: low.u, ..Located::default() };
     }
     if s >= high.sum {
         return Located { u: high.u, ..Located::default() };
     }
-    let panel = high.u - low.u;
     let (mut best, mut halve, mut last_miss) = (Located::default(), false, f64::INFINITY);
     for iterations in 1..=MAX_ITERATIONS {
         let middle = 0.5 * (low.u + high.u);
@@ -119,9 +127,26 @@ mod tests {
         let mut nodes = Vec::new();
         let f = Length(QuadraticSpeed::new(&line));
         tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
-        let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12);
+        let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12, &[]);
         assert_eq!(located.iterations, 1);
         assert!((located.u - 1.25).abs() < 1e-14);
+    }
+
+    #[test]
+    fn rows_beside_those_of_the_table_lead_to_the_same_place_sooner() {
+        let piece = Quadratic::<2> { control: [[0.0, 0.0], [0.5, 0.0], [1.0, 0.5]], width: 1.0 };
+        let (f, mut nodes) = (Length(QuadraticSpeed::new(&piece)), Vec::new());
+        tabulate(f, 0.0, 1.0, 1e-13, &mut nodes);
+        let table = Table { f, nodes: &nodes };
+        let known = [0.3, 0.32].map(|u| row(u, table.integral(u), f.at(u)));
+        for u in [0.305, 0.31, 0.319] {
+            let [alone, beside] =
+                [&[][..], &known].map(|known| locate(&table, table.integral(u), 1e-9, known));
+            assert!((beside.u - u).abs() < 1e-9, "{beside:?}");
+            assert!(beside.iterations < alone.iterations, "{alone:?} {beside:?}");
+        }
+        // A place that is not between them.
+        assert!((locate(&table, table.integral(0.6), 1e-13, &known).u - 0.6).abs() < 1e-12);
     }
 
     proptest! {
@@ -155,7 +180,7 @@ mod tests {
             tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
             let table = Table { f, nodes: &nodes };
             let (s, tolerance) = (at * table.total(), 1e-13 * table.total());
-            let located = locate(&table, s, tolerance);
+            let located = locate(&table, s, tolerance, &[]);
             prop_assert!(located.miss <= tolerance, "{located:?}");
             prop_assert!((table.integral(located.u) - s).abs() <= 2.0 * tolerance);
             prop_assert!(located.iterations <= 30, "{located:?}");

@@ -30,6 +30,7 @@ use std::rc::Rc;
 
 use axis_way::AxisWay;
 use clock::{Clock, Cubic, Even, Jerk, SpeedLine};
+use feedplan_geometry::arc_length::Node;
 use feedplan_geometry::inverse_length::Located;
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::derivatives;
@@ -79,9 +80,9 @@ pub struct State {
 enum Measure {
     Parameter,
     Axis(Box<AxisWay>),
-    /// The lengths up to the start of the phase and on it.
+    /// The lengths up to both ends of the phase, and on it.
     Length {
-        before: f64,
+        ends: [Node; 2],
         total: f64,
     },
 }
@@ -104,13 +105,15 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         let (u0, u1) = (phase.u0, phase.u1);
         let width = u1 - u0;
         let mean_pace = || (Measure::Parameter, Clock::Even(Even::constant(width / phase.duration)));
-        let by_length = |clock: &dyn Fn(f64) -> Clock| {
-            let (before, after) = (path.length(phase.law, u0), path.length(phase.law, u1));
-            (Measure::Length { before, total: after - before }, clock(after - before))
-        };
         let squares = match phase.law {
             PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity | PhaseLaw::ParameterAcceleration => [1.0; 2],
             _ => path.end_squares(phase),
+        };
+        let by_length = |clock: &dyn Fn(f64) -> Clock| {
+            let end = |u: f64, square: f64| Node { u, sum: path.length(phase.law, u), rate: square.sqrt() };
+            let ends = [end(u0, squares[0]), end(u1, squares[1])];
+            let total = ends[1].sum - ends[0].sum;
+            (Measure::Length { ends, total }, clock(total))
         };
         let speeds = || phase.end_speeds(squares);
         let (measure, clock) = match phase.law {
@@ -229,9 +232,9 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
                 Located { u: u.clamp(u0, u1), ..Located::default() }
             }
             Measure::Axis(way) => way.place(&self.phase, part),
-            Measure::Length { before, total } => {
+            Measure::Length { ends, total } => {
                 let way = if part.from_start { total * part.share } else { total * (1.0 - part.share) };
-                let found = self.path.locate(law, before + way, self.step_error() * total * step);
+                let found = self.path.locate(law, ends[0].sum + way, self.step_error() * total * step, ends);
                 Located { u: found.u.clamp(u0, u1), miss: found.miss / total, ..found }
             }
         }
@@ -242,8 +245,8 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         let Phase { law, u0, u1, .. } = self.phase;
         match &self.measure {
             Measure::Axis(way) => way.part(&self.phase, u),
-            Measure::Length { before, total } => {
-                let share = (self.path.length(law, u) - before) / total;
+            Measure::Length { ends, total } => {
+                let share = (self.path.length(law, u) - ends[0].sum) / total;
                 Part { from_start: true, share: share.clamp(0.0, 1.0) }.nearer_end()
             }
             Measure::Parameter if u - u0 <= u1 - u => Part { from_start: true, share: (u - u0) / (u1 - u0) },

@@ -85,14 +85,14 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         lengths.even.map_or_else(|| lengths.up_to(u), |even| even * u)
     }
 
-    /// The place at a length, with the proven error of the table in its miss.
-    pub(super) fn locate(&self, law: PhaseLaw, length: f64, tolerance: f64) -> Located {
+    /// The place at a length between two places with theirs, with the proven error of the table in its miss.
+    pub(super) fn locate(&self, law: PhaseLaw, length: f64, tolerance: f64, ends: &[Node; 2]) -> Located {
         let lengths = self.of(law);
         if let Some(even) = lengths.even {
             return Located { u: length / even, ..Located::default() };
         }
         let table = lengths.table();
-        let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()));
+        let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()), ends);
         Located { miss: found.miss + lengths.error(), ..found }
     }
 
