@@ -34,6 +34,18 @@ impl<const M: usize> Differences<'_, M> {
         PASS_EXCESS * self.limits.period
     }
 
+    /// Least and greatest position of one axis that changes nothing where this share of half its travel was found; none where that is
+    /// not known, or where one end alone is.
+    pub fn travel_of(&self, axis: usize, known: Option<f64>) -> [f64; 2] {
+        let [least, most] = self.limits.travel[axis];
+        let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
+        match known {
+            Some(known) if half.is_finite() => [middle - known * half, middle + known * half],
+            Some(_) if middle.is_nan() => [least, most],
+            _ => [f64::NAN; 2],
+        }
+    }
+
     /// Time from row `n` − 1 to row `n`: the period itself where the times round to it. Row 0 has none.
     pub fn step(&self, n: usize) -> f64 {
         if n == 0 {

@@ -387,6 +387,14 @@ impl<const M: usize> Limits<M> {
         std::array::from_fn(|k| self.feed_axes[feed][k] * of[k])
     }
 
+    /// How far the mean of the recorded velocities of one axis at both ends of a step may be from the mean velocity: an eighth of the
+    /// way from the least acceleration to the greatest, and half of a jump.
+    #[inline(always)]
+    pub fn mean_velocity_off(&self, axis: usize, step: f64) -> f64 {
+        let span = self.acceleration.positive[axis] + self.acceleration.negative[axis];
+        0.125 * span * step + 0.5 * self.jump[axis]
+    }
+
     /// The jump of one axis velocity that means nothing: over this time it adds no more than the pass mark to the acceleration.
     #[inline]
     pub fn negligible_jump(&self, axis: usize, time: f64) -> f64 {

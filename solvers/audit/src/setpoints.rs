@@ -1,6 +1,8 @@
 //! Audits a stream of setpoints: difference quotients against the limits, and each setpoint's place on the path.
 //!
-//! Between chunks the last few setpoints are kept, nothing else.
+//! Between chunks the last few setpoints are kept, nothing else. Most setpoints change nothing that was found: `at_once` tells which.
+
+mod at_once;
 
 use std::ops::Range;
 
@@ -179,20 +181,49 @@ impl<const M: usize> View<'_, M> {
     /// All that some rows show, together with those before them.
     fn block(&self, rows: Range<usize>, tally: &mut Tally<M>) {
         let mut comparison = self.plan.map(|plan| Comparison::new(plan, self.differences.limits));
-        let mut recent = self.recent(rows.start);
-        for n in rows {
-            recent.steps = [recent.steps[1], recent.steps[2], self.differences.step(n)];
-            let rounding = self.differences.rounding(n);
-            if n >= 2 {
-                let newest =
-                    self.differences.acceleration_by(n - 1, recent.steps[1], recent.steps[2], &rounding);
-                let [_, early, late] = recent.accelerations;
-                recent.accelerations = [early, late, newest];
+        for start in rows.clone().step_by(at_once::COUNT) {
+            self.rows(start..rows.end.min(start + at_once::COUNT), comparison.as_mut(), tally);
+        }
+    }
+
+    /// The same of so many rows as are looked at at once.
+    fn rows(&self, rows: Range<usize>, mut comparison: Option<&mut Comparison<M>>, tally: &mut Tally<M>) {
+        let unsure = match rows.start >= at_once::BEFORE {
+            true => at_once::settled(&self.differences, &rows, tally),
+            false => [f64::NAN; at_once::COUNT],
+        };
+        let mut recent = None;
+        for (n, unsure) in rows.zip(unsure) {
+            if !unsure.is_nan() {
+                recent = None;
+                tally.samples += 1;
+                self.compare(n, (self.differences.limits.period, unsure), comparison.as_deref_mut(), tally);
+                continue;
             }
-            self.arrival(n, &recent, &rounding, comparison.as_mut(), tally);
-            if n > AROUND {
-                self.centre(n - AROUND, &recent.accelerations[0], comparison.as_mut(), tally);
-            }
+            let recent = recent.get_or_insert_with(|| self.recent(n));
+            self.row(n, recent, comparison.as_deref_mut(), tally);
+        }
+    }
+
+    /// All that row `n` shows, together with those before it.
+    fn row(
+        &self,
+        n: usize,
+        recent: &mut Recent<M>,
+        mut comparison: Option<&mut Comparison<M>>,
+        tally: &mut Tally<M>,
+    ) {
+        recent.steps = [recent.steps[1], recent.steps[2], self.differences.step(n)];
+        let rounding = self.differences.rounding(n);
+        if n >= 2 {
+            let newest = self.differences.acceleration_by(n - 1, recent.steps[1], recent.steps[2], &rounding);
+            let [_, early, late] = recent.accelerations;
+            recent.accelerations = [early, late, newest];
+        }
+        self.arrival(n, recent, &rounding, tally);
+        self.compare(n, (recent.steps[2], length(&rounding)), comparison.as_deref_mut(), tally);
+        if n > AROUND {
+            self.centre(n - AROUND, &recent.accelerations[0], comparison, tally);
         }
     }
 
@@ -206,15 +237,24 @@ impl<const M: usize> View<'_, M> {
         Recent { steps: [step(3), step(2), step(1)], accelerations: [around(4), around(3), around(2)] }
     }
 
-    /// What row `n` shows together with the rows before it.
-    fn arrival(
+    /// What row `n` shows beside its plan; so long is the step to it, and so much of its distance may be rounding.
+    fn compare(
         &self,
         n: usize,
-        recent: &Recent<M>,
-        rounding: &[f64; M],
+        (step, rounding): (f64, f64),
         comparison: Option<&mut Comparison<M>>,
         tally: &mut Tally<M>,
     ) {
+        let (Some(comparison), rows) = (comparison, self.differences.rows) else { return };
+        comparison.nearest(&rows[n], rounding, tally);
+        if n > 0 {
+            let earlier = n.checked_sub(2).map(|n| &rows[n]);
+            comparison.step(earlier, [&rows[n - 1], &rows[n]], step, rounding, tally);
+        }
+    }
+
+    /// What row `n` shows together with the rows before it.
+    fn arrival(&self, n: usize, recent: &Recent<M>, rounding: &[f64; M], tally: &mut Tally<M>) {
         let (limits, rows) = (self.differences.limits, self.differences.rows);
         let row = &rows[n];
         let (time, line) = (row.t, row.line);
@@ -237,14 +277,6 @@ impl<const M: usize> View<'_, M> {
         }
         if n >= 3 {
             self.jerk(n, recent, tally);
-        }
-        if let Some(comparison) = comparison {
-            let rounding = length(rounding);
-            comparison.nearest(row, rounding, tally);
-            if n > 0 {
-                let earlier = n.checked_sub(2).map(|n| &rows[n]);
-                comparison.step(earlier, [&rows[n - 1], row], recent.steps[2], rounding, tally);
-            }
         }
     }
 
@@ -277,9 +309,7 @@ impl<const M: usize> View<'_, M> {
             for k in 0..M {
                 let mean = (row.q[k] - before.q[k]) * per_step;
                 let off = (mean - 0.5 * (new[k] + old[k])).abs() - 2.0 * rounding[k] * per_step;
-                // An eighth of the way from the least acceleration to the greatest.
-                let span = limits.acceleration.positive[k] + limits.acceleration.negative[k];
-                let limit = 0.125 * span * step + 0.5 * limits.jump[k];
+                let limit = limits.mean_velocity_off(k, step);
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
             }
         }
@@ -325,6 +355,83 @@ impl<const M: usize> View<'_, M> {
                 limit += corners * limits.jump_beyond[k] / time;
             }
             tally.offer(Check::Acceleration, k, value, limit, rows[c].t, rows[c].line);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sided;
+    use proptest::prelude::*;
+
+    const CHECKS_OF_ROWS: [Check; 8] = [
+        Check::Numbers,
+        Check::Grid,
+        Check::Travel,
+        Check::Velocity,
+        Check::Acceleration,
+        Check::Jerk,
+        Check::RecordedVelocity,
+        Check::RecordedAcceleration,
+    ];
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        #[test]
+        fn rows_that_are_looked_at_at_once_show_what_they_show_one_after_the_other(
+            broken in 0..600_usize, what in 0..7_u8, by in -1.0..1.0_f64, travels: bool, records: bool,
+        ) {
+            // Two axes that swing, one row broken in some way or none.
+            let mut rows: Vec<Row<3>> = (0..600)
+                .map(|i| {
+                    let t = 1e-3 * f64::from(i);
+                    let (x, y) = ((9.0 * t).sin_cos(), (13.0 * t).sin_cos());
+                    Row {
+                        t,
+                        q: [x.0, y.0, 0.0],
+                        velocity: records.then_some([9.0 * x.1, 13.0 * y.1, 0.0]),
+                        acceleration: records.then_some([-81.0 * x.0, -169.0 * y.0, 0.0]),
+                        line: i,
+                        nearest: Nearest::default(),
+                    }
+                })
+                .collect();
+            let row = &mut rows[broken];
+            match what {
+                0 => row.q[1] += 1e-3 * by,
+                1 => row.t += 1e-5 * by,
+                2 => row.velocity = row.velocity.map(|[x, y, z]| [x, y + by, z]),
+                3 => row.acceleration = row.acceleration.map(|[x, y, z]| [x + 200.0 * by, y, z]),
+                4 => row.q[0] = if by < 0.0 { f64::NAN } else { f64::INFINITY },
+                5 => row.velocity = None,
+                _ => {}
+            }
+            let sided = |limit: f64| Sided { positive: [limit; 3], negative: [0.9 * limit; 3] };
+            let mut limits = Limits { axes: 2, velocity: sided(12.0), acceleration: sided(150.0), ..Limits::none() };
+            limits.jerk = [1000.0, f64::INFINITY, 0.0];
+            if travels {
+                limits.travel[0] = [-1.0, 2.0];
+            }
+            let stream = Stream::new(limits, 1e-9);
+            let view = View { differences: stream.differences(&rows), plan: None };
+            let (mut found, mut wanted) = (Tally::default(), Tally::default());
+            view.block(0..rows.len(), &mut found);
+            for n in 0..rows.len() {
+                let mut recent = view.recent(n);
+                view.row(n, &mut recent, None, &mut wanted);
+            }
+            prop_assert_eq!(found.samples, wanted.samples);
+            for check in CHECKS_OF_ROWS {
+                for k in 0..2 {
+                    let [found, wanted] = [&found, &wanted].map(|tally| {
+                        let worst = tally.get(check, k);
+                        (worst.ratio, worst.time, worst.line)
+                    });
+                    prop_assert_eq!(found, wanted, "{:?} {}", check, k);
+                }
+            }
         }
     }
 }
