@@ -1,11 +1,14 @@
 //! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
 
+mod at_once;
+
 use super::columns::Columns;
 use super::deviation::{enough, settled, window};
 use super::nearest::Place;
 use super::neighbours::Neighbours;
 use super::profile_reader::ACCELERATION_SHARE;
 use super::rows::Row;
+use super::setpoints::at_once::COUNT;
 use super::tracking::{is_step, Plan};
 use super::vectors::{distance, from_to, inner, length, vector_of, Segment};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
@@ -31,11 +34,27 @@ impl<'a, const M: usize> Comparison<'a, M> {
         Self { plan, limits, columns, near: Neighbours::default(), piece: None, beside: None }
     }
 
-    /// What one setpoint shows: its distance from path and program, and what it records.
+    /// Which rows change nothing but by their distance from the program; see `at_once`.
+    pub fn settled(&self, rows: &[Row<M>], unsure: &[f64; COUNT], tally: &Tally<M>) -> [bool; COUNT] {
+        match self.columns.are_axes() {
+            true => at_once::settled(self.plan, self.limits, rows, unsure, tally),
+            false => [false; COUNT],
+        }
+    }
+
+    /// What one setpoint shows: its distance from the path, and what it records.
     pub fn nearest(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
         let (nearest, time, line) = (&row.nearest, row.t, row.line);
         tally.offer(Check::Place, 0, nearest.off, PLACE_TOLERANCE, time, line);
         tally.offer(Check::Place, 0, nearest.late, nearest.allowed, time, line);
+        if nearest.is_good() {
+            self.recorded(row, rounding, tally);
+        }
+    }
+
+    /// The distance of one setpoint from the program.
+    pub fn deviation(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
+        let (nearest, time, line) = (&row.nearest, row.t, row.line);
         let (path, piece) = (&self.plan.path, nearest.place.piece);
         if let Some(program) = &self.plan.program {
             let limit = path.tolerance[piece] + PLACE_TOLERANCE;
@@ -52,9 +71,6 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 let away = self.near.distance(&row.q, enough(settled, limit, rounding));
                 tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
             }
-        }
-        if nearest.is_good() {
-            self.recorded(row, rounding, tally);
         }
     }
 

@@ -36,13 +36,14 @@ impl<const M: usize> Differences<'_, M> {
 
     /// Least and greatest position of one axis that changes nothing where this share of half its travel was found; none where that is
     /// not known, or where one end alone is.
-    pub fn travel_of(&self, axis: usize, known: Option<f64>) -> [f64; 2] {
+    pub fn travel_of(&self, axis: usize, known: f64) -> [f64; 2] {
         let [least, most] = self.limits.travel[axis];
         let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
-        match known {
-            Some(known) if half.is_finite() => [middle - known * half, middle + known * half],
-            Some(_) if middle.is_nan() => [least, most],
-            _ => [f64::NAN; 2],
+        match () {
+            () if known < 0.0 => [f64::NAN; 2],
+            () if half.is_finite() => [middle - known * half, middle + known * half],
+            () if middle.is_nan() => [least, most],
+            () => [f64::NAN; 2],
         }
     }
 

@@ -247,6 +247,16 @@ impl<const M: usize> Tally<M> {
         known >= 0.0 && most <= known * limit
     }
 
+    /// At most what a value may be to change nothing; not a number where nothing is known. A value against no limit only has to be a
+    /// number.
+    pub fn most(&self, check: Check, axis: usize, limit: f64) -> f64 {
+        match self.worst[check as usize][axis].ratio {
+            known if known < 0.0 => f64::NAN,
+            _ if limit == f64::INFINITY => f64::MAX,
+            known => known * limit,
+        }
+    }
+
     /// The worst ratio of each axis.
     #[inline(always)]
     pub fn ratios(&self, check: Check) -> [f64; M] {

@@ -2,7 +2,7 @@
 //!
 //! Between chunks the last few setpoints are kept, nothing else. Most setpoints change nothing that was found: `at_once` tells which.
 
-mod at_once;
+pub mod at_once;
 
 use std::ops::Range;
 
@@ -192,12 +192,22 @@ impl<const M: usize> View<'_, M> {
             true => at_once::settled(&self.differences, &rows, tally),
             false => [f64::NAN; at_once::COUNT],
         };
-        let mut recent = None;
-        for (n, unsure) in rows.zip(unsure) {
+        let window = &self.differences.rows[rows.start.saturating_sub(at_once::BEFORE)..rows.end];
+        let settled = match &comparison {
+            Some(comparison) if rows.start >= at_once::BEFORE => comparison.settled(window, &unsure, tally),
+            _ => [false; at_once::COUNT],
+        };
+        let (mut recent, period) = (None, self.differences.limits.period);
+        for (n, (unsure, settled)) in rows.zip(unsure.into_iter().zip(settled)) {
             if !unsure.is_nan() {
                 recent = None;
                 tally.samples += 1;
-                self.compare(n, (self.differences.limits.period, unsure), comparison.as_deref_mut(), tally);
+                match &mut comparison {
+                    Some(comparison) if settled => {
+                        comparison.deviation(&self.differences.rows[n], unsure, tally);
+                    }
+                    comparison => self.compare(n, (period, unsure), comparison.as_deref_mut(), tally),
+                }
                 continue;
             }
             let recent = recent.get_or_insert_with(|| self.recent(n));
@@ -247,6 +257,7 @@ impl<const M: usize> View<'_, M> {
     ) {
         let (Some(comparison), rows) = (comparison, self.differences.rows) else { return };
         comparison.nearest(&rows[n], rounding, tally);
+        comparison.deviation(&rows[n], rounding, tally);
         if n > 0 {
             let earlier = n.checked_sub(2).map(|n| &rows[n]);
             comparison.step(earlier, [&rows[n - 1], &rows[n]], step, rounding, tally);
@@ -362,39 +373,44 @@ impl<const M: usize> View<'_, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curve::{Followed, Pieces};
+    use crate::nearest::Place;
+    use crate::phases::{Phases, FEED};
+    use crate::profile_clock::ProfileClock;
+    use crate::station::Rounded;
     use crate::Sided;
     use proptest::prelude::*;
 
-    const CHECKS_OF_ROWS: [Check; 8] = [
-        Check::Numbers,
-        Check::Grid,
-        Check::Travel,
-        Check::Velocity,
-        Check::Acceleration,
-        Check::Jerk,
-        Check::RecordedVelocity,
-        Check::RecordedAcceleration,
-    ];
-
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(300))]
+        #![proptest_config(ProptestConfig::with_cases(500))]
 
         #[test]
         fn rows_that_are_looked_at_at_once_show_what_they_show_one_after_the_other(
-            broken in 0..600_usize, what in 0..7_u8, by in -1.0..1.0_f64, travels: bool, records: bool,
+            broken in 0..600_usize, what in 0..14_u8, by in -1.0..1.0_f64,
+            travels: bool, records: bool, has_plan: bool,
         ) {
-            // Two axes that swing, one row broken in some way or none.
+            // Two axes that swing, one row broken in some way or none; from row 300 on they are on the next piece.
             let mut rows: Vec<Row<3>> = (0..600)
                 .map(|i| {
                     let t = 1e-3 * f64::from(i);
                     let (x, y) = ((9.0 * t).sin_cos(), (13.0 * t).sin_cos());
+                    let velocity = [9.0 * x.1, 13.0 * y.1, 0.0];
+                    let nearest = Nearest {
+                        place: Place { piece: usize::from(i >= 300), u: 10.0 * (t - if i < 300 { 0.0 } else { 0.3 }) },
+                        bend: 0.1 + 0.05 * x.0,
+                        off: 1e-9 * y.0,
+                        late: 1e-9 * x.0,
+                        velocity: Rounded { value: velocity.map(|v| v + 1e-9), rounding: [1e-12; 3] },
+                        acceleration_off: [0.01 * x.0, 0.02 * y.0, 0.0],
+                        ..Nearest::default()
+                    };
                     Row {
                         t,
                         q: [x.0, y.0, 0.0],
-                        velocity: records.then_some([9.0 * x.1, 13.0 * y.1, 0.0]),
+                        velocity: records.then_some(velocity),
                         acceleration: records.then_some([-81.0 * x.0, -169.0 * y.0, 0.0]),
                         line: i,
-                        nearest: Nearest::default(),
+                        nearest,
                     }
                 })
                 .collect();
@@ -406,31 +422,52 @@ mod tests {
                 3 => row.acceleration = row.acceleration.map(|[x, y, z]| [x + 200.0 * by, y, z]),
                 4 => row.q[0] = if by < 0.0 { f64::NAN } else { f64::INFINITY },
                 5 => row.velocity = None,
+                6 => row.nearest.off = 2e-6 * by,
+                7 => row.nearest.late = 2e-6 * by,
+                8 => row.nearest.velocity.value[0] += by,
+                9 => row.nearest.acceleration_off[1] = by,
+                10 => row.nearest.bend = 2.0 * by.abs(),
+                11 => row.nearest.place.u += 1e-2 * by,
+                12 => row.nearest.place.piece = 1,
                 _ => {}
             }
             let sided = |limit: f64| Sided { positive: [limit; 3], negative: [0.9 * limit; 3] };
             let mut limits = Limits { axes: 2, velocity: sided(12.0), acceleration: sided(150.0), ..Limits::none() };
             limits.jerk = [1000.0, f64::INFINITY, 0.0];
+            limits.chord_tolerance = 1e-5;
             if travels {
                 limits.travel[0] = [-1.0, 2.0];
             }
+            let pieces = Pieces {
+                axes: 2,
+                stride: 2,
+                control: &[0.0, 0.0, 3.0, 0.0, 3.0, 0.0, 6.0, 0.0],
+                weights: &[],
+                offsets: &[0, 2, 4],
+                width: &[3.0, 3.0],
+            };
+            let any = f64::INFINITY;
+            let feed = [10.0, any, any, any, 12.0, 15.0, any, any];
+            let path = Followed { feed: &feed, line: &[1, 2], tolerance: &[0.0; 2], ..Followed::of_one(pieces) };
+            let (kind, axis, value, u, p) = ([FEED], [255], [100.0], [0.0, 3.0], [100.0; 2]);
+            let phases = Phases::of_one(&kind, &axis, &value, &u, &p);
+            let profile = Some(ProfileClock { phases, starts: &[0.0, 0.3], run_starts: &[0.0] });
+            let plan = Plan { path, profile, program: None, joints: None };
             let stream = Stream::new(limits, 1e-9);
-            let view = View { differences: stream.differences(&rows), plan: None };
+            let view = View { differences: stream.differences(&rows), plan: has_plan.then_some(&plan) };
             let (mut found, mut wanted) = (Tally::default(), Tally::default());
             view.block(0..rows.len(), &mut found);
+            let mut comparison = view.plan.map(|plan| Comparison::new(plan, &stream.limits));
             for n in 0..rows.len() {
-                let mut recent = view.recent(n);
-                view.row(n, &mut recent, None, &mut wanted);
+                view.row(n, &mut view.recent(n), comparison.as_mut(), &mut wanted);
             }
             prop_assert_eq!(found.samples, wanted.samples);
-            for check in CHECKS_OF_ROWS {
-                for k in 0..2 {
-                    let [found, wanted] = [&found, &wanted].map(|tally| {
-                        let worst = tally.get(check, k);
-                        (worst.ratio, worst.time, worst.line)
-                    });
-                    prop_assert_eq!(found, wanted, "{:?} {}", check, k);
-                }
+            for (check, k) in Check::ALL.into_iter().flat_map(|check| [(check, 0), (check, 1)]) {
+                let [found, wanted] = [&found, &wanted].map(|tally| {
+                    let worst = tally.get(check, k);
+                    (worst.ratio, worst.time, worst.line)
+                });
+                prop_assert_eq!(found, wanted, "{:?} {}", check, k);
             }
         }
     }

@@ -14,10 +14,10 @@ use crate::{Check, Sided, Tally, EPS, ROUNDINGS};
 /// Setpoints that are looked at at once, and those before them that the differences of the first one need.
 pub const COUNT: usize = 256;
 pub const BEFORE: usize = 4;
-const ALL: usize = BEFORE + COUNT;
+pub const ALL: usize = BEFORE + COUNT;
 
 /// A number of each of them.
-type Column = [f64; ALL];
+pub type Column = [f64; ALL];
 
 /// What of the distance of each of some rows may be rounding, where no check of its differences can change the tally; else not a
 /// number. There are as many rows before them as they need.
@@ -33,13 +33,6 @@ fn settled_in_vectors<const M: usize>(
     tally: &Tally<M>,
 ) -> [f64; COUNT] {
     let (limits, period) = (of.limits, of.limits.period);
-    let known = |check: Check, k: usize| Some(tally.get(check, k).ratio).filter(|known| *known >= 0.0);
-    // What changes nothing is no more than this; what is against no limit only has to be a number.
-    let most = |check: Check, k: usize, limit: f64| match known(check, k) {
-        Some(_) if limit == f64::INFINITY => f64::MAX,
-        Some(known) => known * limit,
-        None => f64::NAN,
-    };
     let (mut t, mut magnitude, mut q, mut recorded) = ([0.0; ALL], [0.0; ALL], [0.0; ALL], [0.0; ALL]);
     let (mut rounding, mut acceleration) = ([0.0; ALL], [0.0; ALL]);
     fill(&mut t, rows, |row| row.t);
@@ -48,7 +41,7 @@ fn settled_in_vectors<const M: usize>(
     let records_acceleration = rows.iter().any(|row| row.acceleration.is_some());
     let (mut nothing, mut unsure_sq, mut is_open) = ([0.0; ALL], [0.0; ALL], [0.0; ALL]);
     // Steps of one period.
-    let grid = most(Check::Grid, 0, 0.0);
+    let grid = tally.most(Check::Grid, 0, 0.0);
     let mut is_odd = [grid; ALL];
     for i in 1..ALL {
         let slack = of.uneven() + ROUNDINGS * EPS * t[i].abs();
@@ -70,11 +63,11 @@ fn settled_in_vectors<const M: usize>(
         for i in 1..ALL - 1 {
             acceleration[i] = ((q[i + 1] - q[i]) * per - (q[i] - q[i - 1]) * per) * per_mean;
         }
-        let [least, greatest] = of.travel_of(k, known(Check::Travel, k));
+        let [least, greatest] = of.travel_of(k, tally.get(Check::Travel, k).ratio);
         judge(&mut is_open, |i| q[i], |_| greatest);
         judge(&mut is_open, |i| -q[i], |_| -least);
         let sides = |check: Check, limit: &Sided<M>| {
-            [limit.positive[k], limit.negative[k]].map(|limit| most(check, k, limit))
+            [limit.positive[k], limit.negative[k]].map(|limit| tally.most(check, k, limit))
         };
         let side = |[positive, negative]: [f64; 2], value: f64| if value < 0.0 { negative } else { positive };
         let velocity = sides(Check::Velocity, &limits.velocity);
@@ -89,7 +82,7 @@ fn settled_in_vectors<const M: usize>(
             |i| acceleration[i - 3].abs() - rounding[i - 2] * per_both,
             |i| side(mean, acceleration[i - 3]),
         );
-        let jerk = most(Check::Jerk, k, limits.jerk[k]);
+        let jerk = tally.most(Check::Jerk, k, limits.jerk[k]);
         judge(
             &mut is_open,
             |i| {
@@ -100,7 +93,7 @@ fn settled_in_vectors<const M: usize>(
         );
         if records_velocity {
             fill(&mut recorded, rows, |row| row.velocity.map_or(f64::NAN, |velocity| velocity[k]));
-            let off = most(Check::RecordedVelocity, k, limits.mean_velocity_off(k, period));
+            let off = tally.most(Check::RecordedVelocity, k, limits.mean_velocity_off(k, period));
             judge(
                 &mut is_open,
                 |i| {
@@ -116,7 +109,7 @@ fn settled_in_vectors<const M: usize>(
             judge(&mut is_open, |i| recorded[i].abs(), |i| side(limit, recorded[i]));
         }
     }
-    let numbers = most(Check::Numbers, 0, 0.0);
+    let numbers = tally.most(Check::Numbers, 0, 0.0);
     judge(&mut is_open, |i| nothing[i], |_| numbers);
     let mut unsure = [0.0; COUNT];
     for i in 0..COUNT {
@@ -128,7 +121,7 @@ fn settled_in_vectors<const M: usize>(
 
 /// Takes a number of each row.
 #[inline(always)]
-fn fill<const M: usize>(column: &mut Column, rows: &[Row<M>], number: impl Fn(&Row<M>) -> f64) {
+pub fn fill<const M: usize>(column: &mut Column, rows: &[Row<M>], number: impl Fn(&Row<M>) -> f64) {
     for (own, row) in column.iter_mut().zip(rows) {
         *own = number(row);
     }
@@ -136,7 +129,7 @@ fn fill<const M: usize>(column: &mut Column, rows: &[Row<M>], number: impl Fn(&R
 
 /// Leaves open the rows whose value is not at most so much.
 #[inline(always)]
-fn judge(is_open: &mut Column, value: impl Fn(usize) -> f64, most: impl Fn(usize) -> f64) {
+pub fn judge(is_open: &mut Column, value: impl Fn(usize) -> f64, most: impl Fn(usize) -> f64) {
     for i in BEFORE..ALL {
         is_open[i] = if value(i) <= most(i) { is_open[i] } else { 1.0 };
     }
