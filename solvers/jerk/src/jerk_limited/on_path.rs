@@ -327,9 +327,10 @@ impl<const M: usize> Task<'_, M> {
     ) -> Result<Vec<JerkProfile>, path_problem::Fault> {
         let mut all = take(&mut looked.stretches);
         loop {
+            let is_alone = all.len() == 1;
             let plan = |LookedStretch { stretch, rough, phases }: &mut LookedStretch| {
                 if phases.is_none() {
-                    *phases = Some(self.stretch(path, stretch, rough.take(), looked)?);
+                    *phases = Some(self.stretch(path, stretch, rough.take(), looked, is_alone)?);
                 }
                 Ok(())
             };
@@ -338,7 +339,7 @@ impl<const M: usize> Task<'_, M> {
             for (i, planned) in planned.into_iter().enumerate() {
                 match planned {
                     Ok(()) => {}
-                    Err(path_problem::Fault::NoPlan { .. }) if all.len() > 1 => failed.push(i),
+                    Err(path_problem::Fault::NoPlan { .. }) if !is_alone => failed.push(i),
                     Err(fault) => return Err(fault),
                 }
             }
@@ -362,6 +363,7 @@ impl<const M: usize> Task<'_, M> {
         stretch: &Stretch,
         rough: Option<Result<Rough, path_problem::Fault>>,
         looked: &Looked,
+        is_alone: bool,
     ) -> Result<JerkProfile, path_problem::Fault> {
         let Stretch { ends, held, .. } = *stretch;
         let mut phases = JerkProfile::default();
@@ -379,7 +381,14 @@ impl<const M: usize> Task<'_, M> {
                 price = refinement::price(iter::once(&rough.losses));
                 Ok(rough)
             });
-            let plan = rough.and_then(|rough| moving_axes::plan(problem, moves, rough, price, effort));
+            let plan = rough.and_then(|rough| {
+                // With its neighbours a stretch finds a first plan sooner than on a finer grid.
+                if is_alone || rough.is_planned() {
+                    moving_axes::plan(problem, moves, rough, price, effort)
+                } else {
+                    Err(path_problem::Fault::NoPlan { s: own.within(ends[0]) })
+                }
+            });
             let plan = plan.map_err(|fault| match fault {
                 path_problem::Fault::NoPlan { s } => path_problem::Fault::NoPlan { s: own.outside(s) },
                 fault => fault,

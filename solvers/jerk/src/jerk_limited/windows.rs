@@ -86,6 +86,11 @@ impl Rough {
         Ok(Self { start: prepared.start(), sections, losses })
     }
 
+    /// Whether there is a first plan.
+    pub fn is_planned(&self) -> bool {
+        !self.sections.is_empty()
+    }
+
     /// The plan of least time on a grid for a price of an interval, in s.
     pub fn plan<G: Geometry<M>, const M: usize>(
         self,
