@@ -48,7 +48,7 @@ const BESIDE: f64 = 1e-4;
 /// A jump of the acceleration that third differences of setpoints show as less than this part of the limit of jerk is
 /// rounding: half of what an audit can tell.
 const UNSEEN: f64 = 5e-7;
-/// Chains that are planned together.
+/// Chains of a run that are planned together.
 const TOGETHER: usize = 64;
 /// The share of this cutting in the work of a plan.
 const CUTTING: f64 = 0.1;
@@ -84,7 +84,7 @@ pub fn over_subruns<const M: usize>(
     })
 }
 
-/// The same with a `plan` of the subruns of some chains in a row. Its watch counts a part of a piece.
+/// The same with a `plan` of the subruns of some chains of a run. Its watch counts a part of a piece.
 pub fn over_chains<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -94,8 +94,12 @@ pub fn over_chains<const M: usize>(
     let subruns = subruns(problem);
     let turns = turns(problem, &limits, &subruns);
     let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
+    let chains = chains(&subruns, &turns);
+    // Each run is planned alone: where others are planned does not change its bits.
+    let runs = chains.chunk_by(|a, b| a.subruns[0].run == b.subruns[0].run);
+    let together: Vec<&[Chain]> = runs.flat_map(|run| run.chunks(TOGETHER)).collect();
     let planned: Result<Vec<Vec<JerkProfile>>, Fault> =
-        chains(&subruns, &turns).par_chunks(TOGETHER).map(|chains| plan(chains, &limits, watch)).collect();
+        together.into_par_iter().map(|chains| plan(chains, &limits, watch)).collect();
     let mut planned = planned?.into_iter().flatten();
     let (mut kept, mut runs, mut lower_bound) = (vec![], vec![0], vec![]);
     for run in subruns.chunk_by(|a, b| a.run == b.run) {
