@@ -13,7 +13,7 @@ use feedplan_geometry::lanes::eight::Lanes;
 /// Intervals of an even grid of the resolution in one of the coarse grid.
 pub const COARSE: u32 = 3;
 /// The greatest price of an interval, as a part of the mean time of the coarse intervals, times the square of the resolution.
-const PRICE: f64 = 0.05;
+const PRICE: f64 = 0.06;
 /// It is lowered by this factor until the grid loses no more in all than the even grid, at most so many times.
 const LOWER: f64 = 0.93;
 const TIMES: i32 = 255;
@@ -22,7 +22,7 @@ const LITTLE: f64 = 0.003;
 /// The most parts of an interval.
 const MOST: u32 = 8;
 /// Complementarity gap of the rough plan, as a part of the time, times the square of the resolution.
-const GAP: f64 = 0.03;
+const GAP: f64 = 0.022;
 /// A limit counts as used where the rough plan uses more than this part of it.
 const USED: f64 = 0.97;
 /// An acceleration above this part of its limit is near to it: that of the plan may be greater.
