@@ -67,29 +67,29 @@ struct Strokes<'a, const M: usize> {
     accelerations: Vec<f64>,
 }
 
-/// A path between two ends before its plan.
-struct Looked {
+/// A path between two ends with rough plans of its stretches.
+struct RoughPath {
     junctions: Vec<Junction>,
     caps: Vec<SpeedCap>,
     /// That of the stretches.
     resolution: f64,
-    stretches: Vec<LookedStretch>,
+    stretches: Vec<RoughStretch>,
 }
 
-struct LookedStretch {
+struct RoughStretch {
     stretch: Stretch,
     /// Known of those that do not hold their feed.
     rough: Option<Result<Rough, path_problem::Fault>>,
     phases: Option<JerkProfile>,
 }
 
-/// A chain before its plan.
-struct LookedChain<'a, const M: usize> {
+/// A chain with rough plans.
+struct RoughChain<'a, const M: usize> {
     strokes: Strokes<'a, M>,
     /// The greatest accelerations at the ends of its subruns, in mm/s².
     greatest: Vec<f64>,
-    /// Its subruns but lines, with their numbers in it.
-    looked: Vec<(usize, Looked)>,
+    /// Its subruns that are no lines, with their numbers in it.
+    known: Vec<(usize, RoughPath)>,
 }
 
 pub struct Task<'a, const M: usize> {
@@ -100,7 +100,7 @@ pub struct Task<'a, const M: usize> {
     price: f64,
 }
 
-impl LookedStretch {
+impl RoughStretch {
     fn rough(&self) -> Option<&Rough> {
         self.rough.as_ref()?.as_ref().ok()
     }
@@ -116,24 +116,24 @@ impl<const M: usize> Task<'_, M> {
     /// The profiles of the subruns of some chains; unplanned after the deadline. All are planned roughly first, which shows
     /// how short the intervals are to be for the least time in all.
     pub fn chains(&self, chains: &[Chain]) -> Result<Vec<JerkProfile>, Fault> {
-        let look = |chain| (!self.effort.expired()).then(|| self.look_at_chain(chain)).transpose();
-        let looked: Vec<Option<LookedChain<M>>> = chains.par_iter().map(look).collect::<Result<_, _>>()?;
-        let paths = looked.iter().flatten().flat_map(|chain| &chain.looked);
-        let roughs = paths.flat_map(|(_, own)| &own.stretches).filter_map(LookedStretch::rough);
+        let look = |chain| (!self.effort.expired()).then(|| self.rough_chain(chain)).transpose();
+        let known: Vec<Option<RoughChain<M>>> = chains.par_iter().map(look).collect::<Result<_, _>>()?;
+        let paths = known.iter().flatten().flat_map(|chain| &chain.known);
+        let roughs = paths.flat_map(|(_, own)| &own.stretches).filter_map(RoughStretch::rough);
         let price = refinement::price(roughs.map(|rough| &rough.losses));
         let task = Task { price, ..*self };
-        let plan = |(chain, looked): (&Chain, Option<_>)| match looked {
-            Some(looked) => task.chain(chain, looked),
+        let plan = |(chain, known): (&Chain, Option<_>)| match known {
+            Some(known) => task.chain(chain, known),
             None => Ok(vec![JerkProfile::unplanned(); chain.subruns.len()]),
         };
         let planned: Vec<Vec<JerkProfile>> =
-            chains.par_iter().zip(looked).map(plan).collect::<Result<_, _>>()?;
+            chains.par_iter().zip(known).map(plan).collect::<Result<_, _>>()?;
         Ok(planned.into_iter().flatten().collect())
     }
 
     /// A chain with rough plans. Between its subruns the tool is to turn back with the greatest accelerations that all lines
     /// allow; other subruns take what accelerations are the best for them, and the lines beside them the same.
-    fn look_at_chain<'b>(&self, chain: &Chain<'b>) -> Result<LookedChain<'b, M>, Fault>
+    fn rough_chain<'b>(&self, chain: &Chain<'b>) -> Result<RoughChain<'b, M>, Fault>
     where
         Self: 'b,
     {
@@ -151,34 +151,34 @@ impl<const M: usize> Task<'_, M> {
         }
         let look = |i: usize| {
             let ends = ends_of(chain, i, accelerations, &greatest);
-            lines[i].is_none().then(|| (i, self.of_subrun(chain, i, |own| own.look(&paths[i], ends))))
+            lines[i].is_none().then(|| (i, self.of_subrun(chain, i, |own| own.rough_path(&paths[i], ends))))
         };
-        let looked = (0..lines.len()).into_par_iter().filter_map(look).collect();
-        Ok(LookedChain { strokes, greatest, looked })
+        let known = (0..lines.len()).into_par_iter().filter_map(look).collect();
+        Ok(RoughChain { strokes, greatest, known })
     }
 
-    /// The profiles of a chain of subruns. Two subruns in a row that are no lines are
-    /// planned again, with at most the lesser acceleration of both, until they meet.
-    fn chain(&self, chain: &Chain, looked: LookedChain<M>) -> Result<Vec<JerkProfile>, Fault> {
+    /// The profiles of a chain of subruns. Two subruns in a row that are no lines are planned again, with at most the lesser
+    /// acceleration of both, until they meet.
+    fn chain(&self, chain: &Chain, known: RoughChain<M>) -> Result<Vec<JerkProfile>, Fault> {
         let count = chain.subruns.len();
-        let LookedChain { strokes: Strokes { paths, lines, mut accelerations }, greatest, looked } = looked;
-        let plan = |i: usize, accelerations: &[f64], looked: Option<Looked>| {
+        let RoughChain { strokes: Strokes { paths, lines, mut accelerations }, greatest, known } = known;
+        let plan = |i: usize, accelerations: &[f64], known: Option<RoughPath>| {
             let ends = ends_of(chain, i, accelerations, &greatest);
             self.of_subrun(chain, i, |own| {
-                let looked = looked.unwrap_or_else(|| own.look(&paths[i], ends));
-                own.plan(&paths[i], ends, looked, 0)
+                let known = known.unwrap_or_else(|| own.rough_path(&paths[i], ends));
+                own.plan(&paths[i], ends, known, 0)
             })
         };
         let mut planned = vec![JerkProfile::default(); count];
-        let mut open: Vec<(usize, Option<Looked>)> =
-            looked.into_iter().map(|(i, looked)| (i, Some(looked))).collect();
+        let mut open: Vec<(usize, Option<RoughPath>)> =
+            known.into_iter().map(|(i, known)| (i, Some(known))).collect();
         for round in 0.. {
             if open.is_empty() {
                 break;
             }
             let again: Vec<(usize, JerkProfile)> = open
                 .into_par_iter()
-                .map(|(i, looked)| Ok((i, plan(i, &accelerations, looked)?)))
+                .map(|(i, known)| Ok((i, plan(i, &accelerations, known)?)))
                 .collect::<Result<_, Fault>>()?;
             for (i, phases) in again {
                 planned[i] = phases;
@@ -261,7 +261,7 @@ impl<const M: usize> Task<'_, M> {
     }
 
     /// A path between two ends with rough plans.
-    fn look(&self, path: &ArcLengthPath<M>, ends: [End; 2]) -> Looked {
+    fn rough_path(&self, path: &ArcLengthPath<M>, ends: [End; 2]) -> RoughPath {
         let junctions = path.junctions(&self.limits.jerk);
         let caps = path.caps(&junctions);
         let stretches = stretches(self.problem, path, &self.limits, &junctions, ends);
@@ -269,17 +269,17 @@ impl<const M: usize> Task<'_, M> {
         let share = planned.map(|stretch| stretch.ends[1] - stretch.ends[0]).sum::<f64>() / path.total();
         let resolution = (self.effort.resolution / (1.0 + FINER * (1.0 / share - 1.0)).sqrt())
             .max(LEAST.min(self.effort.resolution));
-        let mut looked = Looked { junctions, caps, resolution, stretches: vec![] };
+        let mut known = RoughPath { junctions, caps, resolution, stretches: vec![] };
         let look = |stretch: Stretch| {
             let rough = stretch.held.is_none().then(|| {
-                self.on_stretch(path, &stretch, &looked, |_, problem, moves, effort| {
+                self.on_stretch(path, &stretch, &known, |_, problem, moves, effort| {
                     moving_axes::rough(problem, moves, effort)
                 })
             });
-            LookedStretch { stretch, rough, phases: None }
+            RoughStretch { stretch, rough, phases: None }
         };
-        looked.stretches = stretches.into_par_iter().map(look).collect();
-        looked
+        known.stretches = stretches.into_par_iter().map(look).collect();
+        known
     }
 
     /// The profile of a path between two ends, after this number of cuts.
@@ -287,11 +287,11 @@ impl<const M: usize> Task<'_, M> {
         &self,
         path: &ArcLengthPath<M>,
         ends: [End; 2],
-        mut looked: Looked,
+        mut known: RoughPath,
         cuts: u32,
     ) -> Result<JerkProfile, Fault> {
         let moving = ends.iter().any(|end| matches!(end, End::Moving { .. }));
-        match self.stretches(path, &mut looked) {
+        match self.stretches(path, &mut known) {
             // The deadline came before the first iteration of all windows.
             Ok(planned) if self.effort.expired() && planned.iter().all(|own| own.excess.is_empty()) => {
                 Ok(JerkProfile::unplanned())
@@ -310,7 +310,7 @@ impl<const M: usize> Task<'_, M> {
             Err(path_problem::Fault::Input(what)) => {
                 Err(Fault::Input { piece: Some(path.parts[0].piece), what })
             }
-            Err(path_problem::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &looked.caps),
+            Err(path_problem::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &known.caps),
             Err(path_problem::Fault::NoPlan { s }) if cuts < CUTS => self.cut(path, s, cuts),
             Err(path_problem::Fault::NoPlan { s }) => {
                 let part = path.part(s);
@@ -323,14 +323,14 @@ impl<const M: usize> Task<'_, M> {
     fn stretches(
         &self,
         path: &ArcLengthPath<M>,
-        looked: &mut Looked,
+        known: &mut RoughPath,
     ) -> Result<Vec<JerkProfile>, path_problem::Fault> {
-        let mut all = take(&mut looked.stretches);
+        let mut all = take(&mut known.stretches);
         loop {
             let is_alone = all.len() == 1;
-            let plan = |LookedStretch { stretch, rough, phases }: &mut LookedStretch| {
+            let plan = |RoughStretch { stretch, rough, phases }: &mut RoughStretch| {
                 if phases.is_none() {
-                    *phases = Some(self.stretch(path, stretch, rough.take(), looked, is_alone)?);
+                    *phases = Some(self.stretch(path, stretch, rough.take(), known, is_alone)?);
                 }
                 Ok(())
             };
@@ -352,7 +352,7 @@ impl<const M: usize> Task<'_, M> {
                 let (first, last) = (all[joined.start].stretch, all[joined.end - 1].stretch);
                 let ends = [first.ends[0], last.ends[1]];
                 let stretch = Stretch { ends, states: [first.states[0], last.states[1]], held: None };
-                all.splice(joined, [LookedStretch { stretch, rough: None, phases: None }]);
+                all.splice(joined, [RoughStretch { stretch, rough: None, phases: None }]);
             }
         }
     }
@@ -362,7 +362,7 @@ impl<const M: usize> Task<'_, M> {
         path: &ArcLengthPath<M>,
         stretch: &Stretch,
         rough: Option<Result<Rough, path_problem::Fault>>,
-        looked: &Looked,
+        known: &RoughPath,
         is_alone: bool,
     ) -> Result<JerkProfile, path_problem::Fault> {
         let Stretch { ends, held, .. } = *stretch;
@@ -371,10 +371,10 @@ impl<const M: usize> Task<'_, M> {
             phases.push_held(path, ends, feed);
             phases.lower_bound.push((ends[1] - ends[0]) / feed);
             self.effort.watch.part((ends[1] - ends[0]) / path.total()).advance(1);
-            self.kinks(path, looked, |_| feed * feed, ends, &mut phases);
+            self.kinks(path, known, |_| feed * feed, ends, &mut phases);
             return Ok(phases);
         }
-        self.on_stretch(path, stretch, looked, |own, problem, moves, effort| {
+        self.on_stretch(path, stretch, known, |own, problem, moves, effort| {
             let mut price = self.price;
             let rough = rough.unwrap_or_else(|| {
                 let rough = moving_axes::rough(problem, moves, effort)?;
@@ -401,7 +401,7 @@ impl<const M: usize> Task<'_, M> {
             if plan.iterations > 0.0 {
                 phases.excess.push(plan.excess);
             }
-            self.kinks(path, looked, |s| plan.profile.at(own.within(s))[0], ends, &mut phases);
+            self.kinks(path, known, |s| plan.profile.at(own.within(s))[0], ends, &mut phases);
             Ok(phases)
         })
     }
@@ -411,17 +411,17 @@ impl<const M: usize> Task<'_, M> {
         &self,
         path: &ArcLengthPath<M>,
         &Stretch { ends, states, .. }: &Stretch,
-        looked: &Looked,
+        known: &RoughPath,
         work: impl FnOnce(&Between<M>, &path_problem::Problem<Between<M>, M>, &[bool; M], &Effort) -> T,
     ) -> T {
         let own = Between::new(path, ends);
         let within = |cap: &SpeedCap| SpeedCap { s: own.within(cap.s), ..*cap };
-        let caps: Vec<SpeedCap> = caps_between(&looked.caps, ends).iter().map(within).collect();
+        let caps: Vec<SpeedCap> = caps_between(&known.caps, ends).iter().map(within).collect();
         let problem =
             path_problem::Problem { geometry: &own, limits: self.limits, caps: &caps, ends: states };
         // Short intervals leave room below the limits for the rounding of such lengths.
         let few_digits = ends[1] - ends[0] < FEW_DIGITS * path.total();
-        let resolution = if few_digits { FINER_THERE } else { 1.0 } * looked.resolution;
+        let resolution = if few_digits { FINER_THERE } else { 1.0 } * known.resolution;
         let watch = self.effort.watch.part((ends[1] - ends[0]) / path.total());
         let effort = Effort { resolution, watch, ..*self.effort };
         work(&own, &problem, &moving(self.problem, path, ends), &effort)
@@ -431,7 +431,7 @@ impl<const M: usize> Task<'_, M> {
     fn kinks(
         &self,
         path: &ArcLengthPath<M>,
-        Looked { junctions, .. }: &Looked,
+        RoughPath { junctions, .. }: &RoughPath,
         w: impl Fn(f64) -> f64,
         [from, to]: [f64; 2],
         phases: &mut JerkProfile,
@@ -505,7 +505,7 @@ impl<const M: usize> Task<'_, M> {
         let path = ArcLengthPath::new(self.problem, parts);
         match self.line(&path, [0.0; 2])? {
             Some(line) => Ok(self.along_line(&path, &line, [0.0; 2])),
-            None => self.plan(&path, [End::Rest; 2], self.look(&path, [End::Rest; 2]), cuts),
+            None => self.plan(&path, [End::Rest; 2], self.rough_path(&path, [End::Rest; 2]), cuts),
         }
     }
 

@@ -45,7 +45,8 @@ const SHORTEST: f64 = rest_ramp::SHORTEST / 16.0;
 const ROUGH: f64 = 0.3;
 /// Windows that are solved before their plans are joined, for each thread.
 const BATCH: usize = 8;
-/// Windows are blended over that part of their overlap where they agree best, of this many parts, else of fewer.
+/// Windows are blended over that part of their overlap where they agree best and the blend keeps the limits, of this many
+/// parts, else of fewer.
 const BLENDS: [usize; 4] = [8, 4, 2, 1];
 /// Greatest use of a limit by a blend: a little more than that of a window.
 const BLENDED: f64 = 1.0 + 5e-7;
@@ -460,6 +461,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         }
         window.rows.drop_at_ends(&ends);
         let verdict = window.improve(ends, &mut y, rough.as_ref(), &effort, exact);
+        // The multipliers are those of the same rows.
         loose.accelerates = window.rows.accelerates;
         let part = (proves && !self.effort.expired()).then(|| {
             let planned =
@@ -498,22 +500,29 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
             let size = (reached - start) / parts;
             let worst = |from: usize| (from..=from + size).map(apart).fold(0.0, f64::max);
             let starts = (0..2 * parts - 1).map(|i| start + i * size / 2);
-            let from = starts.min_by(|&a, &b| worst(a).total_cmp(&worst(b)))?;
-            let length = self.stations[from + size] - self.stations[from];
-            let mut blend = x[2 * from..2 * (from + size) + 2].to_vec();
-            for (n, (z, y)) in blend.chunks_exact_mut(2).zip(y_from(from).chunks_exact(2)).enumerate() {
-                let t = (self.stations[from + n] - self.stations[from]) / length;
-                let (weight, rate) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / length);
-                let [w, slope] = [y[0] - z[0], y[1] - z[1]];
-                z[0] += weight * w;
-                z[1] += weight * slope + rate * w;
-            }
-            let holds = self.in_space(|Space { window, .. }| {
-                self.prepared.fill(from..from + size, window);
-                window.holds(&blend, BLENDED)
-            });
-            holds.then_some((from..from + size, blend))
+            let mut starts: Vec<(usize, f64)> = starts.map(|from| (from, worst(from))).collect();
+            starts.sort_by(|a, b| a.1.total_cmp(&b.1));
+            starts.into_iter().find_map(|(from, _)| self.blend_on(from..from + size, x, y_from(from)))
         })
+    }
+
+    /// The spline that leads from x to y between two stations; None if it does not keep the limits. y begins at the first one.
+    fn blend_on(&self, stations: Range<usize>, x: &[f64], y: &[f64]) -> Option<(Range<usize>, Vec<f64>)> {
+        let s = |station: usize| self.stations[station] - self.stations[stations.start];
+        let length = s(stations.end);
+        let mut blend = x[2 * stations.start..2 * stations.end + 2].to_vec();
+        for (n, (z, y)) in blend.chunks_exact_mut(2).zip(y.chunks_exact(2)).enumerate() {
+            let t = s(stations.start + n) / length;
+            let (weight, rate) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / length);
+            let [w, slope] = [y[0] - z[0], y[1] - z[1]];
+            z[0] += weight * w;
+            z[1] += weight * slope + rate * w;
+        }
+        let holds = self.in_space(|Space { window, .. }| {
+            self.prepared.fill(stations.clone(), window);
+            window.holds(&blend, BLENDED)
+        });
+        holds.then_some((stations, blend))
     }
 
     /// The profile with its ramps.
