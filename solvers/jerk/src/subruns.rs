@@ -4,6 +4,8 @@
 //!
 //! Input: the pieces and limits of a problem. Lengths in mm, speeds in mm/s, parameters u in [0, width] of a piece.
 
+use std::cmp::Reverse;
+
 use rayon::prelude::*;
 
 use crate::arc_length_path::{
@@ -97,10 +99,17 @@ pub fn over_chains<const M: usize>(
     let chains = chains(&subruns, &turns);
     // Each run is planned alone: where others are planned does not change its bits.
     let runs = chains.chunk_by(|a, b| a.subruns[0].run == b.subruns[0].run);
-    let together: Vec<&[Chain]> = runs.flat_map(|run| run.chunks(TOGETHER)).collect();
-    let planned: Result<Vec<Vec<JerkProfile>>, Fault> =
-        together.into_par_iter().map(|chains| plan(chains, &limits, watch)).collect();
-    let mut planned = planned?.into_iter().flatten();
+    let mut together: Vec<(usize, &[Chain])> =
+        runs.flat_map(|run| run.chunks(TOGETHER)).enumerate().collect();
+    // The long ones come first, and each thread takes the next one: at the end none waits for a long one.
+    together.sort_by_key(|(_, chains)| Reverse(parts(chains)));
+    let mut planned: Vec<(usize, Vec<JerkProfile>)> = together
+        .into_iter()
+        .par_bridge()
+        .map(|(i, chains)| Ok((i, plan(chains, &limits, watch)?)))
+        .collect::<Result<_, Fault>>()?;
+    planned.sort_by_key(|(i, _)| *i);
+    let mut planned = planned.into_iter().flat_map(|(_, planned)| planned);
     let (mut kept, mut runs, mut lower_bound) = (vec![], vec![0], vec![]);
     for run in subruns.chunk_by(|a, b| a.run == b.run) {
         let mut own: Vec<JerkProfile> = planned.by_ref().take(run.len()).collect();
@@ -115,6 +124,11 @@ pub fn over_chains<const M: usize>(
     let mut all = JerkProfile::joined(kept);
     (all.runs, all.lower_bound) = (runs, lower_bound);
     Ok(all)
+}
+
+/// The number of parts of pieces in some chains.
+fn parts(chains: &[Chain]) -> usize {
+    chains.iter().flat_map(|chain| chain.subruns).map(|subrun| subrun.parts.len()).sum()
 }
 
 /// The limits of the axes, after a check of all numbers of the problem.
