@@ -67,7 +67,7 @@ pub struct Constraints {
 
 /// Indices of the rows at one collocation point: for each axis the upper and the lower limit of its jerk, then speed, then
 /// w ≥ 0, then for each axis the upper and the lower limit of its acceleration, if it has rows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct RowLayout {
     axes: usize,
     accelerates: bool,

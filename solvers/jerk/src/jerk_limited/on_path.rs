@@ -7,7 +7,6 @@
 //! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
 //! the acceleration goes on (`turns`).
 
-use std::iter;
 use std::mem::take;
 
 use rayon::prelude::*;
@@ -378,7 +377,7 @@ impl<const M: usize> Task<'_, M> {
             let mut price = self.price;
             let rough = rough.unwrap_or_else(|| {
                 let rough = moving_axes::rough(problem, moves, effort)?;
-                price = refinement::price(iter::once(&rough.losses));
+                price = rough.price();
                 Ok(rough)
             });
             let plan = rough.and_then(|rough| {
@@ -522,8 +521,11 @@ impl<const M: usize> Task<'_, M> {
         let possible = |speeds: [f64; 2]| {
             let ends = speeds.map(|speed| end_of(speed, [0.0; 2]));
             let problem = path_problem::Problem { geometry: path, limits: self.limits, caps, ends };
-            let rough = moving_axes::rough(&problem, &moves, &effort);
-            rough.and_then(|rough| moving_axes::plan(&problem, &moves, rough, f64::INFINITY, &effort)).is_ok()
+            let plan = moving_axes::rough(&problem, &moves, &effort).and_then(|rough| {
+                let price = rough.price();
+                moving_axes::plan(&problem, &moves, rough, price, &effort)
+            });
+            plan.is_ok()
         };
         // The end is at fault where the start alone can be met.
         let at = usize::from(speeds[0] == 0.0 || (speeds[1] > 0.0 && possible([speeds[0], 0.0])));

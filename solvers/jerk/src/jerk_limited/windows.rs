@@ -54,7 +54,7 @@ const BLENDED: f64 = 1.0 + 5e-7;
 /// The plan of least time.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let rough = Rough::new(problem, effort)?;
-    let price = refinement::price(std::iter::once(&rough.losses));
+    let price = rough.price();
     rough.plan(problem, price, effort)
 }
 
@@ -90,6 +90,11 @@ impl Rough {
     /// Whether there is a first plan.
     pub fn is_planned(&self) -> bool {
         !self.sections.is_empty()
+    }
+
+    /// The price of an interval on this path alone, in s.
+    pub fn price(&self) -> f64 {
+        refinement::price(std::iter::once(&self.losses))
     }
 
     /// The plan of least time on a grid for a price of an interval, in s.
