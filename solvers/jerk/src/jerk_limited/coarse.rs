@@ -17,8 +17,6 @@ const GROUP: usize = 3;
 const FEWEST: usize = 30;
 /// Complementarity gap of the coarse solution, as a part of the time.
 const GAP: f64 = 0.2;
-/// The first μ after it, as in `Effort`.
-const BARRIER: f64 = 0.3;
 /// Uses of a limit below this part do not count.
 const LITTLE: f64 = 0.02;
 /// Use of a speed limit by a start that leaves room.
@@ -44,8 +42,7 @@ pub fn starts<'e, X: Model>(
         iterations = report.iterations.div_ceil(GROUP);
         if report.outcome == Outcome::Converged {
             let near = prolong(&x, rows);
-            let own = Effort { barrier: BARRIER, ..*effort };
-            starts.extend(BACK.map(|part| (hermite::blend(&far, &near, part), own)));
+            starts.extend(BACK.map(|part| (hermite::blend(&far, &near, part), *effort)));
         }
     }
     starts.push((far, *effort));

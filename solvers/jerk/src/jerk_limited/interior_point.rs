@@ -59,6 +59,8 @@ pub struct Report {
 const STEP: f64 = 0.995;
 /// Given ends count as met within this relative error.
 const MET: f64 = 1e-9;
+/// The least μ aimed at in the first steps, as a part of the time per row, where `barrier` is 1; near a solution less.
+const FLOOR: f64 = 0.3;
 /// Steps shorter than this part of Newton's step count as no progress.
 const LEAST_STEP: f64 = 1e-6;
 /// λ s stays above this part of the complementarity aimed at.
@@ -96,7 +98,8 @@ impl<X: Model> InteriorPoint<X> {
             return Report { outcome: Outcome::NotInside, iterations: 0, time, excess: time };
         };
         let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
-        let mut floor = 0.3 * effort.barrier;
+        // Far from the optimum the centring has a least μ; it falls with the steps.
+        let mut floor = FLOOR * effort.barrier * effort.barrier;
         // The part of the multipliers' last step that is still to be added, and their least complementarity after it.
         let (mut dual, mut least_dual) = (0.0, 0.0);
         let mut gain = f64::INFINITY;

@@ -53,8 +53,10 @@ struct Start {
 
 /// Beside the plan, with its multipliers, where these are nearly those of the relaxation …
 const BESIDE: Start = Start { below: 1e-3, above: 1e-3, barrier: 1e-3, warm: true, tolerance: 1e-5 };
-/// … and where they are not.
+/// … and where they are not. Where the multipliers exceed c by a greater part of it, the start is farther from the plan: that
+/// part times SPREAD.
 const NEAR: Start = Start { below: 1e-2, above: 0.1, barrier: 0.03, warm: true, tolerance: 3e-5 };
+const SPREAD: f64 = 2.5;
 /// Far inside the limits, where no solution is found from there.
 const FAR: Start = Start { below: 0.03, above: 0.1, barrier: 1.0, warm: false, tolerance: 3e-5 };
 /// The solution starts beside the plan where its multipliers of jerk exceed c by at most this part.
@@ -148,6 +150,12 @@ pub struct Solution {
     pub x: Vec<f64>,
 }
 
+/// The start where the multipliers of jerk exceed c by this part of it.
+fn near(excess: f64) -> Start {
+    let far = SPREAD * excess;
+    Start { above: NEAR.above.max(far), barrier: NEAR.barrier.max(far), ..NEAR }
+}
+
 /// The part of the intervals `core` of a window, with the solution of the relaxation unless it is beside the plan; its
 /// multipliers stay in `space`.
 pub fn part(
@@ -157,8 +165,9 @@ pub fn part(
     space: &mut InteriorPoint<Relaxed>,
 ) -> (Part, Option<Solution>) {
     loosen(planned, &mut space.state.dual);
-    let tight = excess(planned.rows, &space.state.dual) <= TIGHT;
-    let starts = [if tight { BESIDE } else { NEAR }, FAR];
+    let excess = excess(planned.rows, &space.state.dual);
+    let tight = excess <= TIGHT;
+    let starts = [if tight { BESIDE } else { near(excess) }, FAR];
     let lowered = (!tight).then(|| {
         let mut rows = planned.rows.clone();
         speed_limit::lower(&mut rows);

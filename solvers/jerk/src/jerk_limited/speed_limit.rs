@@ -24,14 +24,11 @@ const CLOSE: f64 = 1.0 - 1e-6;
 /// q'' jumps where it changes by more than this part of itself at a station; κ w^(3/2) jumps there as well.
 const JUMP: f64 = 1e-6;
 
-/// A number for each axis, 0 beyond the last one.
-type Axes = [f64; MOST_AXES];
-
-struct Point {
-    first: Axes,
+struct Point<const N: usize> {
+    first: [f64; N],
     /// q_k'² and its inverse.
-    square: [Axes; 2],
-    normal: Axes,
+    square: [[f64; N]; 2],
+    normal: [f64; N],
     bend: f64,
     /// Bounds of w, of v³, and of v³ plus the integral.
     w: f64,
@@ -43,9 +40,9 @@ struct Point {
 }
 
 /// The way from a point to the next.
-struct Step {
+struct Step<const N: usize> {
     /// The greatest changes of q_k'² w forward and backward.
-    energy: [Axes; 2],
+    energy: [[f64; N]; 2],
     /// The greatest change of κ w^(3/2), and the least κ.
     bending: f64,
     straight: f64,
@@ -53,16 +50,27 @@ struct Step {
 
 /// Lowers the speed caps of a window.
 pub fn lower(rows: &mut Constraints) {
-    let axes = rows.axes();
-    let (mut points, steps) = points(rows);
+    match rows.axes() {
+        0..=2 => lower_by::<2>(rows),
+        3 => lower_by::<3>(rows),
+        4 => lower_by::<4>(rows),
+        5 => lower_by::<5>(rows),
+        6 => lower_by::<6>(rows),
+        _ => lower_by::<MOST_AXES>(rows),
+    }
+}
+
+/// With numbers for N axes, 0 beyond the last one.
+fn lower_by<const N: usize>(rows: &mut Constraints) {
+    let (mut points, steps) = points::<N>(rows);
     for _ in 0..ROUNDS {
         for (n, step) in steps.iter().enumerate() {
             let (before, after) = points.split_at_mut(n + 1);
-            after[0].lower(&before[n], &step.energy[0][..axes], step);
+            after[0].lower(&before[n], &step.energy[0], step);
         }
         for (n, step) in steps.iter().enumerate().rev() {
             let (before, after) = points.split_at_mut(n + 1);
-            before[n].lower(&after[0], &step.energy[1][..axes], step);
+            before[n].lower(&after[0], &step.energy[1], step);
         }
         convex(&mut points);
     }
@@ -71,14 +79,14 @@ pub fn lower(rows: &mut Constraints) {
     }
 }
 
-impl Point {
+impl<const N: usize> Point<N> {
     /// q_k''.
     fn second(&self, k: usize) -> f64 {
         self.normal[k] * self.bend
     }
 
-    /// Lowers w to what can be reached from another point.
-    fn lower(&mut self, from: &Self, energy: &[f64], step: &Step) {
+    /// Lowers w to what can be reached from another point. An axis that does not move sets no limit: w.min(NaN) = w.
+    fn lower(&mut self, from: &Self, energy: &[f64; N], step: &Step<N>) {
         let mut w = self.w;
         if self.s == from.s {
             // At a knot q' differs by rounding, at a corner by more: the speed is the same on both sides.
@@ -103,26 +111,26 @@ impl Point {
     }
 }
 
-fn points(rows: &Constraints) -> (Vec<Point>, Vec<Step>) {
-    let mut jerk = [0.0; MOST_AXES];
-    let mut acceleration = [[0.0; 2]; MOST_AXES];
+fn points<const N: usize>(rows: &Constraints) -> (Vec<Point<N>>, Vec<Step<N>>) {
+    let mut jerk = [0.0; N];
+    let mut acceleration = [[0.0; 2]; N];
     for (k, (per_jerk, limit)) in rows.per_jerk.iter().zip(&rows.acceleration).enumerate() {
         (jerk[k], acceleration[k]) = (1.0 / per_jerk, limit.most.map(|most| most / limit.per_mean));
     }
     let most = |k: usize, side: bool| acceleration[k][usize::from(side)];
-    let along = |direction: &Axes| (0..MOST_AXES).map(|k| direction[k].abs() * jerk[k]).sum::<f64>();
-    let mut points: Vec<Point> = Vec::with_capacity(COUNT * rows.count());
+    let along = |direction: &[f64; N]| (0..N).map(|k| direction[k].abs() * jerk[k]).sum::<f64>();
+    let mut points: Vec<Point<N>> = Vec::with_capacity(COUNT * rows.count());
     let mut steps = Vec::with_capacity(COUNT * rows.count());
     let mut slope = 0.0;
     for n in 0..rows.count() {
         for p in 0..COUNT {
-            let (mut first, mut second) = ([0.0; MOST_AXES], [0.0; MOST_AXES]);
+            let (mut first, mut second) = ([0.0; N], [0.0; N]);
             for axis in 0..rows.axes() {
                 [first[axis], second[axis], _] = rows.derivatives(n, p, axis);
             }
             let bend = length(&second);
             let normal = second.map(|second: f64| second / bend.max(f64::MIN_POSITIVE));
-            let across: f64 = (0..MOST_AXES).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
+            let across: f64 = (0..N).map(|k| normal[k].abs() * most(k, normal[k] < 0.0)).sum();
             let w = (1.0 / rows.speed(n, p)).min(across / bend);
             let square = first.map(|first| first * first);
             let square = [square, square.map(|square| 1.0 / square)];
@@ -143,15 +151,15 @@ fn points(rows: &Constraints) -> (Vec<Point>, Vec<Step>) {
     (points, steps)
 }
 
-fn step(
-    last: &Point,
-    next: &Point,
+fn step<const N: usize>(
+    last: &Point<N>,
+    next: &Point<N>,
     h: f64,
-    mean: &Axes,
-    along: &impl Fn(&Axes) -> f64,
+    mean: &[f64; N],
+    along: &impl Fn(&[f64; N]) -> f64,
     all: f64,
     most: &impl Fn(usize, bool) -> f64,
-) -> Step {
+) -> Step<N> {
     let energy = [false, true].map(|back| {
         std::array::from_fn(|k| {
             // Acceleration against the axis is negative; on the way back the signs change.
@@ -170,15 +178,15 @@ fn step(
     let turn = length(&difference(&last.normal, &next.normal));
     let steep = along(&last.normal).max(along(&next.normal)) * (1.0 + turn * turn / 6.0);
     // The least |q''| where q'' changes evenly.
-    let back: f64 = (0..MOST_AXES).map(|k| -bends[0][k] * apart[k]).sum();
+    let back: f64 = (0..N).map(|k| -bends[0][k] * apart[k]).sum();
     let part = (back / length(&apart).powi(2).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    let straight = length(&std::array::from_fn(|k| bends[0][k] + part * apart[k]));
+    let straight = length::<N>(&std::array::from_fn(|k| bends[0][k] + part * apart[k]));
     Step { energy, bending: h * if turn < 1.0 { steep.min(all) } else { all }, straight }
 }
 
 /// The greatest mean of |q_k'| between two points, h apart: by the trapezoidal rule on an arc, or by the cubic with the same q''
 /// at both points.
-fn mean_direction(last: &Point, next: &Point, h: f64) -> Axes {
+fn mean_direction<const N: usize>(last: &Point<N>, next: &Point<N>, h: f64) -> [f64; N] {
     // The mean of a component on an arc of the angle 2 φ exceeds that of its ends by tan φ/φ; this is more for chords up to 1.
     let chord = length(&difference(&last.first, &next.first));
     let arc = 1.0 + chord * chord / 8.0;
@@ -192,7 +200,7 @@ fn mean_direction(last: &Point, next: &Point, h: f64) -> Axes {
 }
 
 /// Lowers w to the lower convex hull of v³ plus the integral over the arc length.
-fn convex(points: &mut [Point]) {
+fn convex<const N: usize>(points: &mut [Point<N>]) {
     let mut hull: Vec<usize> = vec![];
     for n in 0..points.len() {
         points[n].convex = points[n].cube + points[n].integral;
@@ -217,11 +225,11 @@ fn convex(points: &mut [Point]) {
     }
 }
 
-fn length(vector: &Axes) -> f64 {
+fn length<const N: usize>(vector: &[f64; N]) -> f64 {
     vector.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
-fn difference(a: &Axes, b: &Axes) -> Axes {
+fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {
     std::array::from_fn(|k| b[k] - a[k])
 }
 

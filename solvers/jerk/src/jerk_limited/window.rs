@@ -133,6 +133,11 @@ impl Window {
         self.rows.accelerates = false;
         loop {
             let (starts, mut spent) = coarse::starts(&self.rows, ends, inside(x), effort, space);
+            if !self.rows.accelerates && self.rows.utilisation(&starts[0].0).iter().any(|used| used[1] > 1.0)
+            {
+                self.rows.accelerates = true;
+                continue;
+            }
             let (y, report) = self.attempt(ends, starts, space, &mut spent)?;
             if report.outcome == Outcome::Stopped {
                 return None;
