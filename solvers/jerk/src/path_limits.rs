@@ -67,12 +67,8 @@ pub struct Allowable {
 /// 4 δ²)/T² on a circle, with the tolerance δ [mm], the curvature κ [1/mm] and the servo period T [s].
 pub fn chord_speed(curvature: f64, tolerance: f64, period: f64) -> f64 {
     // Where 1/κ < δ, no part of the path shorter than 2 δ leaves its chord by δ.
-    let chord_sq = if curvature * tolerance < 1.0 {
-        8.0 * tolerance / curvature - 4.0 * tolerance * tolerance
-    } else {
-        4.0 * tolerance * tolerance
-    };
-    chord_sq.sqrt() / period
+    let least = 4.0 * tolerance * tolerance;
+    (8.0 * tolerance / curvature - least).max(least).sqrt() / period
 }
 
 /// V, A and J for a segment, with V at most `speed` (feed and chord error). `reference_length` is the L of the head, in

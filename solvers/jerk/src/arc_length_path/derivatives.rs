@@ -206,7 +206,7 @@ pub fn path_point<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Pat
 pub fn path_points<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) -> PathPoints<M> {
     let c = derivatives_at_four(&piece(problem, i), u);
     let rate = problem.way.map(|way| polynomial_at_four(way.of(i), problem.width[i], u));
-    let (q, d) = dispatch!(Level::new(), simd => by_length(simd, &c, rate));
+    let (q, [d, bend]) = dispatch!(Level::new(), simd => by_length(simd, &c, rate));
     let square = match (problem.tip, problem.share(i)) {
         (Some(tip), _) => Some(polynomial_at_four(tip.speed.of(i), problem.width[i], u)[0]),
         (None, None) => None,
@@ -217,19 +217,18 @@ pub fn path_points<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) 
     let d = d.values();
     let speed_cap = std::array::from_fn(|lane| {
         let per_feed = square.map_or(1.0, |square| (d[lane] / square.values()[lane]).sqrt());
-        let bend = || norm::<M>(&std::array::from_fn(|k| q[k][1].values()[lane]));
-        (problem.feed[i] * per_feed).min(chord_cap(problem, i, u[lane], d[lane], bend))
+        (problem.feed[i] * per_feed).min(chord_cap(problem, i, u[lane], d[lane], || bend.values()[lane]))
     });
     PathPoints { q, speed_cap: Lanes::new(speed_cap) }
 }
 
-/// The derivatives by the arc length at four places, and D: that of the axes, if not given with its derivatives.
+/// The derivatives by the arc length at four places, D and the curvature: D is that of the axes, if not given with its derivatives.
 #[inline(always)]
 fn by_length<S: Simd, const M: usize>(
     simd: S,
     c: &[[Lanes; 3]; M],
     rate: Option<[Lanes; 3]>,
-) -> ([[Lanes; 3]; M], Lanes) {
+) -> ([[Lanes; 3]; M], [Lanes; 2]) {
     let one = Register::all(simd, 1.0);
     let [d, d1, d2] = match rate {
         Some(rate) => rate.map(|rate| rate.load(simd)),
@@ -249,15 +248,14 @@ fn by_length<S: Simd, const M: usize>(
     let u2 = d1 * -0.5 * per_d_sq;
     let u3 = u1 * per_d_sq * (d1 * d1 / d - d2 * 0.5);
     let mut q = [[Lanes::ZERO; 3]; M];
+    let mut bend = Register::all(simd, 0.0);
     for k in 0..M {
         let [c1, c2, c3] = c[k].map(|c| c.load(simd));
-        q[k] = [
-            (c1 * u1).into(),
-            (c2 * u1 * u1 + c1 * u2).into(),
-            (c3 * u1 * u1 * u1 + c2 * 3.0 * u1 * u2 + c1 * u3).into(),
-        ];
+        let second = c2 * u1 * u1 + c1 * u2;
+        q[k] = [(c1 * u1).into(), second.into(), (c3 * u1 * u1 * u1 + c2 * 3.0 * u1 * u2 + c1 * u3).into()];
+        bend += second * second;
     }
-    (q, d.into())
+    (q, [d, bend.sqrt()].map(Lanes::from))
 }
 
 /// The greatest speed along s by the chord error at u of piece `i`, with this D and curvature of the axes' path.

@@ -103,7 +103,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let (limits, slopes) = (&self.problem.limits, self.slopes);
         let mut caps =
             self.each(|rows, _| (0..rows.count()).map(|n| rows.envelope_cap(n, limits, slopes.k)).collect());
-        self.speeds = caps.iter().map(|r| r.power(2.0 / 3.0)).collect();
+        self.speeds = caps.iter().map(|r| r.cbrt().powi(2)).collect();
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
             self.watch.check();

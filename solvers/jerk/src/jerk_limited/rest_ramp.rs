@@ -20,6 +20,8 @@ const CHANGE: f64 = 0.05;
 const APART: f64 = 1e-5;
 /// The part of the limit of jerk that a ramp of constant acceleration uses: the rest is for changes of it.
 const USED: f64 = 0.75;
+/// The least time for which a point is looked at, in units where the distance from rest is its cube in mm.
+const LEAST_TIME: f64 = 1e-30;
 /// Number of octaves of time in which points begin near rest: the path may turn within any length there.
 const OCTAVES: i32 = 12;
 /// Points between the neighbours of the worst point, and rounds of this refinement.
@@ -97,12 +99,15 @@ pub fn greatest<const M: usize>(
         }
         // The greatest c at a time t, in units where the distance from rest is t³.
         let at = |t: f64| {
-            let x = (t * t * t).max(f64::MIN_POSITIVE);
+            let t = t.max(LEAST_TIME);
+            let x = t * t * t;
             let point = geometry.at(piece, if end == 0 { x } else { total - x });
             // w/c, w'/c; then w^(3/2), √w w' and √w w'', all over c^(3/2).
-            let (w, w1) = (x.power(power), sign * power * x.power(power - 1.0));
-            let (cubed, crossed) = (x.power(1.5 * power), sign * power * x.power(1.5 * power - 1.0));
-            let bend = power * (power - 1.0) * x.power(1.5 * power - 2.0);
+            let w = if power == Ramp::JERK { t * x } else { x };
+            let w1 = sign * power * w / x;
+            let cubed = w * w.sqrt();
+            let crossed = sign * power * cubed / x;
+            let bend = power * (power - 1.0) * cubed / (x * x);
             let mut c = 1.0 / (limits.per_speed_sq(&point) * w);
             for k in 0..M {
                 let (q1, q2, q3) = (point.first[k], point.second[k], point.third[k]);
