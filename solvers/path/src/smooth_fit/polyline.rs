@@ -108,14 +108,25 @@ impl<const D: usize> Polyline<D> {
 
 /// The angle between two vectors, in rad; 0 where one has no length.
 pub fn angle<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    2.0 * half_tangent(a, b).atan()
+}
+
+/// Whether the angle between two vectors is at most this, in rad: mostly without an arc tangent.
+pub fn is_within<const D: usize>(a: &[f64; D], b: &[f64; D], most: f64) -> bool {
+    let (half, tangent) = (0.5 * most, half_tangent(a, b));
+    // t − t³/3 ≤ atan t ≤ t.
+    tangent <= half || (tangent * (1.0 - tangent * tangent / 3.0) <= half && tangent.atan() <= half)
+}
+
+/// The tangent of half the angle between two vectors, which keeps the digits of small turns; 0 where one has no length.
+fn half_tangent<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     let (p, q) = (norm(a), norm(b));
     if !(p > 0.0 && q > 0.0) {
         return 0.0;
     }
-    // The half angle by its tangent keeps the digits of small turns.
     let (x, y): ([f64; D], [f64; D]) =
         (std::array::from_fn(|k| a[k] / p - b[k] / q), std::array::from_fn(|k| a[k] / p + b[k] / q));
-    2.0 * norm(&x).atan2(norm(&y))
+    (dot(&x, &x) / dot(&y, &y)).sqrt()
 }
 
 #[cfg(test)]
@@ -131,5 +142,15 @@ mod tests {
         assert_eq!((elbow.distance(0, &[4.0, 0.0]), elbow.distance(1, &[2.0, 1.0])), (1.0, 1.0));
         assert_eq!((elbow.tolerance_at(0), elbow.tolerance_at(1), elbow.tolerance_at(2)), (0.1, 0.1, 0.2));
         assert_eq!(elbow.point(1, 5.0), [3.0, 2.0]);
+    }
+
+    #[test]
+    fn a_turn_is_within_what_is_more_than_it() {
+        for turn in [0.0, 1e-9, 0.01, 1.0, 2.0, 3.0, std::f64::consts::PI] {
+            let b = [2.0 * turn.cos(), 2.0 * turn.sin()];
+            assert!((angle(&[3.0, 0.0], &b) - turn).abs() < 1e-15);
+            assert!(is_within(&[3.0, 0.0], &b, turn * (1.0 + 1e-14)), "{turn}");
+            assert!(turn == 0.0 || !is_within(&[3.0, 0.0], &b, turn * (1.0 - 1e-14)), "{turn}");
+        }
     }
 }

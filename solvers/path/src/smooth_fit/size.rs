@@ -7,7 +7,7 @@
 //! The polyline so leaves an interval by no more than a few tolerances, and noise below the tolerance does not shorten
 //! intervals. Neighbours differ little: |h'| ≤ GRADE.
 
-use super::polyline::{angle, Polyline};
+use super::polyline::{is_within, Polyline};
 use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::sub;
 
@@ -115,7 +115,7 @@ fn sizes<const D: usize>(line: &Polyline<D>, greatest: f64) -> Vec<f64> {
             }
             let back = sub(&line.vertex[i], &line.point(a, low));
             let ahead = sub(&line.point(b, high), &line.vertex[i]);
-            let straight = w * angle(&back, &ahead) <= TURN * epsilon[i];
+            let straight = is_within(&back, &ahead, TURN * epsilon[i] / w);
             if straight {
                 h[i] = h[i].max(w.min(greatest));
             }
