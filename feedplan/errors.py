@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+from typing import ClassVar, Literal
+
+ErrorKind = Literal["program", "machine", "package", "infeasible", "solver", "input"]
+
 # Longest sentence, and longest word in it if it is too long: the middle of long words, such as paths, is left
 # out first, then the middle of the sentence.
 LONGEST, LONGEST_WORD = 300, 60
 
 
 class FeedplanError(Exception):
-    """Base of every error that feedplan raises on purpose; its text, one line, is meant for the user."""
+    """Base of every error that feedplan raises on purpose; its text, one line, is meant for the user.
 
-    def __init__(self, message: str = "") -> None:
-        line = " ".join(message.splitlines())
-        if len(line) > LONGEST:
-            line = " ".join(_shortened(word, LONGEST_WORD) for word in line.split(" "))
-        super().__init__(_shortened(line, LONGEST))
+    `line` is the source line of the program that it is about, from 1, or None. `kind` names the class in the
+    outcomes of jobs and in the problems of the service.
+    """
+
+    kind: ClassVar[ErrorKind] = "input"
+
+    def __init__(self, message: str = "", line: int | None = None) -> None:
+        self.line = line
+        text = " ".join(message.splitlines())
+        if len(text) > LONGEST:
+            text = " ".join(_shortened(word, LONGEST_WORD) for word in text.split(" "))
+        super().__init__(_shortened(text, LONGEST))
 
 
 def _shortened(text: str, most: int) -> str:
@@ -28,29 +39,24 @@ class InputError(FeedplanError):
 
 
 class ProgramError(InputError):
-    """A part program cannot be understood.
+    """A part program cannot be understood; `line` is None where the whole file is meant."""
 
-    `line` is the line of the file, from 1, or None for the whole file.
-    """
-
-    def __init__(self, message: str, line: int | None = None) -> None:
-        super().__init__(message)
-        self.line = line
+    kind = "program"
 
 
 class MachineError(InputError):
     """A machine file is incomplete or contradictory, or the machine does not suit the program."""
 
+    kind = "machine"
+
 
 class InfeasibleError(FeedplanError):
-    """No profile meets the limits.
+    """No profile meets the limits; `reachable` is the greatest speed that is possible at the line [mm/s]."""
 
-    `line` is the source line, `reachable` the greatest speed that is possible there [mm/s].
-    """
+    kind = "infeasible"
 
     def __init__(self, message: str, line: int | None = None, reachable: float | None = None) -> None:
-        super().__init__(message)
-        self.line = line
+        super().__init__(message, line)
         self.reachable = reachable
 
 
@@ -58,6 +64,10 @@ class SolverError(FeedplanError):
     """A numerical solver failed, or a method cannot plan this kind of path; the text has reason and
     remedy."""
 
+    kind = "solver"
+
 
 class MissingPackageError(FeedplanError):
     """An optional package is not installed; the text carries the command that installs it."""
+
+    kind = "package"

@@ -31,10 +31,7 @@ if TYPE_CHECKING:
 
 # The error for each type of problem (the part after its last colon).
 _ERRORS: Mapping[str, type[FeedplanError]] = {
-    "machine": MachineError,
-    "infeasible": InfeasibleError,
-    "solver": SolverError,
-    "package": MissingPackageError,
+    own.kind: own for own in (ProgramError, MachineError, InfeasibleError, SolverError, MissingPackageError)
 }
 # The pause before each attempt to send a request [s]; it is sent again if the connection breaks.
 _PAUSES = (0.0, 0.2, 1.0)
@@ -154,11 +151,7 @@ def _error(response: HTTPResponse) -> FeedplanError:
 
 def error_of(kind: str, detail: str, line: int | None) -> FeedplanError:
     """The error for a kind of problem, with its sentence and the line of the program."""
-    if kind == "program":
-        return ProgramError(detail, line)
-    if kind == "infeasible":
-        return InfeasibleError(detail, line)
-    return _ERRORS.get(kind, InputError)(detail)
+    return _ERRORS.get(kind, InputError)(detail, line)
 
 
 def form(fields: Mapping[str, str], program: bytes, name: str) -> tuple[bytes, str]:

@@ -25,7 +25,7 @@ from feedplan.jobs.connection import Client, Future, close, connect, require_equ
 from feedplan.jobs.executor import JobLimits, JobListener
 from feedplan.jobs.identity import identity
 from feedplan.jobs.order import Job
-from feedplan.jobs.outcome import Outcome, failure_of
+from feedplan.jobs.outcome import Outcome
 from feedplan.outputs._staging import staged
 from feedplan.program.source import content_of
 
@@ -85,7 +85,7 @@ class Cluster:
             try:
                 sent[number] = _sent(job)
             except Exception as error:  # noqa: PERF203
-                outcomes[number] = Outcome("failed", failure=failure_of(error))
+                outcomes[number] = Outcome.of_error(error)
         groups = [list(sent)] if sent else []
         doubted: set[int] = set()
         while groups:
@@ -190,7 +190,7 @@ def _returned(future: Future, count: int, started: bool) -> Sequence[cluster_tas
         sentence = f"a worker of the cluster lacks {error.name}: install feedplan {identity()} for it"
         return [Outcome.failed("worker", sentence)] * count
     except Exception as error:
-        return [Outcome("failed", failure=failure_of(error))] * count
+        return [Outcome.of_error(error)] * count
 
 
 class _Heard:
@@ -234,5 +234,5 @@ def _kept(job: Job, returned: cluster_task.Returned | Outcome) -> Outcome:
             for name, content in returned.files.items():
                 (stage / FilePath(name).name).write_bytes(content)
     except InputError as error:
-        return Outcome("failed", failure=failure_of(error))
+        return Outcome.of_error(error)
     return outcome

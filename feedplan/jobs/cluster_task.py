@@ -12,7 +12,7 @@ from typing import Any
 from feedplan.jobs.executor import JobLimits
 from feedplan.jobs.identity import identity
 from feedplan.jobs.order import Order
-from feedplan.jobs.outcome import Outcome, failure_of
+from feedplan.jobs.outcome import Outcome
 from feedplan.jobs.work import Pace, Stopped, work_on
 
 TOPIC = "feedplan"
@@ -56,7 +56,7 @@ def _run_one(progress: _JobProgress, job: Sent) -> Returned:
     try:
         return _worked(progress, job)
     except Exception as error:
-        return Returned(Outcome("failed", failure=failure_of(error)).text(), {})
+        return Returned(Outcome.of_error(error).text(), {})
 
 
 def _worked(progress: _JobProgress, job: Sent) -> Returned:

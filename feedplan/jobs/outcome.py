@@ -7,36 +7,9 @@ import traceback
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from feedplan.errors import (
-    FeedplanError,
-    InfeasibleError,
-    MachineError,
-    MissingPackageError,
-    ProgramError,
-    SolverError,
-)
+from feedplan.errors import ErrorKind, FeedplanError
 
-Kind = Literal[
-    "program",
-    "machine",
-    "package",
-    "infeasible",
-    "solver",
-    "input",
-    "disk",
-    "limit",
-    "worker",
-    "defect",
-]
-# The kind of a failure for each class of error; the first class that matches is used.
-_KINDS: tuple[tuple[type[FeedplanError], Kind], ...] = (
-    (ProgramError, "program"),
-    (MachineError, "machine"),
-    (MissingPackageError, "package"),
-    (InfeasibleError, "infeasible"),
-    (SolverError, "solver"),
-    (FeedplanError, "input"),
-)
+Kind = ErrorKind | Literal["disk", "limit", "worker", "defect"]
 
 
 @dataclass(frozen=True)
@@ -80,13 +53,13 @@ class Outcome:
         """The outcome of a job that failed."""
         return Outcome("failed", failure=Failure(kind, sentence))
 
+    @staticmethod
+    def of_error(error: Exception, seconds: float = 0.0) -> Outcome:
+        """The outcome of a job that raised this error after some time."""
+        return Outcome("failed", failure=_failure_of(error), seconds=seconds)
 
-def kind_of(error: FeedplanError) -> Kind:
-    """The kind of an error of feedplan."""
-    return next(kind for known, kind in _KINDS if isinstance(error, known))
 
-
-def failure_of(error: Exception) -> Failure:
+def _failure_of(error: Exception) -> Failure:
     """The failure of a job that raised this error."""
     if isinstance(error, MemoryError):
         said = "the memory of the computer does not suffice below max_memory: split the program"
@@ -96,4 +69,4 @@ def failure_of(error: Exception) -> Failure:
         sentence = f"this is a defect in feedplan ({told}): please report it with the program"
         return Failure("defect", sentence, trace=traceback.format_exc()[-4000:])
     is_disk = isinstance(error.__cause__, OSError)
-    return Failure("disk" if is_disk else kind_of(error), str(error), getattr(error, "line", None))
+    return Failure("disk" if is_disk else error.kind, str(error), error.line)

@@ -17,7 +17,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.jobs.order import Job, Order
-from feedplan.jobs.outcome import Outcome, failure_of
+from feedplan.jobs.outcome import Outcome
 from feedplan.jobs.work import Pace, Stopped, work_on
 from feedplan.program.source import content_of
 
@@ -57,7 +57,7 @@ def _work_on(message: dict[str, Any], parent: _Parent) -> Outcome:
     try:
         content = content_of(FilePath(message["program"])).content
     except Exception as error:
-        return Outcome("failed", failure=failure_of(error))
+        return Outcome.of_error(error)
     return work_on(
         Order.of(message["order"]),
         content,

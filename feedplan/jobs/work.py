@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.jobs.order import Order
-from feedplan.jobs.outcome import Outcome, failure_of
+from feedplan.jobs.outcome import Outcome
 from feedplan.machine.machine import Machine
 from feedplan.plan_folder import write_plan
 from feedplan.planning import Plan, plan
@@ -62,8 +62,7 @@ def work_on(
     except Stopped:
         return Outcome("stopped")
     except Exception as error:
-        seconds = time.perf_counter() - start
-        return Outcome("failed", failure=failure_of(error), seconds=seconds)
+        return Outcome.of_error(error, time.perf_counter() - start)
     return Outcome("done", figures, seconds=time.perf_counter() - start, size=size)
 
 

@@ -21,7 +21,7 @@ from feedplan.service.refusals import (
     UNKNOWN,
     Kind,
     Refusal,
-    kind_of,
+    refusal_of,
 )
 from feedplan.service.requests import sentence_of
 
@@ -35,7 +35,7 @@ def add_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(FeedplanError)
     async def failed(_: Request, error: FeedplanError) -> Response:
-        return _problem(Refusal(kind_of(error), str(error)))
+        return _problem(refusal_of(error))
 
     @app.exception_handler(RequestValidationError)
     async def wrong(_: Request, error: RequestValidationError) -> Response:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from feedplan.errors import FeedplanError
-from feedplan.jobs import outcome
 
 MEDIA_TYPE = "application/problem+json"
 TYPE = "urn:feedplan:"
@@ -47,18 +46,8 @@ CANCELLED = Kind("cancelled", 409, "The job was cancelled")
 DEFECT = Kind("defect", 500, "A defect in feedplan")
 
 # The kind of problem for each kind of failure of a job.
-KINDS: dict[outcome.Kind, Kind] = {
-    "program": PROGRAM,
-    "machine": MACHINE,
-    "input": INPUT,
-    "infeasible": INFEASIBLE,
-    "solver": SOLVER,
-    "package": PACKAGE,
-    "limit": LIMIT,
-    "disk": DISK,
-    "worker": WORKER,
-    "defect": DEFECT,
-}
+_OF_FAILURES = (PROGRAM, MACHINE, INPUT, INFEASIBLE, SOLVER, PACKAGE, LIMIT, WORKER, DEFECT)
+KINDS: dict[str, Kind] = {**{kind.name: kind for kind in _OF_FAILURES}, "disk": DISK}
 
 
 class Refusal(Exception):  # noqa: N818 (it is an answer)
@@ -99,6 +88,6 @@ class Refusal(Exception):  # noqa: N818 (it is an answer)
         return json.dumps(self.to_json(), ensure_ascii=False)
 
 
-def kind_of(error: FeedplanError) -> Kind:
-    """The kind of an error of feedplan."""
-    return KINDS[outcome.kind_of(error)]
+def refusal_of(error: FeedplanError) -> Refusal:
+    """An error of feedplan as a problem."""
+    return Refusal(KINDS[error.kind], str(error))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from feedplan import __version__
-from feedplan.errors import FeedplanError, MachineError
+from feedplan.errors import MachineError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.machine.axis import Axis
 from feedplan.machine.controller import Controller
@@ -21,7 +21,7 @@ from feedplan.planners import MethodName, given_options, methods, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
 from feedplan.service.limits import Limits
-from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal, kind_of
+from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal
 from feedplan.setpoints import Interpolator
 
 # Longest name of a program. Messages and reports show names; no file is named by them.
@@ -136,21 +136,18 @@ class MachineRequest(BaseModel):
 
 
 def machine_of(request: MachineRequest) -> Machine:
-    """The machine with the changed limits. Raises Refusal."""
-    try:
-        known = _machine(request.machine)
-        names = [axis.name for axis in known.axes]
-        for name in request.limits:
-            if name not in names:
-                raise MachineError(
-                    f"the machine {known.name} has no axis {name[:32]}: give some of {', '.join(names)}"
-                )
-        axes = [
-            request.limits[axis.name].on(axis) if axis.name in request.limits else axis for axis in known.axes
-        ]
-        return replace(known, axes=tuple(axes))
-    except FeedplanError as error:
-        raise Refusal(kind_of(error), str(error)) from None
+    """The machine with the changed limits. Raises Refusal and MachineError."""
+    known = _machine(request.machine)
+    names = [axis.name for axis in known.axes]
+    for name in request.limits:
+        if name not in names:
+            raise MachineError(
+                f"the machine {known.name} has no axis {name[:32]}: give some of {', '.join(names)}"
+            )
+    axes = [
+        request.limits[axis.name].on(axis) if axis.name in request.limits else axis for axis in known.axes
+    ]
+    return replace(known, axes=tuple(axes))
 
 
 @dataclass(frozen=True)
@@ -180,19 +177,16 @@ class Order:
 
 
 def order_of(request: PlanRequest, limits: Limits) -> Order:
-    """The request, checked without reading its program. Raises Refusal."""
+    """The request, checked without reading its program. Raises Refusal and FeedplanError."""
     options = request.options.model_dump(exclude_none=True)
     asked = options.get("max_setpoints", 1)
     if asked > limits.max_setpoints:
         raise over(limits, f"max_setpoints is {asked}, the service has {limits.max_setpoints}: ask for fewer")
     own = {name: value for name, value in options.items() if name not in (*OF_ALL_METHODS, *READING)}
-    try:
-        given_options(request.method, own, OF_ALL_METHODS)
-        if "controller" in options:
-            Controller.of(options["controller"])
-        text, machine_name = _text_of(request.machine)
-    except FeedplanError as error:
-        raise Refusal(kind_of(error), str(error)) from None
+    given_options(request.method, own, OF_ALL_METHODS)
+    if "controller" in options:
+        Controller.of(options["controller"])
+    text, machine_name = _text_of(request.machine)
     return Order(_title(request.name), text, machine_name, request.method, options, request.tool_table)
 
 
