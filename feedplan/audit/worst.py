@@ -3,52 +3,37 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 # Name, axis (−1: none), worst value, limit, ratio, time, source line.
 Finding = tuple[str, int, float, float, float, float, int]
+# What was found, and the number of samples that were taken for it.
 Findings = tuple[list[Finding], int]
+Floats = NDArray[np.float64]
 
 
 class Worst:
-    """Keeps the worst place of every check."""
+    """Keeps the worst place of every check; it measures samples that the native audit has counted."""
 
     def __init__(self) -> None:
-        self.samples = 0
         self._found: dict[tuple[str, int], Finding] = {}
 
     def offer(
-        self,
-        name: str,
-        value: ArrayLike,
-        limit: ArrayLike,
-        time: ArrayLike,
-        line: ArrayLike,
-        axis: int = -1,
+        self, name: str, value: Floats, limit: Floats, time: Floats, line: NDArray[np.int32], axis: int
     ) -> None:
-        """Values at places, each with its limit. What is not a number is the worst there is."""
-        values, limits, times, lines = (
-            array.ravel() for array in np.broadcast_arrays(value, limit, time, line)
-        )
-        if not len(values):
+        """Values of an axis at places (n,), each with its limit. What is not a number is the worst there
+        is."""
+        if not len(value):
             return
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(values <= 0.0, 0.0, values / limits)
-        ratio = np.where(np.isnan(ratio), np.inf, ratio)
-        worst = int(np.argmax(ratio))
-        self.offer_ratio(
-            name, max(float(values[worst]), 0.0), float(limits[worst]), float(ratio[worst]),
-            float(times[worst]), int(lines[worst]), axis,
-        )  # fmt: skip
-
-    def offer_ratio(
-        self, name: str, value: float, limit: float, ratio: float, time: float, line: int, axis: int = -1
-    ) -> None:
-        """One value whose ratio is not that to its limit."""
-        known = self._found.get((name, axis))
+            ratios = np.where(value <= 0.0, 0.0, value / limit)
+        ratios[np.isnan(ratios)] = np.inf
+        worst = int(np.argmax(ratios))
+        ratio, known = float(ratios[worst]), self._found.get((name, axis))
         if known is None or ratio > known[4]:
-            self._found[name, axis] = (name, axis, value, limit, ratio, time, line)
+            place = float(limit[worst]), ratio, float(time[worst]), int(line[worst])
+            self._found[name, axis] = (name, axis, max(float(value[worst]), 0.0), *place)
 
     def findings(self) -> Findings:
-        """What was found, and how many samples were looked at."""
-        return list(self._found.values()), self.samples
+        """What was found."""
+        return list(self._found.values()), 0
