@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from feedplan.arguments import callback, file_path, flag, list_of_names, refuse
 from feedplan.errors import InputError
-from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, format_named
+from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, formats_named
 from feedplan.outputs._staging import require_folder, staged
 from feedplan.progress import Listener, Progress, beside, of_stage, part, tell
 from feedplan.setpoints import SetpointChunk, Sink
@@ -70,11 +70,7 @@ def write_plan(
     callback(progress)
     if not callable(getattr(plan, "summary", None)):
         raise refuse("the plan", plan, "what feedplan.plan returns")
-    outputs = {name: format_named(name) for name in dict.fromkeys(formats)}
-    by_file = {output.FILE: name for name, output in outputs.items()}
-    for name, output in outputs.items():
-        if (other := by_file[output.FILE]) != name:
-            raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
+    outputs = formats_named(formats)
     if program is not None:
         _require_program(program)
     flag(drawing, "the drawing")

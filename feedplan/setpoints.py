@@ -49,6 +49,14 @@ class SetpointChunk:
     def __len__(self) -> int:
         return len(self.t)
 
+    def part(self, rows: slice, axes: Sequence[str]) -> SetpointChunk:
+        """Some rows of these axes, without their places on the path."""
+        columns = [self.axes.index(name) for name in axes]
+        names = ("position", "velocity", "acceleration", "jerk")
+        of_axes = {name: np.asarray(getattr(self, name)[rows][:, columns]) for name in names}
+        t, line = np.asarray(self.t[rows]), np.asarray(self.line[rows])
+        return SetpointChunk(t=t, **of_axes, line=line, axes=tuple(axes))
+
     def __repr__(self) -> str:
         span = f", {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""
         return f"<SetpointChunk of {counted(len(self), 'setpoint')} of {' '.join(self.axes)}{span}>"

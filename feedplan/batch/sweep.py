@@ -15,6 +15,7 @@ from feedplan.batch.names import Names, safe_name
 from feedplan.errors import InputError
 from feedplan.jobs.order import Job, Order
 from feedplan.machine.machine import Machine
+from feedplan.outputs import formats_named
 from feedplan.planners import given_options, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
@@ -42,6 +43,7 @@ class Sweep:
     subprograms: tuple[FilePath, ...] = ()
 
     def __post_init__(self) -> None:
+        formats_named(self.formats)
         for name, value in self.options.items():
             takers = [method for method in self.methods if self._takes(method, name)]
             if not takers:

@@ -18,7 +18,6 @@ from feedplan.cli import terminal
 from feedplan.cli.cluster_options import cluster_options
 from feedplan.cli.ending import BROKEN, DONE
 from feedplan.cli.reading_options import reading_options
-from feedplan.errors import InputError
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading, checked_reading
 from feedplan.program.tools import read_tools
@@ -149,7 +148,6 @@ def batch(
         None if table is None else FilePath(table).absolute(),
         tuple(FilePath(folder).absolute() for folder in folders),
     )
-    _require_formats(sweep.formats)
     folder, start = FilePath(output).absolute(), time.monotonic()
     with _executor(cluster, jobs, max_time, max_memory) as executor, terminal.progress_bar(quiet) as progress:
         rows, kept = run_batch(sweep, folder, executor, progress)
@@ -170,15 +168,6 @@ def batch(
             for file in files:
                 print(file)
     return BROKEN if any(row["error"] is not None or not row["ok"] for row in rows) else DONE
-
-
-def _require_formats(formats: tuple[str, ...]) -> None:
-    """Raises if two formats write the same file, or if the package of a format is missing."""
-    by_file: dict[str, str] = {}
-    for name in formats:
-        other = by_file.setdefault(outputs.format_named(name).FILE, name)
-        if other != name:
-            raise InputError(f"{name} and {other} write the same file: ask for one of them")
 
 
 @contextmanager

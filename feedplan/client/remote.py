@@ -9,16 +9,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.arguments import is_whole, refuse, shown
+from feedplan.arguments import refuse
 from feedplan.audit import Audit
 from feedplan.client.transport import Transport
-from feedplan.errors import InputError
-from feedplan.outputs import FormatName, format_named, npz
+from feedplan.outputs import FormatName, formats_named, npz
 from feedplan.outputs._staging import staged
 from feedplan.plan_folder import SUMMARY_FILE, summary_text
 from feedplan.progress import Progress, of_stage, tell
 from feedplan.report.page import FILE as REPORT_FILE
-from feedplan.setpoints import MAX_CHUNK, SetpointChunk
+from feedplan.setpoints import SetpointChunk, chunks
 
 
 class RemotePlan:
@@ -105,14 +104,12 @@ class RemotePlan:
     ) -> tuple[FilePath, ...]:
         """Writes the folder that `feedplan.write_plan` writes; returns the files."""
         share = of_stage(progress, "write")
-        files = {format_named(name).FILE: name for name in formats}
-        if len(files) < len(set(formats)):
-            raise InputError(f"two of {', '.join(formats)} are one file: ask for one of them")
+        outputs = formats_named(formats)
         tell(share, 0.0)
         with staged(folder, last=SUMMARY_FILE) as stage:
-            for number, (file, name) in enumerate(files.items()):
-                self._transport.download(f"{self._address}/setpoints", stage / file, {"format": name})
-                tell(share, (number + 1) / (len(files) + 1))
+            for number, (name, output) in enumerate(outputs.items()):
+                self._transport.download(f"{self._address}/setpoints", stage / output.FILE, {"format": name})
+                tell(share, (number + 1) / (len(outputs) + 1))
             self._transport.download(f"{self._address}/report", stage / REPORT_FILE)
             (stage / SUMMARY_FILE).write_text(summary_text(self._summary), encoding="utf-8")
             names = sorted(file.name for file in stage.iterdir())
@@ -148,11 +145,6 @@ class RemoteSetpoints:
         return self._chunk
 
     def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
-        """The stream in chunks of `size` setpoints, the last one shorter."""
-        if not is_whole(size, most=MAX_CHUNK):
-            raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
-        whole = self.all()
-        names = ("t", "position", "velocity", "acceleration", "jerk", "line")
-        for first in range(0, self.count, size):
-            rows = slice(first, first + size)
-            yield SetpointChunk(**{name: getattr(whole, name)[rows] for name in names}, axes=self.axes)
+        """The stream in chunks of `size` setpoints, the last one shorter. Raises InputError for a size out of
+        range."""
+        return chunks(lambda start, stop: self.all().part(slice(start, stop), self.axes), self.count, size)

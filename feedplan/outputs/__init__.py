@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
@@ -93,6 +93,16 @@ def format_named(name: str) -> Format:
     """The format of that name. Raises InputError with the names of all formats."""
     one_of(name, "output format", formats())
     return cast(Format, importlib.import_module(f"{__name__}.{name.replace('-', '_')}"))
+
+
+def formats_named(names: Iterable[str]) -> dict[str, Format]:
+    """The formats of these names. Raises InputError for an unknown one, and if two write the same file."""
+    found = {name: format_named(name) for name in names}
+    by_file: dict[str, str] = {}
+    for name, output in found.items():
+        if (other := by_file.setdefault(output.FILE, name)) != name:
+            raise InputError(f"{other} and {name} are both {output.FILE}: ask for one of them")
+    return found
 
 
 def require_format(version: object, what: str) -> None:

@@ -11,9 +11,8 @@ import numpy as np
 
 from feedplan import outputs
 from feedplan.events import TimedEvents
-from feedplan.outputs import QUANTITIES, SETPOINTS, FormatName, Header, format_named, npz
+from feedplan.outputs import SETPOINTS, FormatName, Header, format_named, npz
 from feedplan.service.refusals import INPUT, Refusal
-from feedplan.setpoints import SetpointChunk
 
 _ROWS_AT_ONCE = 10_000
 _MEDIA_TYPES = {".npz": "application/zip"}
@@ -53,7 +52,7 @@ def setpoints_file(
             raise Refusal(INPUT, f"the plan has no axis {name[:32]}: give some of {', '.join(points.axes)}")
     if len(set(axes)) < len(axes):
         raise Refusal(INPUT, "axes has an axis twice: give each once")
-    columns = [points.axes.index(name) for name in axes]
+    units = tuple(points.units[points.axes.index(name)] for name in axes)
     first = 0 if start is None else int(np.searchsorted(points.t, start, "left"))
     last = len(points) if end is None else int(np.searchsorted(points.t, end, "right"))
     if first >= last:
@@ -72,11 +71,8 @@ def setpoints_file(
     folder = new / secrets.token_hex(8)
     folder.mkdir()
     file = folder / output.FILE
-    header = Header(tuple(axes), tuple(points.units[k] for k in columns), float(points.period or 0.0), within)
+    header = Header(tuple(axes), units, float(points.period or 0.0), within)
     with output.writer(file, header, last - first) as add:
         for row in range(first, last, _ROWS_AT_ONCE):
-            rows = slice(row, min(row + _ROWS_AT_ONCE, last))
-            columns_of = {name: np.asarray(getattr(points, name)[rows][:, columns]) for name in QUANTITIES}
-            t, line = np.asarray(points.t[rows]), np.asarray(points.line[rows])
-            add(SetpointChunk(t=t, **columns_of, line=line, axes=tuple(axes)))
+            add(points.part(slice(row, min(row + _ROWS_AT_ONCE, last)), axes))
     return file, True

@@ -155,7 +155,10 @@ def test_one_batch_at_a_time_works_on_a_folder(tmp_path: Path) -> None:
     ("options", "sentence"),
     [
         (("--method", "bang-bang", "--accuracy", "0.1"), "the method bang-bang takes no accuracy: give "),
-        (("--format", "npz", "--format", "npz-compressed"), "write the same file: ask for one of them"),
+        (
+            ("--format", "npz", "--format", "npz-compressed"),
+            "npz and npz-compressed are both setpoints.npz: ask for one of them",
+        ),
         (("--format", "npz", "--format", "none"), "--format none excludes other formats: leave one"),
         (("-m", "mil"), "machine"),
         (("--tool-table", "none.tbl"), "the tool table none.tbl cannot be read: No such file"),
