@@ -96,8 +96,7 @@ class Client:
         }
         given = {name: value for name, value in given.items() if value != _USUAL[name]} | options
         callback(progress)
-        job, is_new = self._submitted(source, machine, method, given, reading)
-        return self._ended(job, is_new, progress)
+        return self._ended(*self._submitted(_program(source), machine, method, given, reading), progress)
 
     def compare(
         self,
@@ -116,12 +115,10 @@ class Client:
         own = {
             name: value for name, value in {"time_limit": time_limit, **options}.items() if value is not None
         }
-        if not isinstance(source, Program):
-            content = content_of(source)  # a stream can be read only once
-            source = _Named(content.content, content.name)
+        program = _program(source)  # a stream can be read only once
         jobs = [
             self._submitted(
-                source,
+                program,
                 machine,
                 cast(MethodName, method),
                 {name: value for name, value in own.items() if name in _USUAL or name in options_of(method)},
@@ -193,14 +190,13 @@ class Client:
 
     def _submitted(
         self,
-        source: Any,
+        program: tuple[bytes, str],
         machine: Machine | str | os.PathLike[str],
         method: MethodName,
         options: dict[str, Any],
         reading: Reading | None,
     ) -> tuple[dict[str, Any], bool]:
-        """The job of a program, and whether it is new."""
-        content, name = _program(source)
+        """The job of a program, given as its content and its name, and whether the job is new."""
         fields = {"machine": _machine(machine), "method": str(method)}
         for key, value in checked_reading(reading).items():
             if key == "tool_table" and value is not None:
@@ -213,7 +209,7 @@ class Client:
             fields["options"] = json.dumps({key: _plain(value) for key, value in options.items()})
         except (TypeError, ValueError):
             raise refuse("an option", options, "numbers and names") from None
-        body, kind = form(fields, content, name)
+        body, kind = form(fields, *program)
         # With this key a request that is sent again after a broken connection gives the same job.
         headers = {"Content-Type": kind, "Idempotency-Key": secrets.token_hex(16)}
         status, job = self._line.json("POST", "/v1/jobs", body=body, headers=headers)
@@ -249,29 +245,16 @@ class Client:
         return Row(method, cast(Plan, made), made.lower_bound)
 
 
-class _Named(bytes):
-    """The content of a program with its name."""
-
-    name: str
-
-    def __new__(cls, content: bytes, name: str) -> _Named:
-        own = super().__new__(cls, content)
-        own.name = name
-        return own
-
-
 def _program(source: Any) -> tuple[bytes, str]:
     """The content of a program and its name."""
     if isinstance(source, Path):
         raise InputError("a Path stays on this computer: plan it by feedplan.plan, or send a path file")
-    if isinstance(source, _Named):
-        return source, source.name
     if isinstance(source, Program):
         if source.text is None:
             raise InputError(f"{source.name} was not read from a text: plan it by feedplan.plan")
         return content_of(source.text).content, source.name
-    content = content_of(source)
-    return content.content, content.name
+    content, name, _ = content_of(source)
+    return content, name
 
 
 def _machine(given: Machine | str | os.PathLike[str]) -> str:
