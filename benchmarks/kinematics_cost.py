@@ -9,9 +9,10 @@ import numpy as np
 
 from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
+from feedplan._solvers import joint_enclosures
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine, bundled_machines
-from feedplan.machine.path_derivatives import derivatives, enclosures, positions
+from feedplan.machine.path_derivatives import TipPieces, derivatives, positions
 from feedplan.machine.rotary import RotaryChain, ToolVector
 from feedplan.machine.singularities import joint_path
 
@@ -49,6 +50,8 @@ def _row(kinematics: Kinematics, count: int) -> dict[str, Cell]:
     points = start + np.cumsum(generator.normal(size=(count, 4, len(names))), axis=1) * scale
     width, half = np.full(count, 2.0), np.full(count, 0.5)
 
+    tips = TipPieces.of(points, width, None)
+
     def cost(call: Callable[[], object]) -> float:
         return 1e6 * best_of(call, 3).processor / count
 
@@ -56,7 +59,7 @@ def _row(kinematics: Kinematics, count: int) -> dict[str, Cell]:
         "K": cost(partial(positions, kinematics, points[:, 0])),
         "to order 3": cost(partial(derivatives, kinematics, points, width, half, 3)),
         "to order 9": cost(partial(derivatives, kinematics, points, width, half, 9)),
-        "bounds to 3": cost(partial(enclosures, kinematics, points, width, 3)),
-        "bounds to 9": cost(partial(enclosures, kinematics, points, width, 9)),
+        "bounds to 3": cost(partial(joint_enclosures, kinematics.recorded, tips, 3)),
+        "bounds to 9": cost(partial(joint_enclosures, kinematics.recorded, tips, 9)),
         "joint path": cost(partial(joint_path, kinematics, points, width)),
     }

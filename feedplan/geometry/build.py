@@ -32,7 +32,6 @@ def build_path(
     program: Program,
     machine: Machine,
     tolerance: float | None = None,
-    settings: FitSettings | None = None,
     corners: Corners = Corners.ROUNDED,
     motion: Motion | None = None,
     progress: Listener | None = None,
@@ -43,11 +42,12 @@ def build_path(
 
     - G61.1 stops after every move.
     - G61 follows lines and splines exactly, arcs (with rounded ends) and helices within
-      `settings.exact_tolerance`, and stops where the direction jumps. A turn of less than a degree beside an
-      arc or a spline comes from rounded coordinates: it is smoothed within the same tolerance.
+      `FitSettings.exact_tolerance`, and stops where the direction jumps. A turn of less than a degree beside
+      an arc or a spline comes from rounded coordinates: it is smoothed within the same tolerance.
     - G64 stays within a tolerance [mm] of the program, and the program within it of the path: chains of G1
       moves are fitted, and corners are rounded, those of rapids too. The tolerance is `tolerance`, else the
-      program's P, else `settings.default_tolerance`; 0 means exact lines with stops. Q limits the fit only.
+      program's P, else `FitSettings.default_tolerance`; 0 means exact lines with stops. Q limits the fit
+      only.
 
     Where G64 meets G61 the stricter mode holds. A blend of a rapid and a feed move has the feed up to the
     place nearest to the corner. Arcs become true circles. Splines enter the path unchanged, their widths
@@ -85,7 +85,7 @@ def build_path(
     length, an arc no radius, a spline does not fit its move), InputError (a position outside the travel, a
     negative tolerance).
     """
-    settings = settings or FitSettings()
+    settings = FitSettings()
     if tolerance is not None:
         tolerance = tolerance_of(tolerance)
     words = path_words(program, machine)

@@ -55,15 +55,13 @@ def axis_words(
     *,
     tool_length: float | None = None,
     held: Mapping[str, float] | None = None,
-    side: float = 1.0,
 ) -> AxisWords:
     """The program axes `axes` on a machine; MachineError names a letter the machine does not have.
 
     Letters of other modes are left out: I, J, K, or rotary joints beside a direction.
 
     Without a `coordinate_mode` it is the machine's own before any G43.4. `tool_length` [mm] replaces the
-    machine file's; `held` gives positions of axes that the program never moves, 0 by default; `side` ±1
-    chooses between the two poses that point the tool along a direction.
+    machine file's; `held` gives positions of axes that the program never moves, 0 by default.
     """
     axes = tuple(axes)
     kinematics = machine.inverse
@@ -79,7 +77,7 @@ def axis_words(
                 f"machine {machine.name} has no two rotary axes that point the tool along I, J, K: "
                 "program rotary words, or use a five-axis machine"
             )
-        kinematics = ToolVector(kinematics, side)
+        kinematics = ToolVector(kinematics)
     known = kinematics.tip_names
     # The columns of a program with several modes serve all of them.
     others = kinematics.joint_names if coordinate_mode is CoordinateMode.VECTOR else DIRECTION

@@ -1,8 +1,8 @@
-"""Joint motion along polynomial pieces of a tip path: exact derivatives at points, proven bounds over pieces.
+"""Joint motion along polynomial pieces of a tip path: positions and exact derivatives at points.
 
 A piece is given by Bézier points (n, d + 1, axes) of the tip, in the order of `Kinematics.tip_names`, over
 u in [0, width]; with weights (n, d + 1) it is rational. The recorded formula of the kinematics is evaluated
-natively on Taylor series in u: at points with numbers as coefficients, over whole pieces with intervals.
+natively on Taylor series in u.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan._solvers import joint_derivatives, joint_enclosures, joint_positions
+from feedplan._solvers import joint_derivatives, joint_positions
 from feedplan.machine.kinematics import Kinematics
 
 Array = NDArray[np.float64]
@@ -31,30 +31,6 @@ class TipPieces:
     def of(cls, control_points: ArrayLike, width: ArrayLike, weights: ArrayLike | None) -> TipPieces:
         """From arrays of any kind."""
         return cls(contiguous(control_points), contiguous(width), contiguous(weights))
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Lower and upper bounds `lo` ≤ `hi` of one shape; rounding is included."""
-
-    lo: Array
-    hi: Array
-
-    @property
-    def bounded(self) -> NDArray[np.bool_]:
-        """Where both ends are finite."""
-        return np.isfinite(self.lo) & np.isfinite(self.hi)
-
-    @property
-    def middle(self) -> Array:
-        """Numbers about half way between the bounds; NaN where unbounded."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(0.5 * self.lo + 0.5 * self.hi)
-
-    @property
-    def magnitude(self) -> Array:
-        """The greatest absolute values inside."""
-        return np.asarray(np.maximum(np.abs(self.lo), np.abs(self.hi)))
 
 
 def positions(kinematics: Kinematics, tip: ArrayLike) -> Array:
@@ -79,25 +55,6 @@ def derivatives(
     pieces = TipPieces.of(control_points, width, weights)
     found = joint_derivatives(kinematics.recorded, pieces, contiguous(fraction), order)
     return np.ascontiguousarray(np.moveaxis(found, 1, 0))
-
-
-def enclosures(
-    kinematics: Kinematics,
-    control_points: ArrayLike,
-    width: ArrayLike,
-    order: int,
-    parts: ArrayLike | None = None,
-    weights: ArrayLike | None = None,
-) -> Bounds:
-    """Bounds (order + 1, n, joints) of q^(k)(u)/k! for every u of each piece, rounding included.
-
-    `parts` (n, 2) are fractions of the pieces in [0, 1], if not the whole pieces are meant. A bound is
-    infinite where K is singular on the part, or too near to it to decide: cut the part smaller. Angles known
-    up to whole turns are continuous over the part, whichever turn they are on.
-    """
-    pieces = TipPieces.of(control_points, width, weights)
-    lo, hi = joint_enclosures(kinematics.recorded, pieces, order, contiguous(parts))
-    return Bounds(np.moveaxis(lo, 1, 0), np.moveaxis(hi, 1, 0))
 
 
 @overload

@@ -15,10 +15,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import joint_path as native_joint_path
 from feedplan.machine.kinematics import Kinematics
-from feedplan.machine.path_derivatives import Bounds, TipPieces, contiguous, derivatives
+from feedplan.machine.path_derivatives import TipPieces, contiguous, derivatives
 
 Array = NDArray[np.float64]
 TURN = 360.0
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Lower and upper bounds `lo` ≤ `hi` of one shape; rounding is included."""
+
+    lo: Array
+    hi: Array
+
+    @property
+    def middle(self) -> Array:
+        """Numbers about half way between the bounds; NaN where unbounded."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(0.5 * self.lo + 0.5 * self.hi)
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,9 @@ from feedplan.machine.numbers import (
     sqrt,
     square,
 )
-from feedplan.machine.path_derivatives import Bounds, derivatives, enclosures, positions
+from feedplan.machine.path_derivatives import derivatives, positions
 from tests.machine import taylor
+from tests.machine.enclosures import Enclosures, enclosures
 
 Array = NDArray[np.float64]
 Formula = Callable[..., Number]
@@ -50,10 +51,10 @@ class Formulas(Kinematics):
         return tuple(formula(*tip) for formula in self.formulas)
 
 
-def over(x: tuple[float, float], y: tuple[float, float], *formulas: Formula, order: int = 0) -> Bounds:
+def over(x: tuple[float, float], y: tuple[float, float], *formulas: Formula, order: int = 0) -> Enclosures:
     """Bounds (order + 1, joints) over a box."""
     found = enclosures(Formulas(*formulas), np.array([[[x[0], y[0]], [x[1], y[1]]]]), [1.0], order)
-    return Bounds(found.lo[:, 0], found.hi[:, 0])
+    return Enclosures(found.lo[:, 0], found.hi[:, 0])
 
 
 def series(u: float, *formulas: Formula) -> Array:

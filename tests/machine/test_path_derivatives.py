@@ -12,8 +12,9 @@ from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.kinematics.corexy import CoreXY
 from feedplan.machine.kinematics.cylindrical import Cylindrical
 from feedplan.machine.numbers import Number
-from feedplan.machine.path_derivatives import derivatives, enclosures, positions
+from feedplan.machine.path_derivatives import derivatives, positions
 from tests.machine import taylor
+from tests.machine.enclosures import enclosures
 from tests.machine.kinematics.bundled import all_kinematics, random_tips
 
 CYLINDER = Cylindrical(("C", "X", "Z"))
