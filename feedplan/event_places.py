@@ -92,12 +92,12 @@ def _places(program: Program, path: Path, moves: Indices) -> tuple[Indices, Indi
     if shared.any():
         columns = [program.axes.index(name) for name in path.axes]
         points = program.target[moves[shared] - 1][:, columns]
-        piece[shared], u[shared] = _nearest(path, points, low[shared], high[shared])
+        piece[shared], u[shared] = nearest(path, points, low[shared], high[shared])
         run[shared] = np.searchsorted(path.runs[1:], piece[shared], side="right")
     return run, piece, u
 
 
-def _nearest(path: Path, points: Floats, low: Indices, high: Indices) -> tuple[Indices, Floats]:
+def nearest(path: Path, points: Floats, low: Indices, high: Indices) -> tuple[Indices, Floats]:
     """The nearest places to points (k, axes), each on the pieces from `low` up to `high` (k,)."""
     piece, u = np.empty(len(points), np.int64), np.empty(len(points))
     offsets = np.concatenate(([0], np.cumsum(high - low)))

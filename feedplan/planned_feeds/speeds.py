@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
+from feedplan.event_places import nearest
 from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
@@ -26,8 +27,6 @@ Indices = NDArray[np.int64]
 DIRECTION = ("I", "J", "K")
 # Places within each phase of the profile at which the speed is taken, beside both ends.
 _WITHIN = (0.25, 0.5, 0.75)
-# Steps of the search for the nearest place: samples, then sections of the interval around the best one.
-_SAMPLES, _SECTIONS = 8, 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,36 +95,17 @@ def _ends_of_moves(problem: Problem, program: Program) -> tuple[tuple[Indices, A
     shared = last - first > 1
     u_begin, u_end = np.zeros(len(moves)), path.width[end].copy()
     ends = shared[end] & (last[end] > moves)
-    u_end[ends] = _nearest(problem, end[ends], program.target[ends])
+    u_end[ends] = nearest(path, program.target[ends], end[ends], end[ends] + 1)[1]
     begins = shared[begin] & (first[begin] < moves)
     # Usually the move before ends at the same place.
     same = begins & np.append(False, ends[:-1] & (end[:-1] == begin[1:]))
     u_begin[same] = u_end[:-1][same[1:]]
     begins &= ~same
-    u_begin[begins] = _nearest(problem, begin[begins], program.starts()[begins])
+    u_begin[begins] = nearest(path, program.starts()[begins], begin[begins], begin[begins] + 1)[1]
     length = np.linalg.norm(program.target - program.starts(), axis=1)
     whole = shared[begin] & shared[end] & (length <= 2.0 * path.tolerance[begin])
     u_begin, u_end = np.where(whole, 0.0, u_begin), np.where(whole, path.width[end], u_end)
     return (begin, u_begin), (end, np.where((begin == end) & (u_end < u_begin), u_begin, u_end))
-
-
-def _nearest(problem: Problem, piece: Indices, point: Array) -> Array:
-    """The parameters (n,) at which pieces (n,) come nearest to points (n, axes)."""
-    curve, width = problem.path.curve, problem.path.width[piece]
-    if not len(piece):
-        return np.empty(0)
-    shares = np.linspace(0.0, 1.0, _SAMPLES + 1)
-    places = curve.evaluate(np.repeat(piece, len(shares)), np.outer(width, shares).ravel())[0]
-    away = ((places.reshape(len(piece), len(shares), -1) - point[:, None]) ** 2).sum(axis=2)
-    best = away.argmin(axis=1)
-    low = width * shares[np.maximum(best - 1, 0)]
-    high = width * shares[np.minimum(best + 1, _SAMPLES)]
-    for _ in range(_SECTIONS):
-        middle = 0.5 * (low + high)
-        place, slope = curve.evaluate(piece, middle, 1)
-        beyond = ((place - point) * slope).sum(axis=1) > 0.0
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    return np.asarray(0.5 * (low + high))
 
 
 def speeds_at(problem: Problem, profile: SpeedProfile, piece: Indices, u: Array) -> tuple[Array, Array]:
