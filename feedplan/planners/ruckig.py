@@ -192,17 +192,11 @@ def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
 
     Raises SolverError for an axis without a limit of jerk, MissingPackageError.
     """
-    time_limit = _checked(time_limit)
-    if time_limit is not None and problem.even is not problem:
-        time_limit *= 0.5
+    if time_limit is not None:
+        time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
+        time_limit *= 1.0 if problem.even is problem else 0.5
     own = within_both(problem, lambda problem, _: _planned(problem, time_limit), None)
     return fastest_runs([own, s_curve.plan(problem)])
-
-
-def _checked(time_limit: float | None) -> float | None:
-    if time_limit is None:
-        return None
-    return number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
 
 
 def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:

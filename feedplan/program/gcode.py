@@ -144,7 +144,7 @@ class Options:
     tip_control: TipControl | None
     block_delete: bool
     max_moves: int
-    tools: Sequence[tuple[int, int, Sequence[float], float, int]] | None
+    tools: Sequence[Tool] | None
     subprograms: Callable[[str], tuple[str, bytes] | None] | None
     feed: float | None
     whole_step: float
@@ -188,7 +188,7 @@ def read_gcode(
         tip_control=control,
         block_delete=block_delete,
         max_moves=max_moves,
-        tools=None if tools is None else [tool.row() for tool in tools],
+        tools=tools,
         subprograms=finder(folders, max_bytes) if folders else None,
         feed=feed,
         whole_step=whole_step,

@@ -8,21 +8,19 @@ Text after `;` is a comment.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from feedplan.errors import InputError
-from feedplan.machine.axis import AXIS_LETTERS, ROTARY_LETTERS
+from feedplan.machine.axis import AXIS_LETTERS
 
 MAX_BYTES = 1 << 20
 
 _WORD = re.compile(r"\s*([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 _KNOWN = frozenset("TPDQIJ").union(AXIS_LETTERS)
-_INCH = 25.4
 
 
-@dataclass(frozen=True)
-class Tool:
+class Tool(NamedTuple):
     """A tool: `number`, `pocket`, `offset` (9,) along XYZABCUVW [mm, deg], `diameter` [mm] (negative where it
     is smaller than the tool that a path was made for), `orientation` (1 to 9 for lathe tools, else 0)."""
 
@@ -32,16 +30,9 @@ class Tool:
     diameter: float
     orientation: int
 
-    def row(self) -> tuple[int, int, tuple[float, ...], float, int]:
-        """The tool as a row for the native reader."""
-        return self.number, self.pocket, self.offset, self.diameter, self.orientation
 
-
-def read_tools(file: Path, *, inches: bool = False) -> tuple[Tool, ...]:
-    """The tools of a table; with `inches` its lengths are in inches.
-
-    Raises InputError naming file, line and word where it cannot be read.
-    """
+def read_tools(file: Path) -> tuple[Tool, ...]:
+    """The tools of a table. Raises InputError naming file, line and word where it cannot be read."""
     try:
         if file.stat().st_size > MAX_BYTES:
             raise InputError(f"{file} has more than {MAX_BYTES} bytes: give a tool table")
@@ -52,7 +43,7 @@ def read_tools(file: Path, *, inches: bool = False) -> tuple[Tool, ...]:
     for number, line in enumerate(lines, 1):
         words = _words(line, f"{file.name} line {number}")
         if words:
-            tool = _tool(words, _INCH if inches else 1.0, f"{file.name} line {number}")
+            tool = _tool(words, f"{file.name} line {number}")
             tools[tool.number] = tool
     return tuple(tools.values())
 
@@ -73,17 +64,14 @@ def _words(line: str, place: str) -> dict[str, float]:
     return words
 
 
-def _tool(words: dict[str, float], unit: float, place: str) -> Tool:
+def _tool(words: dict[str, float], place: str) -> Tool:
     number = words.get("T", -1.0)
     if number < 0 or number != int(number):
         raise InputError(f"{place}: the tool has no number: give a whole T from 0")
-    offset = tuple(
-        words.get(letter, 0.0) * (1.0 if letter in ROTARY_LETTERS else unit) for letter in AXIS_LETTERS
-    )
     return Tool(
         number=int(number),
         pocket=max(int(words.get("P", 0.0)), 0),
-        offset=offset,
-        diameter=words.get("D", 0.0) * unit,
+        offset=tuple(words.get(letter, 0.0) for letter in AXIS_LETTERS),
+        diameter=words.get("D", 0.0),
         orientation=max(int(words.get("Q", 0.0)), 0),
     )

@@ -72,14 +72,10 @@ def _of_form(form: FormData, new: FilePath, limits: Limits) -> tuple[Upload, Pla
     stream: IO[bytes] = io.BytesIO(program.encode()) if isinstance(program, str) else program.file
     if not isinstance(program, str):
         fields.setdefault("name", (program.filename or "")[-120:])
-    options = parsed_options(fields.pop("options", None))
+    given = fields.pop("options", None)
+    options = parsed(Options, given) if given else Options()
     asked: PlanRequest = parsed(PlanRequest, json.dumps(fields))
     return _stored(stream, new, limits), asked.model_copy(update={"options": options})
-
-
-def parsed_options(text: str | None) -> Options:
-    """The options in a field of a form, which is JSON."""
-    return Options() if not text else parsed(Options, text)
 
 
 def _text(field: str, value: UploadFile | str) -> str:

@@ -16,7 +16,6 @@ def test_a_line_is_a_tool(tmp_path: Path) -> None:
     file.write_text(TABLE)
     offset = (1.5, 0.0, -50.25, 90.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert read_tools(file) == (Tool(1, 2, offset, 6.0, 9), Tool(12, 0, (0.0,) * 9, 0.5, 0))
-    assert read_tools(file, inches=True)[0].offset[2:4] == (-50.25 * 25.4, 90.0)
 
 
 @pytest.mark.parametrize(
