@@ -15,10 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from feedplan.arguments import callback, flag, is_number, not_negative, number, shown
+from feedplan.arrays import Floats
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.audit.events import require_events
 from feedplan.audit.knots import audit_knots
@@ -108,7 +106,7 @@ def check(
     return audit
 
 
-def _recorded(values: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _recorded(values: Floats) -> Floats | None:
     """The values; None if the format has none."""
     return values if len(values) else None
 

@@ -11,16 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
+from feedplan.arrays import Floats, Integers
 from feedplan.events import PlacedEvents, TimedEvents
 from feedplan.geometry.path import Path
 from feedplan.program.actions import actions
 from feedplan.program.program import Program
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Places of a piece that are tried, and steps from the nearest of them to the nearest place.
 _TRIED, _STEPS = 9, 8
@@ -73,7 +70,7 @@ def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
     return PlacedEvents(placed, run[source], after[source], starts)
 
 
-def _places(program: Program, path: Path, moves: Indices) -> tuple[Indices, Indices, Floats]:
+def _places(program: Program, path: Path, moves: Integers) -> tuple[Integers, Integers, Floats]:
     """Run, piece and parameter where the path has followed so many `moves` (k,), sorted, and no more.
 
     The piece is −1 where that is a stop, at the end of the run, or at the start of the path for run −1.
@@ -97,7 +94,7 @@ def _places(program: Program, path: Path, moves: Indices) -> tuple[Indices, Indi
     return run, piece, u
 
 
-def nearest(path: Path, points: Floats, low: Indices, high: Indices) -> tuple[Indices, Floats]:
+def nearest(path: Path, points: Floats, low: Integers, high: Integers) -> tuple[Integers, Floats]:
     """The nearest places to points (k, axes), each on the pieces from `low` up to `high` (k,)."""
     piece, u = np.empty(len(points), np.int64), np.empty(len(points))
     offsets = np.concatenate(([0], np.cumsum(high - low)))
@@ -110,7 +107,7 @@ def nearest(path: Path, points: Floats, low: Indices, high: Indices) -> tuple[In
     return piece, u
 
 
-def _nearest_of(path: Path, points: Floats, low: Indices, count: Indices) -> tuple[Indices, Floats]:
+def _nearest_of(path: Path, points: Floats, low: Integers, count: Integers) -> tuple[Integers, Floats]:
     owner = np.repeat(np.arange(len(points)), count)
     begins = np.concatenate(([0], np.cumsum(count)[:-1]))
     pieces = low[owner] + np.arange(len(owner)) - begins[owner]

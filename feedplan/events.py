@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.program.actions import KINDS
 from feedplan.units import counted
 
@@ -40,12 +41,12 @@ class TimedEvents:
     `time`.
     """
 
-    time: NDArray[np.float64]
+    time: Floats
     line: NDArray[np.int32]
     kind: NDArray[np.str_]
-    channel: NDArray[np.float64]
-    value: NDArray[np.float64]
-    stops: NDArray[np.bool_]
+    channel: Floats
+    value: Floats
+    stops: Flags
     text: tuple[str, ...]
 
     @classmethod
@@ -109,11 +110,11 @@ class PlacedEvents:
     clock. The times of `events` are not set."""
 
     events: TimedEvents
-    run: NDArray[np.int64]
-    after: NDArray[np.float64]
-    starts: NDArray[np.float64]
+    run: Integers
+    after: Floats
+    starts: Floats
 
-    def on(self, starts: NDArray[np.float64]) -> TimedEvents:
+    def on(self, starts: Floats) -> TimedEvents:
         """The events by a clock on which the runs start at these times (runs,) [s]."""
         time = np.concatenate(([0.0], starts))[self.run + 1] + self.after
         # By rounding a run may start before the end of the run before it.

@@ -15,8 +15,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, SolverError
@@ -117,7 +117,7 @@ def faster(
                 _sums(each.profile.run_times, runs)
                 for each, runs in zip((best, other), sections.runs, strict=True)
             )
-            better: NDArray[np.bool_] = after < (1.0 - _ROUNDING) * before
+            better: Flags = after < (1.0 - _ROUNDING) * before
             count = int(better.sum())
             if count:
                 best = other if better.all() else _joined(best, other, sections, better, join)
@@ -128,7 +128,7 @@ def faster(
 
 
 def _stepped(
-    best: Followed, limits: FitLimits, step: NDArray[np.float64], fit: Callable[[Motion], Path]
+    best: Followed, limits: FitLimits, step: Floats, fit: Callable[[Motion], Path]
 ) -> tuple[Path, float]:
     """The path a step along the gradient from the best, and what it promises to save [s]."""
     along, gradient = best.problem.path, path_gradient(best.problem, best.profile, limits.jerk)
@@ -155,22 +155,22 @@ class _Sections:
         return len(self.runs[0]) - 1
 
 
-def _last_moves(path: Path) -> NDArray[np.int64]:
+def _last_moves(path: Path) -> Integers:
     """The last move of each run."""
     return np.asarray(path.move[path.runs[1:] - 1, 1])
 
 
-def _stops(path: Path) -> NDArray[np.int64]:
+def _stops(path: Path) -> Integers:
     """The moves at whose end the tool stops, but for the last; stops within a move do not count."""
     last, after = _last_moves(path)[:-1], path.move[path.runs[1:-1], 0]
     return np.asarray(last[after > last])
 
 
-def _sums(values: NDArray[np.float64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+def _sums(values: Floats, offsets: Integers) -> Floats:
     return np.add.reduceat(values, offsets[:-1])
 
 
-def _excess(followed: Followed) -> NDArray[np.float64]:
+def _excess(followed: Followed) -> Floats:
     """By how much each run takes longer than at the feed and the axes' greatest speeds, as a part."""
     problem, path = followed.problem, followed.problem.path
     control, offsets = path.curve.control_points, path.curve.offsets
@@ -185,7 +185,7 @@ def _joined(
     first: Followed,
     other: Followed,
     sections: _Sections,
-    better: NDArray[np.bool_],
+    better: Flags,
     join: Callable[[Path], Problem],
 ) -> Followed:
     """Each section as one of two plans has it."""

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.arguments import number, positive
+from feedplan.arrays import Flags
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
@@ -80,7 +80,7 @@ class Knots:
         return _resting(chunk, pausing | stops)
 
 
-def _resting(chunk: SetpointChunk, rests: NDArray[np.bool_]) -> SetpointChunk:
+def _resting(chunk: SetpointChunk, rests: Flags) -> SetpointChunk:
     """The same without motion at some rows."""
     moving = ~rests[:, None]
     rates = {name: getattr(chunk, name) * moving for name in ("velocity", "acceleration", "jerk")}

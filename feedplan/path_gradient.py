@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square
 from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 # Cells of the spline in each piece, and the places in a cell at which limits hold.
 _CELLS, _PLACES = 3, (0.05, 0.95)
@@ -45,17 +43,17 @@ class PathGradient:
     time grows with each of them per length of the parameter: `by_second` [s], `by_third` [s mm].
     """
 
-    piece: NDArray[np.int64]
-    u: Array
-    width: Array
-    p: Array
-    second: Array
-    third: Array
-    by_second: Array
-    by_third: Array
+    piece: Integers
+    u: Floats
+    width: Floats
+    p: Floats
+    second: Floats
+    third: Floats
+    by_second: Floats
+    by_third: Floats
 
 
-def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Array) -> PathGradient:
+def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Floats) -> PathGradient:
     """The gradient at a plan whose axes are those of its path.
 
     `max_jerk` (axes,) [mm/s³] is infinite where the plan has no limit of jerk."""
@@ -116,15 +114,13 @@ def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Array) -> P
 class _Spline:
     """The coefficients that count at each place (m, degree + 1), their basis functions and derivatives."""
 
-    column: NDArray[np.int64]
-    value: Array
-    slope: Array
-    bend: Array
+    column: Integers
+    value: Floats
+    slope: Floats
+    bend: Floats
 
     @classmethod
-    def of(
-        cls, runs: NDArray[np.int64], size: Array, piece: NDArray[np.int64], part: Array, degree: int
-    ) -> _Spline:
+    def of(cls, runs: Integers, size: Floats, piece: Integers, part: Floats, degree: int) -> _Spline:
         """A spline for each run, over cells of `size` (pieces,), at parts of the cells of each piece."""
         cell = _CELLS * piece + np.tile(part.astype(np.int64), len(size))
         run = np.searchsorted(runs, piece, side="right") - 1
@@ -140,7 +136,7 @@ class _Spline:
         after[_CELLS * runs[1:] - 1] = 0.0
         low, high = h / (h + before[cell]), h / (h + after[cell])
 
-        def three(first: Array, last: Array, total: float) -> Array:
+        def three(first: Floats, last: Floats, total: float) -> Floats:
             return np.stack([first, total - first - last, last], axis=1)
 
         return cls(
@@ -154,9 +150,7 @@ class _Spline:
 class _Program:
     """Minimise the time to second order in the change of p under linear limits."""
 
-    def __init__(
-        self, spline: _Spline, p: Array, width: Array, free: NDArray[np.bool_], known: NDArray[np.bool_]
-    ) -> None:
+    def __init__(self, spline: _Spline, p: Floats, width: Floats, free: Flags, known: Flags) -> None:
         """Coefficients are free that count at a `free` place and at no `known` one."""
         self._column = spline.column
         count = int(spline.column.max()) + 1
@@ -169,7 +163,7 @@ class _Program:
         self._free = int(may.sum())
         # The places at which p may change.
         self.touched = (self._index[spline.column] >= 0).any(axis=1)
-        self._limits: list[tuple[Any, Array, Array]] = []
+        self._limits: list[tuple[Any, Floats, Floats]] = []
         self._most = _DEAREST * width / np.sqrt(np.maximum(p, 1e-300))
         moving = np.flatnonzero(~known)
         time = width[moving] / np.sqrt(p[moving])
@@ -179,7 +173,7 @@ class _Program:
         self._cost = matrix.T @ (-0.5 * time / p[moving]) / self._time
         self._curvature = matrix.T @ matrix.multiply((0.75 * time / p[moving] ** 2 / self._time)[:, None])
 
-    def _matrix(self, at: NDArray[np.int64], values: Array) -> Any:
+    def _matrix(self, at: Integers, values: Floats) -> Any:
         from scipy import sparse
 
         column = self._column[at]
@@ -188,11 +182,11 @@ class _Program:
         entries = (values * self._unit[column])[kept], (row[kept], index[kept])
         return sparse.coo_matrix(entries, shape=(len(at), self._free)).tocsr()
 
-    def limit(self, at: NDArray[np.int64], values: Array, most: Array) -> None:
+    def limit(self, at: Integers, values: Floats, most: Floats) -> None:
         """Σ values · change of the coefficients at a place is at most `most`."""
         self._limits.append((self._matrix(at, values), most, self._most[at]))
 
-    def multipliers(self) -> list[Array]:
+    def multipliers(self) -> list[Floats]:
         """Those of the limits, a list for each call of `limit` [s]."""
         import clarabel
         from scipy import sparse

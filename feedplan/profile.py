@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import Profile, Sampler
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.lazy import cached_property
 from feedplan.native import OfNative
@@ -74,20 +75,20 @@ class SpeedProfile(OfNative[Profile]):
     piece: NDArray[np.uint32]
     kind: NDArray[np.uint8]
     axis: NDArray[np.uint8]
-    value: NDArray[np.float64]
-    u0: NDArray[np.float64]
-    u1: NDArray[np.float64]
-    p0: NDArray[np.float64]
-    p1: NDArray[np.float64]
-    duration: NDArray[np.float64]
-    runs: NDArray[np.int64]
+    value: Floats
+    u0: Floats
+    u1: Floats
+    p0: Floats
+    p1: Floats
+    duration: Floats
+    runs: Integers
     slowed: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
-    a0: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    a1: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    a0: Floats = field(default_factory=lambda: np.empty(0))
+    a1: Floats = field(default_factory=lambda: np.empty(0))
     kinked: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
     stopped: bool = False
     excess: float = math.nan
-    run_bounds: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    run_bounds: Floats = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         for name, dtype in _DTYPES.items():
@@ -114,7 +115,7 @@ class SpeedProfile(OfNative[Profile]):
         return min(math.fsum(self.run_bounds), self.time) if len(self.run_bounds) else math.nan
 
     @property
-    def run_times(self) -> NDArray[np.float64]:
+    def run_times(self) -> Floats:
         """Time of each run [s], shape (runs,)."""
         ends = np.concatenate(([0.0], np.cumsum(self.duration)))
         return np.asarray(np.diff(ends[self.runs]))

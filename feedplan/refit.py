@@ -12,15 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.path import Path
 from feedplan.geometry.rules import Motion
 from feedplan.path_gradient import PathGradient
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 # The speed counts as at least this part of the greatest of its run: where one plan stops, the next need not.
 LEAST_SPEED = 0.25
@@ -32,8 +30,8 @@ class FitLimits:
 
     The jerk is infinite where the plan has no limit of it."""
 
-    acceleration: Array
-    jerk: Array
+    acceleration: Floats
+    jerk: Floats
 
 
 def at_speed_of(problem: Problem, profile: SpeedProfile, limits: FitLimits) -> Motion:
@@ -53,7 +51,7 @@ def at_speed_of(problem: Problem, profile: SpeedProfile, limits: FitLimits) -> M
     return _motion(path, np.union1d(path.runs, rests), piece, u, p, nothing, nothing, limits)
 
 
-def along_gradient(path: Path, at: PathGradient, limits: FitLimits, step: Array) -> Motion:
+def along_gradient(path: Path, at: PathGradient, limits: FitLimits, step: Floats) -> Motion:
     """The motion of a plan, its path less a step along the gradient; `step` (m,) is the length by place."""
     second_weight, third_weight = _weights(path, at, limits)
     second = at.second - step[:, None] * at.by_second / second_weight
@@ -63,7 +61,7 @@ def along_gradient(path: Path, at: PathGradient, limits: FitLimits, step: Array)
 
 
 def promise(
-    at: PathGradient, path: Path, other: Path, runs: list[NDArray[np.int64]], limits: FitLimits, step: Array
+    at: PathGradient, path: Path, other: Path, runs: list[Integers], limits: FitLimits, step: Floats
 ) -> float:
     """The time [s] that the sections promise to save on which the other path is faster to second order.
 
@@ -81,13 +79,13 @@ def promise(
     return float(np.maximum(np.add.reduceat(saved, first), 0.0).sum())
 
 
-def _weights(path: Path, at: PathGradient, limits: FitLimits) -> tuple[Array, Array]:
+def _weights(path: Path, at: PathGradient, limits: FitLimits) -> tuple[Floats, Floats]:
     """u̇³/A² and u̇⁵/J² (m, axes) at the speed that counts."""
     p = _counted(at.p, np.searchsorted(at.piece, path.runs))[:, None]
     return p**1.5 / limits.acceleration**2, p**2.5 / limits.jerk**2
 
 
-def _counted(p: Array, start: NDArray[np.int64]) -> Array:
+def _counted(p: Floats, start: Integers) -> Floats:
     """p as it counts, runs from `start` (r + 1,)."""
     greatest = np.maximum.reduceat(p, start[:-1])
     return np.maximum(p, LEAST_SPEED**2 * np.repeat(greatest, np.diff(start)))
@@ -95,12 +93,12 @@ def _counted(p: Array, start: NDArray[np.int64]) -> Array:
 
 def _motion(
     path: Path,
-    runs: NDArray[np.int64],
-    piece: NDArray[np.int64],
-    u: Array,
-    p: Array,
-    second: Array,
-    third: Array,
+    runs: Integers,
+    piece: Integers,
+    u: Floats,
+    p: Floats,
+    second: Floats,
+    third: Floats,
     limits: FitLimits,
 ) -> Motion:
     begin, start = np.concatenate([[0.0], np.cumsum(path.width)]), np.searchsorted(piece, runs)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
 from feedplan.arguments import is_whole, number, one_of, positive, shown, whole
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.events import Events, TimedEvents
@@ -36,15 +37,15 @@ class SetpointChunk:
     `piece` (n,) and `u` (n,) say where on the path each is, and are empty where that is not known.
     """
 
-    t: NDArray[np.float64]
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    jerk: NDArray[np.float64]
+    t: Floats
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
     line: NDArray[np.int32]
     axes: tuple[str, ...]
     piece: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
-    u: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    u: Floats = field(default_factory=lambda: np.empty(0))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -152,7 +153,7 @@ class Setpoints:
         return self._events.placed(lambda: self._sampler).on(self.run_starts)
 
     @property
-    def run_starts(self) -> NDArray[np.float64]:
+    def run_starts(self) -> Floats:
         """When each run between stops starts (runs,) [s]."""
         return self._sampler.runs[:, 1]
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem, speed_square
 from feedplan.curves._arrays import within
 from feedplan.curves.length import CurveLength
 from feedplan.lazy import cached_property
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +21,11 @@ class State:
     and the source `line`. For one time each is one row (axes,) and `line` a number, for (n,) times (n, axes)
     and (n,)."""
 
-    t: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
+    t: Floats
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
     line: NDArray[np.int32]
 
 
@@ -71,20 +70,20 @@ class Trajectory:
         row = 0 if times.ndim == 0 else slice(None)
         return State(times, position[row], velocity[row], acceleration[row], jerk[row], line[row])
 
-    def distance(self, t: ArrayLike) -> Array:
+    def distance(self, t: ArrayLike) -> Floats:
         """s(t): the length of the way [mm] at one time or at times (n,) [s]. Raises as `at`."""
         times = within(t, "time", self.duration, "s")
         piece, u = self.sampler.at(np.atleast_1d(times))[6:8]
         return self._lengths.length(piece, u).reshape(times.shape)
 
-    def time(self, s: ArrayLike) -> Array:
+    def time(self, s: ArrayLike) -> Floats:
         """t(s): when the tool is at one length or at lengths (n,) [mm], before the pause at a stop [s].
 
         Raises InputError for a length that is not on the path."""
         lengths = within(s, "length", self.length, self._problem.unit)
         return self.sampler.along(*self._lengths.locate(np.atleast_1d(lengths)))[0].reshape(lengths.shape)
 
-    def speed(self, s: ArrayLike) -> Array:
+    def speed(self, s: ArrayLike) -> Floats:
         """v(s): the speed of the tool [mm/s] at one length or at lengths (n,) [mm]. Raises as `time`."""
         lengths = within(s, "length", self.length, self._problem.unit)
         piece, u = self._lengths.locate(np.atleast_1d(lengths))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_joints, audit_plan
 from feedplan.arguments import callback, flag, instance, list_of_names, not_negative, number, positive
+from feedplan.arrays import Floats
 from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.recorded import audit_recorded
 from feedplan.audit.verdict import PASS_MARK, Audit, LimitCheck, join
@@ -347,7 +348,7 @@ def _lines(given: ArrayLike) -> NDArray[np.int32]:
     return np.ascontiguousarray(lines, np.int32)
 
 
-def _period(times: NDArray[np.float64], default: float) -> float:
+def _period(times: Floats, default: float) -> float:
     """The usual time step; the machine's where the times show none."""
     step = float(np.median(np.diff(times[:CHUNK])))
     return step if math.isfinite(step) and step > 0 else default

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.errors import InputError
 from feedplan.events import Event, TimedEvents
 from feedplan.program.actions import KINDS
@@ -55,7 +55,7 @@ def require_events(
             raise _refused(file, row, f"takes {row.value:g} s", why)
 
 
-def _moves(velocity: NDArray[np.float64], row: int) -> bool:
+def _moves(velocity: Floats, row: int) -> bool:
     """Whether the tool moves at a row, by the velocities around it; False where none are known."""
     if not len(velocity):
         return False

@@ -8,8 +8,8 @@ axes that its own moves do not move: on a blend both blocks count.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.program.program import Program
 from feedplan.progress import Listener, tell
@@ -30,9 +30,7 @@ def feed_axes(names: tuple[str, ...]) -> list[list[float]]:
     ]
 
 
-def feed_limits(
-    problem: Problem, program: Program | None, progress: Listener | None = None
-) -> NDArray[np.float64]:
+def feed_limits(problem: Problem, program: Program | None, progress: Listener | None = None) -> Floats:
     """The greatest of each speed on each piece (n, 4) [mm/s, deg/s]; infinite where it is not limited.
 
     Without a program the numbers are the problem's: along the axes that the piece moves if the problem counts
@@ -71,7 +69,7 @@ def feed_limits(
     return np.ascontiguousarray(limits.T)
 
 
-def _any(moving: NDArray[np.bool_], groups: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _any(moving: Flags, groups: Flags) -> Flags:
     """Which groups have an axis that moves (3, n)."""
     moves = np.zeros((len(groups), len(moving)), dtype=np.bool_)
     for group, axis in np.argwhere(groups):

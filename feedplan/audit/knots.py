@@ -7,14 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.audit.verdict import join, worst_of
 from feedplan.audit.worst import Findings, Worst
 from feedplan.errors import InputError
 from feedplan.machine.machine import Machine
 from feedplan.progress import Listener, tell
-
-Floats = NDArray[np.float64]
 
 
 def audit_knots(

@@ -12,10 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.audit.worst import Findings, Worst
 from feedplan.progress import Listener, tell
-
-Array = NDArray[np.float64]
 
 # Steps of the mean: the ramps of a machine are longer, or its feed is slow.
 STEPS = 16
@@ -29,11 +28,11 @@ _AT_ONCE = 100_000
 
 def audit_recorded(
     name: str,
-    t: Array,
-    rate: Array,
-    change: Array,
-    limit: Array,
-    jump: Array,
+    t: Floats,
+    rate: Floats,
+    change: Floats,
+    limit: Floats,
+    jump: Floats,
     line: NDArray[np.int32],
     progress: Listener | None = None,
 ) -> Findings:
@@ -59,7 +58,7 @@ def audit_recorded(
     return worst.findings()
 
 
-def _over_steps(pick: np.ufunc, values: Array) -> Array:
+def _over_steps(pick: np.ufunc, values: Floats) -> Floats:
     """The least or greatest of each `STEPS` + 1 rows on end."""
     reach = 1
     while reach < STEPS:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
+
 # Name, axis (−1: none), worst value, limit, ratio, time, source line.
 Finding = tuple[str, int, float, float, float, float, int]
 # What was found, and the number of samples that were taken for it.
 Findings = tuple[list[Finding], int]
-Floats = NDArray[np.float64]
 
 
 class Worst:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.arguments import number, positive
+from feedplan.arrays import Floats
 from feedplan.geometry.feed_groups import feed_groups, leading_feed, moving_axes
 from feedplan.geometry.path import Path
 
@@ -26,18 +26,18 @@ class FeedRequest:
             feed = number(self.feed, "feed", "a positive feed", positive, "mm/s")
             object.__setattr__(self, "feed", feed)
 
-    def of(self, feed: NDArray[np.float64]) -> NDArray[np.float64]:
+    def of(self, feed: Floats) -> Floats:
         """The feed in place of a programmed one; infinite ones stay."""
         given = feed if self.feed is None else np.where(np.isfinite(feed), self.feed, feed)
         return np.asarray(given * self.override)
 
 
-def feed_limit(path: Path, greatest: float, request: FeedRequest) -> NDArray[np.float64]:
+def feed_limit(path: Path, greatest: float, request: FeedRequest) -> Floats:
     """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is the speed of rapids."""
     return np.minimum(request.of(path.feed), greatest)
 
 
-def feed_share(path: Path, greatest: float, request: FeedRequest) -> NDArray[np.float64] | None:
+def feed_share(path: Path, greatest: float, request: FeedRequest) -> Floats | None:
     """The share of the velocity of each axis in the speed that `feed_limit` limits (n, axes).
 
     It is 1 on the axes along which that feed counts, and 0 on axes without a feed. Where a piece keeps feeds

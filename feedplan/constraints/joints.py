@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.speed_polynomial import SpeedPolynomial, interpolated_squares
 from feedplan.errors import InputError
@@ -33,7 +33,6 @@ from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import positions
 from feedplan.machine.singularities import JointPath, joint_path
 
-Array = NDArray[np.float64]
 # Joints that differ by less than this are in the same position [mm, deg].
 MEETING = 1e-6
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
@@ -50,12 +49,12 @@ class JointMotion:
     path: Path
     cut: Cut
     joints: CompositeCurve
-    joint_origin: Array
+    joint_origin: Floats
     tip_speed: SpeedPolynomial
     words: tuple[AxisWords, ...]
 
 
-def way_scale(axes: tuple[str, ...], machine: Machine) -> Array:
+def way_scale(axes: tuple[str, ...], machine: Machine) -> Floats:
     """The share of each axis of a path in its length (axes,), 1 for linear axes.
 
     A degree of a rotary axis counts as the way of the slowest linear axis in the time of that turn, both at
@@ -69,7 +68,7 @@ def way_scale(axes: tuple[str, ...], machine: Machine) -> Array:
     return np.array(scale)
 
 
-def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
+def joint_motion(path: Path, machine: Machine, feed: Floats) -> JointMotion:
     """The motion of the machine's joints along the path; `feed` (n,) [mm/s] is the greatest speed of a piece.
 
     Raises InputError where the tool passes a singular position or a joint leaves its travel, with the line.
@@ -94,7 +93,7 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
     return JointMotion(cut_path, cut, whole.joints, whole.origin, whole.speed, tuple(words))
 
 
-def _require_meeting(machine: Machine, line: int, start: Array, motion: _Motion) -> None:
+def _require_meeting(machine: Machine, line: int, start: Floats, motion: _Motion) -> None:
     """Raises InputError unless the joints begin where those before end: a change of mode moves no joint."""
     begin = motion.origin[0] + motion.joints.control_points[0]
     apart = np.abs(begin - start)
@@ -115,9 +114,9 @@ class _Task:
     path: Path
     machine: Machine
     words: AxisWords
-    pieces: NDArray[np.int64]
-    feed: Array
-    start: Array | None
+    pieces: Integers
+    feed: Floats
+    start: Floats | None
 
     def line(self, piece: int) -> int:
         """Source line of one of the pieces."""
@@ -144,11 +143,11 @@ class _Motion:
     """
 
     words: AxisWords
-    piece: NDArray[np.int64]
-    part: Array
+    piece: Integers
+    part: Floats
     tool: CompositeCurve
     joints: CompositeCurve
-    origin: Array
+    origin: Floats
     speed: SpeedPolynomial
 
     @classmethod
@@ -291,14 +290,14 @@ def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) ->
     return SpeedPolynomial.of(replace(joints, control_points=joints.control_points[:, columns]))
 
 
-def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
+def _moving(curve: CompositeCurve) -> Flags:
     """Which pieces have a length (n,)."""
     moving = np.ones(len(curve), dtype=bool)
     moving[curve.zero_length] = False
     return moving
 
 
-def _accuracy(task: _Task, curve: CompositeCurve, moves: NDArray[np.bool_]) -> Accuracy:
+def _accuracy(task: _Task, curve: CompositeCurve, moves: Flags) -> Accuracy:
     """The accuracy of interpolants: limits of the machine, and squares of speeds that are not polynomials."""
     even = curve.elevated(int(curve.degree.max()))
     squares = []
@@ -322,10 +321,10 @@ def _accuracy(task: _Task, curve: CompositeCurve, moves: NDArray[np.bool_]) -> A
     )
 
 
-def _turning_of(curve: CompositeCurve) -> Callable[[NDArray[np.int64], Array], Array]:
+def _turning_of(curve: CompositeCurve) -> Callable[[Integers, Floats], Floats]:
     """The square of the rate at which a direction of any length turns [deg²], by u."""
 
-    def square(piece: NDArray[np.int64], u: Array) -> Array:
+    def square(piece: Integers, u: Floats) -> Floats:
         direction, slope = curve.evaluate(piece, u, 1)
         across = (np.cross(direction, slope) ** 2).sum(axis=1)
         return np.asarray(np.degrees(1.0) ** 2 * across / (direction**2).sum(axis=1) ** 2)
@@ -349,7 +348,7 @@ def _tool_speed(linear: CompositeCurve) -> SpeedPolynomial:
     return replace(speed, coefficients=speed.coefficients * above)
 
 
-def _either(first: SpeedPolynomial, second: SpeedPolynomial, chosen: NDArray[np.bool_]) -> SpeedPolynomial:
+def _either(first: SpeedPolynomial, second: SpeedPolynomial, chosen: Flags) -> SpeedPolynomial:
     """The first where it is chosen, piece by piece, and else the second."""
     if chosen.all():
         return first

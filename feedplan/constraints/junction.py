@@ -5,14 +5,14 @@ from __future__ import annotations
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import Path
 
 
-def junction_limit(path: Path, max_velocity_jump: NDArray[np.float64]) -> NDArray[np.float64]:
+def junction_limit(path: Path, max_velocity_jump: Floats) -> Floats:
     """Greatest speed (n + 1,) [mm/s] at the ends of the pieces.
 
     0 at the ends of runs. Within a run, where the unit tangent jumps by ΔT, min over the axes of

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import Problem as NativeProblem
 from feedplan.arguments import not_negative, number
+from feedplan.arrays import Floats
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.constraints.tool_motion import ToolMotion
@@ -62,27 +63,27 @@ class Problem:
     """
 
     path: Path
-    max_velocity: NDArray[np.float64]
-    max_acceleration: NDArray[np.float64]
-    max_jerk: NDArray[np.float64]
-    feed: NDArray[np.float64]
-    junction_speed: NDArray[np.float64]
+    max_velocity: Floats
+    max_acceleration: Floats
+    max_jerk: Floats
+    feed: Floats
+    junction_speed: Floats
     chord_tolerance: float
     period: float
     start_speed: float = 0.0
     end_speed: float = 0.0
-    velocity_jump: NDArray[np.float64] | None = None
+    velocity_jump: Floats | None = None
     joint_axes: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
-    least_velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    least_acceleration: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    least_velocity: Floats = field(default_factory=lambda: np.zeros(0))
+    least_acceleration: Floats = field(default_factory=lambda: np.zeros(0))
     joints: CompositeCurve | None = None
-    joint_origin: NDArray[np.float64] | None = None
+    joint_origin: Floats | None = None
     tip_speed: SpeedPolynomial | None = None
-    way_scale: NDArray[np.float64] | None = None
+    way_scale: Floats | None = None
     words: tuple[AxisWords, ...] = ()
     cut: Cut | None = None
-    feed_share: NDArray[np.float64] | None = None
+    feed_share: Floats | None = None
     request: FeedRequest = field(default_factory=FeedRequest)
 
     def __post_init__(self) -> None:
@@ -99,25 +100,25 @@ class Problem:
         return f"<Problem of the joints {' '.join(self.axes)} on {self.path!r}>"
 
     @property
-    def min_velocity(self) -> NDArray[np.float64]:
+    def min_velocity(self) -> Floats:
         """The least velocity of each axis (axes,) [mm/s]."""
         return self.least_velocity if len(self.least_velocity) else -self.max_velocity
 
     @property
-    def min_acceleration(self) -> NDArray[np.float64]:
+    def min_acceleration(self) -> Floats:
         """The least acceleration of each axis (axes,) [mm/s²]."""
         return self.least_acceleration if len(self.least_acceleration) else -self.max_acceleration
 
-    def limits(self, name: Limited) -> NDArray[np.float64]:
+    def limits(self, name: Limited) -> Floats:
         """The sizes of the limits upward and downward (2, axes)."""
         return np.stack([getattr(self, f"max_{name}"), -getattr(self, f"min_{name}")])
 
-    def limit(self, name: Limited, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def limit(self, name: Limited, values: Floats) -> Floats:
         """The sizes of the limits of values (…, axes), each that of its direction."""
         up, down = self.limits(name)
         return np.asarray(np.where(values < 0.0, down, up))
 
-    def use(self, name: Limited, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def use(self, name: Limited, values: Floats) -> Floats:
         """The share of their limits that values (…, axes) use, each of the limit of its direction."""
         least, most = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
         return np.asarray(values / np.where(values < 0.0, least, most))
@@ -178,9 +179,7 @@ class Problem:
         """The motion of the joints."""
         return self.path.curve if self.joints is None else self.joints
 
-    def derivatives(
-        self, piece: NDArray[np.integer], u: NDArray[np.float64], order: int
-    ) -> NDArray[np.float64]:
+    def derivatives(self, piece: NDArray[np.integer], u: Floats, order: int) -> Floats:
         """The joints' q, q', … by u at places (m,): (order + 1, m, joints), order ≤ 3.
 
         Exact to rounding: by the kinematics from the path as it was before it was cut, not by `joints`;
@@ -316,7 +315,7 @@ def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
     return machine.inverse.always or (mode is not None and bool((mode != CoordinateMode.JOINTS).any()))
 
 
-def _velocity_jump(path: Path, machine: Machine, axes: Sequence[Axis]) -> NDArray[np.float64]:
+def _velocity_jump(path: Path, machine: Machine, axes: Sequence[Axis]) -> Floats:
     """What the velocity of each axis may jump by at a corner (axes,) [mm/s]."""
     cut = machine.chord_tolerance / machine.period
     most = [cut if axis.kind == "linear" else np.inf for axis in axes]
@@ -326,7 +325,7 @@ def _velocity_jump(path: Path, machine: Machine, axes: Sequence[Axis]) -> NDArra
     return jump
 
 
-def feed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.float64]) -> NDArray[np.float64]:
+def feed_square(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Floats:
     """The square of the speed that the feed limits over p at places (n,)."""
     if problem.feed_share is None:
         return speed_square(problem, piece, u)
@@ -334,7 +333,7 @@ def feed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.floa
     return np.asarray(((problem.feed_share[piece] * slope) ** 2).sum(axis=1))
 
 
-def speed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.float64]) -> NDArray[np.float64]:
+def speed_square(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Floats:
     """The square of the tool's speed over p at places (n,)."""
     tip = problem.tip_speed
     if tip is None:

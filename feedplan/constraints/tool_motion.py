@@ -14,13 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
 from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
-
-Floats = NDArray[np.float64]
 
 # I, J, K are the tool's direction, a unit vector.
 _DEGREES = {name: math.degrees(1.0) for name in "IJK"}
@@ -40,7 +39,7 @@ class ToolMotion:
     curve: CompositeCurve
     table: CurveLength | None
     share: Floats | None
-    turns: NDArray[np.bool_]
+    turns: Flags
     units: tuple[str, str]
 
     @classmethod
@@ -60,7 +59,7 @@ class ToolMotion:
         return self.units[1 if self.turns.all() else 0]
 
     @cached_property
-    def drawn(self) -> NDArray[np.bool_]:
+    def drawn(self) -> Flags:
         """Pieces (n,) whose length is in that unit."""
         return np.asarray(~self.turns | self.turns.all())
 
@@ -86,7 +85,7 @@ class ToolMotion:
         return np.zeros(len(u)) if self.table is None else self.table.length(piece, u)
 
 
-def _counted(path: Path) -> tuple[Floats, NDArray[np.bool_]]:
+def _counted(path: Path) -> tuple[Floats, Flags]:
     """`ToolMotion.share` and `ToolMotion.turns` of a path with other axes than X, Y, Z."""
     axes, points, first = path.axes, path.curve.control_points, path.curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)

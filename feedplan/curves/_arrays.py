@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan.arguments import is_number, shown
+from feedplan.arrays import Flags, Floats
 from feedplan.errors import InputError
 
 MAX_AXES = 9
 
 
-def points(
-    control_points: ArrayLike, weights: ArrayLike | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def points(control_points: ArrayLike, weights: ArrayLike | None) -> tuple[Floats, Floats | None]:
     """Control points (n, axes), of one axis also (n,), and their weights."""
     control = floats(control_points, "control points")
     if control.ndim == 1:
@@ -33,7 +32,7 @@ def points(
     return control, weight
 
 
-def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], Floats]:
     """Pieces and parameters of places (m,)."""
     pieces, at = whole_numbers(piece, "pieces"), floats(u, "parameters")
     refuse(pieces < 0, lambda i: f"place {i} is on piece {pieces[i]}: pieces are counted from 0")
@@ -59,7 +58,7 @@ def whole_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
     return given
 
 
-def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> NDArray[np.float64]:
+def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> Floats:
     """A C-contiguous array of numbers, of `dimensions` dimensions if that is given."""
     try:
         given = np.asarray(values)
@@ -76,7 +75,7 @@ def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> NDArr
     return array
 
 
-def within(given: ArrayLike, name: str, end: float, unit: str) -> NDArray[np.float64]:
+def within(given: ArrayLike, name: str, end: float, unit: str) -> Floats:
     """A number or numbers (n,) from 0 to `end`, each a time or a length as `name` says."""
     try:
         values = floats(given, name).reshape(np.shape(given))
@@ -92,7 +91,7 @@ def within(given: ArrayLike, name: str, end: float, unit: str) -> NDArray[np.flo
     return values
 
 
-def refuse(bad: NDArray[np.bool_], sentence: Callable[[int], str]) -> None:
+def refuse(bad: Flags, sentence: Callable[[int], str]) -> None:
     """Raises the sentence for the first index that is bad."""
     if bad.any():
         raise InputError(sentence(int(bad.argmax())))

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedplan._solvers import Curve
 from feedplan.arguments import flag, instance, is_number, is_whole, number, positive, shown
 from feedplan.arguments import refuse as refusal
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves._arrays import floats, places, points, refuse, whole_numbers
 from feedplan.errors import InputError
 from feedplan.native import OfNative
@@ -32,10 +33,10 @@ class CompositeCurve(OfNative[Curve]):
     Raises InputError for columns that do not fit together and values that cannot be used.
     """
 
-    control_points: NDArray[np.float64]
-    weights: NDArray[np.float64] | None
-    offsets: NDArray[np.int64]
-    width: NDArray[np.float64]
+    control_points: Floats
+    weights: Floats | None
+    offsets: Integers
+    width: Floats
 
     def __post_init__(self) -> None:
         control, weights = points(self.control_points, self.weights)
@@ -174,7 +175,7 @@ class CompositeCurve(OfNative[Curve]):
         return CompositeCurve(self.control_points[own], weights, offsets, self.width[pieces])
 
     @property
-    def rational(self) -> NDArray[np.bool_]:
+    def rational(self) -> Flags:
         """Which pieces are rational with weights that differ (n,)."""
         if self.weights is None:
             return np.zeros(len(self), dtype=bool)
@@ -187,12 +188,12 @@ class CompositeCurve(OfNative[Curve]):
         return int(self.control_points.shape[1])
 
     @property
-    def degree(self) -> NDArray[np.int64]:
+    def degree(self) -> Integers:
         """Degree of each piece (n,)."""
         return np.diff(self.offsets) - 1
 
     @property
-    def by_piece(self) -> NDArray[np.float64]:
+    def by_piece(self) -> Floats:
         """Control points (n, d + 1, axes) of pieces that all have one degree d.
 
         Raises InputError where the degrees differ.
@@ -204,11 +205,11 @@ class CompositeCurve(OfNative[Curve]):
         return np.ascontiguousarray(self.control_points).reshape(len(self), degree + 1, self.axes)
 
     @property
-    def weights_by_piece(self) -> NDArray[np.float64] | None:
+    def weights_by_piece(self) -> Floats | None:
         """Their weights (n, d + 1), or None where all pieces are polynomial."""
         return None if self.weights is None else self.weights.reshape(self.by_piece.shape[:2])
 
-    def evaluate(self, piece: ArrayLike, u: ArrayLike, order: int = 0) -> NDArray[np.float64]:
+    def evaluate(self, piece: ArrayLike, u: ArrayLike, order: int = 0) -> Floats:
         """C and its derivatives by u to `order` ≤ 3 at places (m,): (order + 1, m, axes)."""
         if not is_whole(order, 0, 3):
             raise InputError(f"derivatives to order {shown(order)}: orders 0 to 3 are supported")
@@ -243,7 +244,7 @@ class CompositeCurve(OfNative[Curve]):
         )
 
     @property
-    def zero_length(self) -> NDArray[np.int64]:
+    def zero_length(self) -> Integers:
         """The pieces whose control points all coincide."""
         first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         apart = (self.control_points != first).any(axis=1)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import CurveLength as Native
+from feedplan.arrays import Floats
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
@@ -36,13 +37,11 @@ class CurveLength:
         """Bound of the error of every length on the curve [mm]."""
         return self._table.error
 
-    def length(self, piece: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
+    def length(self, piece: ArrayLike, u: ArrayLike) -> Floats:
         """Length from the start of the curve to places (m,) [mm]."""
         return self._table.lengths(*places(piece, u))
 
-    def locate(
-        self, lengths: ArrayLike, tolerance: float = 1e-12
-    ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+    def locate(self, lengths: ArrayLike, tolerance: float = 1e-12) -> tuple[NDArray[np.uint32], Floats]:
         """The pieces and the parameters u at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an
         end gives that end."""
         return self._table.locate(floats(lengths, "lengths", 1), tolerance)

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.curves.composite import CompositeCurve
-
-Array = NDArray[np.float64]
 
 # Chebyshev points of |C'|² of rational pieces.
 SPEED_NODES = 12
@@ -25,8 +24,8 @@ class SpeedPolynomial:
     before `offsets[i + 1]`; `offsets` (n + 1,).
     """
 
-    coefficients: Array
-    offsets: NDArray[np.int64]
+    coefficients: Floats
+    offsets: Integers
 
     @classmethod
     def of(cls, curve: CompositeCurve) -> SpeedPolynomial:
@@ -57,12 +56,12 @@ class SpeedPolynomial:
         return cls(coefficients, offsets)
 
     @classmethod
-    def joined(cls, rows: Iterable[Array]) -> SpeedPolynomial:
+    def joined(cls, rows: Iterable[Floats]) -> SpeedPolynomial:
         """The polynomials with these coefficients, one row a piece."""
         rows = list(rows)
         return cls(np.concatenate(rows), np.concatenate([[0], np.cumsum([len(row) for row in rows])]))
 
-    def rows(self) -> list[Array]:
+    def rows(self) -> list[Floats]:
         """The coefficients of each piece."""
         return np.split(self.coefficients, self.offsets[1:-1])
 
@@ -71,7 +70,7 @@ class SpeedPolynomial:
         offsets = self.offsets[pieces.start : pieces.stop + 1]
         return SpeedPolynomial(self.coefficients[offsets[0] : offsets[-1]], offsets - offsets[0])
 
-    def evaluate(self, piece: NDArray[np.integer], t: Array) -> Array:
+    def evaluate(self, piece: NDArray[np.integer], t: Floats) -> Floats:
         """The square at fractions t (m,) of the parameter intervals of pieces (m,)."""
         counts = np.diff(self.offsets)[piece]
         square = np.empty(len(t))
@@ -85,43 +84,43 @@ class SpeedPolynomial:
 
 
 def interpolated_squares(
-    square: Callable[[NDArray[np.int64], Array], Array], piece: NDArray[np.int64], width: Array
-) -> Array:
+    square: Callable[[Integers, Floats], Floats], piece: Integers, width: Floats
+) -> Floats:
     """Bernstein coefficients (n, SPEED_NODES) through a function of piece and u, on these pieces (n,)."""
     u = (width[:, None] * chebyshev(SPEED_NODES)).ravel()
     values = square(np.repeat(piece, SPEED_NODES), u)
     return from_chebyshev(values.reshape(-1, SPEED_NODES))
 
 
-def from_chebyshev(values: Array) -> Array:
+def from_chebyshev(values: Floats) -> Floats:
     """Bernstein coefficients (n, m, …) of the polynomials with these values (n, m, …) at `chebyshev(m)`."""
-    coefficients: Array = np.einsum("ij,nj...->ni...", to_bernstein(values.shape[1]), values)
+    coefficients: Floats = np.einsum("ij,nj...->ni...", to_bernstein(values.shape[1]), values)
     return coefficients
 
 
-def to_bernstein(count: int) -> Array:
+def to_bernstein(count: int) -> Floats:
     """The matrix (count, count) that takes values at `chebyshev(count)` to Bernstein coefficients."""
     return np.ascontiguousarray(np.linalg.inv(_bernstein(count - 1, chebyshev(count))))
 
 
-def interpolation(count: int, at: Array) -> Array:
+def interpolation(count: int, at: Floats) -> Floats:
     """The matrix (places, count) that takes values at `chebyshev(count)` to those at places in [0, 1]."""
-    matrix: Array = _bernstein(count - 1, at) @ to_bernstein(count)
+    matrix: Floats = _bernstein(count - 1, at) @ to_bernstein(count)
     return matrix
 
 
-def _bernstein(degree: int, at: Array) -> Array:
+def _bernstein(degree: int, at: Floats) -> Floats:
     """The values (places, degree + 1) of the Bernstein polynomials."""
     power = np.arange(degree + 1)
-    values: Array = _binomials(degree) * at[:, None] ** power * (1 - at[:, None]) ** (degree - power)
+    values: Floats = _binomials(degree) * at[:, None] ** power * (1 - at[:, None]) ** (degree - power)
     return values
 
 
-def chebyshev(count: int) -> Array:
+def chebyshev(count: int) -> Floats:
     """The Chebyshev points of [0, 1]."""
-    nodes: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    nodes: Floats = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
     return nodes
 
 
-def _binomials(degree: int) -> Array:
+def _binomials(degree: int) -> Floats:
     return np.array([math.comb(degree, i) for i in range(degree + 1)], dtype=np.float64)

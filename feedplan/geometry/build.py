@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import build_path as native_build_path
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
@@ -161,10 +161,10 @@ def build_path(
     )
 
 
-def _new_words(program: Program, first: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _new_words(program: Program, first: Integers) -> Flags:
     """Whether mode or tool length change before a run (r,), of which `first` (r,) is the first move."""
     changes = np.searchsorted(program.change_move, first, side="right")
-    new: NDArray[np.bool_] = np.diff(changes, prepend=changes[:1]) > 0
+    new: Flags = np.diff(changes, prepend=changes[:1]) > 0
     if program.coordinate_mode is not None:
         new[1:] |= np.diff(program.coordinate_mode[first]) != 0
     if program.tool_length is not None:
@@ -172,15 +172,13 @@ def _new_words(program: Program, first: NDArray[np.int64]) -> NDArray[np.bool_]:
     return new
 
 
-def _changes_of_group(names: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _changes_of_group(names: tuple[str, ...], moving: Flags) -> Flags:
     """(m − 1,) whether the feed of the next move counts along other axes."""
     leading = leading_group(names, moving)
     return np.asarray((leading[1:] != leading[:-1]) & (leading[1:] >= 0) & (leading[:-1] >= 0))
 
 
-def _rough_places(
-    program: Program, reversals: NDArray[np.int64], zones: NDArray[np.int64]
-) -> tuple[str, ...]:
+def _rough_places(program: Program, reversals: Integers, zones: Integers) -> tuple[str, ...]:
     """Sentences on the stops of a smooth path that the program does not require."""
     sentences = []
     if len(reversals):
@@ -196,7 +194,7 @@ def _rough_places(
     return tuple(sentences)
 
 
-def _lines(program: Program, moves: NDArray[np.int64], most: int = 5) -> str:
+def _lines(program: Program, moves: Integers, most: int = 5) -> str:
     """The source lines of some moves, the first ones by number."""
     lines = list(dict.fromkeys(program.line[moves].tolist()))
     shown = ", ".join(str(line) for line in lines[:most])
@@ -236,7 +234,7 @@ def _splines(program: Program) -> CompositeCurve | None:
 
 def _tolerances(
     program: Program, tolerance: float | None, settings: FitSettings, corners: Corners
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Per move the allowed deviation and the fit's share of it [mm]; 0 where the path is exact."""
     if tolerance is None:
         limit = np.where(

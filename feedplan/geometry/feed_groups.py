@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves.composite import CompositeCurve
 
 GROUPS = 3
@@ -21,33 +22,31 @@ GROUPS = 3
 _LETTERS = (("X", "Y", "Z"), ("U", "V", "W"))
 
 
-def feed_groups(axes: tuple[str, ...]) -> NDArray[np.bool_]:
+def feed_groups(axes: tuple[str, ...]) -> Flags:
     """Which axes belong to which group (3, axes): X, Y, Z; U, V, W; all others."""
     linear, parallel = ([name in letters for name in axes] for letters in _LETTERS)
     others = [not (x or u) for x, u in zip(linear, parallel, strict=True)]
     return np.array([linear, parallel, others], dtype=np.bool_)
 
 
-def moved_groups(axes: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def moved_groups(axes: tuple[str, ...], moving: Flags) -> Flags:
     """Which groups have an axis that moves (m, 3), from which axes move (m, axes)."""
     return np.asarray(np.logical_or.reduce(moving[:, None, :] & feed_groups(axes), axis=2), dtype=np.bool_)
 
 
-def moving_axes(curve: CompositeCurve) -> NDArray[np.bool_]:
+def moving_axes(curve: CompositeCurve) -> Flags:
     """Which axes each piece moves (n, axes)."""
     control, first = curve.control_points, curve.offsets[:-1]
     return np.asarray(np.maximum.reduceat(control, first) > np.minimum.reduceat(control, first))
 
 
-def leading_group(axes: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.int64]:
+def leading_group(axes: tuple[str, ...], moving: Flags) -> Integers:
     """The group that the feed of each move counts along (m,), −1 where nothing moves."""
     moves = moved_groups(axes, moving)
     return np.where(np.logical_or.reduce(moves, axis=1), moves.argmax(axis=1), -1)
 
 
-def told_apart(
-    axes: tuple[str, ...], moving: NDArray[np.bool_], feed: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def told_apart(axes: tuple[str, ...], moving: Flags, feed: Floats) -> Floats:
     """The feeds (m,), changed by a rounding where equal numbers count along different axes."""
     if _are_one_group(axes):
         return feed
@@ -59,11 +58,11 @@ def told_apart(
 
 def group_feeds(
     axes: tuple[str, ...],
-    moving: NDArray[np.bool_],
-    feed: NDArray[np.float64],
+    moving: Flags,
+    feed: Floats,
     curve: CompositeCurve,
-    covered: NDArray[np.int64],
-) -> NDArray[np.float64] | None:
+    covered: Integers,
+) -> Floats | None:
     """The greatest speed of pieces along each group of axes (n, 3) [mm/s, deg/s], infinite without a limit.
 
     `moving` (m, axes) are the axes that each move moves, `feed` (m,) its feed, infinite on rapids, `covered`
@@ -85,7 +84,7 @@ def group_feeds(
     return np.asarray(np.where(foreign, np.minimum(own, beside), own))
 
 
-def leading_feed(by_group: NDArray[np.float64], otherwise: NDArray[np.float64]) -> NDArray[np.float64]:
+def leading_feed(by_group: Floats, otherwise: Floats) -> Floats:
     """The feed along the first group that has one (n,), `otherwise` where none has."""
     finite = np.isfinite(by_group)
     first = np.take_along_axis(by_group, finite.argmax(axis=1)[:, None], axis=1)[:, 0]
@@ -96,9 +95,7 @@ def _are_one_group(axes: tuple[str, ...]) -> bool:
     return int(np.logical_or.reduce(feed_groups(axes), axis=1).sum()) == 1
 
 
-def _over(
-    function: np.ufunc, values: NDArray[Any], covered: NDArray[np.int64], nothing: float | bool
-) -> NDArray[Any]:
+def _over(function: np.ufunc, values: NDArray[Any], covered: Integers, nothing: float | bool) -> NDArray[Any]:
     """The function over the rows from the first to the last (n, …)."""
     padded = np.concatenate([values, np.full((1, *values.shape[1:]), nothing, dtype=values.dtype)])
     ends = np.stack([covered[:, 0], covered[:, 1] + 1], axis=1).ravel()

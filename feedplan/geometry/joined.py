@@ -11,17 +11,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.program.program import LINEAR_AXES, MoveKind, Program
-
-Array = NDArray[np.float64]
 
 # The greatest number of points that a line leaves out.
 MOST = 100
 
 
-def joined(program: Program, tolerance: Array, halt: NDArray[np.bool_]) -> tuple[Program, NDArray[np.int64]]:
+def joined(program: Program, tolerance: Floats, halt: Flags) -> tuple[Program, Integers]:
     """The program with fewer moves, and the move that each one ends with (k,).
 
     `tolerance` (n,) [mm] holds for each move, 0 joins none; after `halt` (n,) a new line begins, and where
@@ -53,11 +51,11 @@ _BY_MOVE = (
 )
 
 
-def _taken(column: Array | None, last: NDArray[np.int64]) -> Array | None:
+def _taken(column: Floats | None, last: Integers) -> Floats | None:
     return None if column is None else column[last]
 
 
-def _ends(program: Program, tolerance: Array, halt: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _ends(program: Program, tolerance: Floats, halt: Flags) -> Integers:
     """The moves with which lines end (k,)."""
     columns = [i for i, name in enumerate(program.axes) if name in LINEAR_AXES]
     others = [i for i in range(len(program.axes)) if i not in columns]
@@ -81,7 +79,7 @@ def _ends(program: Program, tolerance: Array, halt: NDArray[np.bool_]) -> NDArra
     return np.flatnonzero(ends)
 
 
-def _near(points: Array, tolerance: float) -> bool:
+def _near(points: Floats, tolerance: float) -> bool:
     """Whether all points are within the tolerance of the line from the first to the last one."""
     way = points[-1] - points[0]
     square = float(way @ way)

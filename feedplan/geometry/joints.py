@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.curves.composite import CompositeCurve
-
-Array = NDArray[np.float64]
 
 # A unit tangent computed from control points of size |C| with an edge of length e carries a rounding error
 # of a few eps·|C|/e; a smaller turn than this many times that is no corner.
@@ -20,7 +18,7 @@ SMOOTH_TURN = 1e-9
 VANISHING_EDGE = 1e-12
 
 
-def tangent_jumps(curve: CompositeCurve) -> Array:
+def tangent_jumps(curve: CompositeCurve) -> Floats:
     """|T₊ − T₋| by axis at the joints between pieces (n − 1, axes), T being the unit tangents.
 
     0 where the jump may be rounding, NaN next to a piece without length. In a cusp T is the
@@ -31,14 +29,14 @@ def tangent_jumps(curve: CompositeCurve) -> Array:
     points = curve.control_points[curve.offsets[1:-1]]
     length_out, length_in = np.linalg.norm(edge_out, axis=1), np.linalg.norm(edge_in, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        jump: Array = np.abs(edge_in / length_in[:, None] - edge_out / length_out[:, None])
+        jump: Floats = np.abs(edge_in / length_in[:, None] - edge_out / length_out[:, None])
         size = _greatest(points)
         noise = ROUNDING_MARGIN * np.finfo(float).eps * size / np.minimum(length_in, length_out)
         jump[jump <= (SMOOTH_TURN + noise)[:, None]] = 0.0
     return jump
 
 
-def end_edges(curve: CompositeCurve) -> tuple[Array, Array]:
+def end_edges(curve: CompositeCurve) -> tuple[Floats, Floats]:
     """The edges of the control polygons along the tangents at both ends of each piece, each (n, axes).
 
     The first and the last edge that have a length; 0 on a piece without any.
@@ -63,6 +61,6 @@ def end_edges(curve: CompositeCurve) -> tuple[Array, Array]:
     return start, end
 
 
-def _greatest(vectors: Array) -> Array:
+def _greatest(vectors: Floats) -> Floats:
     """The greatest component of each vector (n, axes); by axis, because NumPy is slow along short rows."""
     return reduce(np.maximum, np.abs(vectors.T))

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedplan._solvers import build_path
 from feedplan.arguments import instance, is_whole, list_of_names, number, shown
 from feedplan.arguments import refuse as refuse_value
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves._arrays import points as point_array
 from feedplan.curves._arrays import refuse, within
 from feedplan.curves.composite import CompositeCurve
@@ -87,8 +88,8 @@ class Cut:
     """
 
     curve: CompositeCurve
-    piece: NDArray[np.int64]
-    part: NDArray[np.float64]
+    piece: Integers
+    part: Floats
 
     @cached_property
     def even(self) -> CompositeCurve:
@@ -126,20 +127,20 @@ class Path:
 
     axes: tuple[str, ...]
     curve: CompositeCurve
-    feed: NDArray[np.float64]
-    move: NDArray[np.int64]
+    feed: Floats
+    move: Integers
     line: NDArray[np.int32]
-    runs: NDArray[np.int64]
-    dwell: NDArray[np.float64]
-    tolerance: NDArray[np.float64]
+    runs: Integers
+    dwell: Floats
+    tolerance: Floats
     fit: FitSummary = field(default_factory=FitSummary)
     start_dwell: float = 0.0
     coordinate_mode: NDArray[np.uint8] | None = None
-    tool_length: NDArray[np.float64] | None = None
-    new_words: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    tool_length: Floats | None = None
+    new_words: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     corners: Corners = Corners.ROUNDED
     warnings: tuple[str, ...] = ()
-    group_feed: NDArray[np.float64] | None = None
+    group_feed: Floats | None = None
 
     def __post_init__(self) -> None:
         dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
@@ -264,9 +265,9 @@ class Path:
             raise InputError(f"a path of {len(array)} points: give two or more")
         tolerance = tolerance_of(tolerance)
         instance(corners, Corners, "corners", "one of Corners")
-        finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(array), axis=1)
+        finite: Flags = np.logical_and.reduce(np.isfinite(array), axis=1)
         refuse(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
-        same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
+        same: Flags = (array[1:] == array[:-1]).all(axis=1)
         refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
         count, width = len(array) - 1, array.shape[1]
         lines = Program(
@@ -312,9 +313,9 @@ class Path:
         axes: tuple[str, ...],
         curve: CompositeCurve,
         feed: float,
-        runs: NDArray[np.int64],
-        moving: NDArray[np.bool_],
-        move: NDArray[np.int64],
+        runs: Integers,
+        moving: Flags,
+        move: Integers,
     ) -> Path:
         """The path along a curve at one feed; `moving` (m, axes) are the axes that each move moves."""
         count = len(curve)
@@ -349,7 +350,7 @@ class Path:
         return f"<Path of {' '.join(self.axes)}: {pieces} in {runs}>"
 
     @property
-    def width(self) -> NDArray[np.float64]:
+    def width(self) -> Floats:
         """The parameter interval of each piece (n,) [mm: about the length]."""
         return self.curve.width
 
@@ -362,7 +363,7 @@ class Path:
         """Length along all axes [mm; of joints their unit]."""
         return self.lengths.total
 
-    def evaluate(self, s: ArrayLike, order: int = 0) -> NDArray[np.float64]:
+    def evaluate(self, s: ArrayLike, order: int = 0) -> Floats:
         """The place at one length or at lengths (n,) from the start: (axes,) or (n, axes) [mm, deg].
 
         `order` 1 gives the unit tangent there, 2 the curvature vector [1/mm]; NaN where the path has neither.
@@ -388,7 +389,7 @@ class Path:
         """The length along all axes as a function of the place."""
         return CurveLength(self.curve)
 
-    def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:
+    def cut(self, curve: CompositeCurve, piece: Integers) -> Path:
         """The same path with pieces cut: `curve` has the parts in order, part i of the piece `piece[i]`."""
         return replace(
             self,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats
 from feedplan.errors import MachineError
 from feedplan.machine.axis import AXIS_LETTERS, size_of
 from feedplan.machine.coordinate_mode import CoordinateMode
@@ -27,12 +27,12 @@ class PathWords:
     """
 
     names: tuple[str, ...]
-    joints: NDArray[np.bool_]
-    changes: NDArray[np.bool_]
-    max_velocity: NDArray[np.float64]
-    max_acceleration: NDArray[np.float64]
-    max_jerk: NDArray[np.float64]
-    travel: NDArray[np.float64]
+    joints: Flags
+    changes: Flags
+    max_velocity: Floats
+    max_acceleration: Floats
+    max_jerk: Floats
+    travel: Floats
     may_jump: bool
 
 
@@ -46,14 +46,14 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     coordinate_mode = np.full(len(program), default, dtype=np.uint8) if given is None else given
     known: dict[str, None] = {}
     moving = program.moving()
-    used: NDArray[np.bool_] = np.logical_or.reduce(moving, axis=0)
+    used: Flags = np.logical_or.reduce(moving, axis=0)
     for value in [default] if given is None or len(given) == 0 else np.unique(given):
         letters = _letters(machine, CoordinateMode(value))
         known.update(dict.fromkeys(letters))
         for column, name in enumerate(program.axes):
             if name in letters:
                 continue
-            moves: NDArray[np.bool_] = moving[:, column] & (coordinate_mode == value)
+            moves: Flags = moving[:, column] & (coordinate_mode == value)
             if moves.any():
                 line = program.line[int(moves.argmax())]
                 what = "none" if value == CoordinateMode.JOINTS else f"{', '.join(letters)} there"
@@ -105,7 +105,7 @@ def _letters(machine: Machine, coordinate_mode: CoordinateMode) -> tuple[str, ..
     return axis_words(machine, ("I", "J", "K"), coordinate_mode).kinematics.tip_names
 
 
-def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> NDArray[np.float64]:
+def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> Floats:
     size = {axis.name: size_of(getattr(axis, limit)) for axis in machine.axes}
     linear = [size[axis.name] for axis in machine.axes if axis.kind == "linear"]
     least = min(linear or size.values())

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves.composite import CompositeCurve
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +29,8 @@ class Rules:
     feed: Floats
     tolerance: Floats
     fit_tolerance: Floats
-    halt: NDArray[np.bool_]
-    joints: NDArray[np.bool_]
+    halt: Flags
+    joints: Flags
     max_velocity: Floats
     max_acceleration: Floats
     travel: Floats
@@ -58,8 +54,8 @@ class Motion:
     `max_jerk` (axes,) [mm/s³], infinite where the motion has no limit of jerk.
     """
 
-    run: NDArray[np.int64]
-    start: NDArray[np.int64]
+    run: Integers
+    start: Integers
     place: Floats
     speed_sq: Floats
     second: Floats

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.errors import MachineError
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.kinematics import Kinematics
@@ -39,7 +39,7 @@ class AxisWords:
         assert isinstance(self.kinematics, ToolVector)
         return replace(self, kinematics=replace(self.kinematics, side=-self.kinematics.side))
 
-    def tip(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def tip(self, points: Floats) -> Floats:
         """What `kinematics` takes (…, tip axes), from points or Bézier points (…, program axes)."""
         columns = [
             points[..., column] if column >= 0 else np.full(points.shape[:-1], held)

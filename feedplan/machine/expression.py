@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.errors import MachineError
 
 
@@ -53,7 +54,7 @@ class Expression:
 
     inputs: int
     operations: NDArray[np.int32]
-    constants: NDArray[np.float64]
+    constants: Floats
     outputs: NDArray[np.int32]
     turning: tuple[bool, ...]
 

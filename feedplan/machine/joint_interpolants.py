@@ -14,14 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from feedplan._solvers import joint_interpolants as native_joint_interpolants
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves.speed_polynomial import SPEED_NODES, chebyshev, interpolation, to_bernstein
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.path_derivatives import TipPieces, contiguous
 
-Array = NDArray[np.float64]
 # The greatest relative error of squares of speeds that are not polynomials.
 SPEED_SHARE = 1e-9
 
@@ -34,8 +34,8 @@ class SquareOfSpeed:
     [deg] at which a direction of any length turns. Weights are those of the tip.
     """
 
-    control_points: Array
-    pieces: NDArray[np.bool_]
+    control_points: Floats
+    pieces: Flags
     turning: bool = False
 
 
@@ -48,27 +48,27 @@ class Accuracy:
     `moves` there. The speeds that feed and velocities allow are estimated; limits hold at every lower speed.
     """
 
-    acceleration: Array
-    least_velocity: Array
-    greatest_velocity: Array
-    feed: Array
-    linear: Array
-    moves: NDArray[np.bool_]
+    acceleration: Floats
+    least_velocity: Floats
+    greatest_velocity: Floats
+    feed: Floats
+    linear: Floats
+    moves: Flags
     squares: list[SquareOfSpeed]
     speed_share: float = SPEED_SHARE
 
     @property
-    def speed_nodes(self) -> Array:
+    def speed_nodes(self) -> Floats:
         """The places at which squares of speeds are interpolated."""
         return chebyshev(SPEED_NODES)
 
     @property
-    def speed_between(self) -> Array:
+    def speed_between(self) -> Floats:
         """Places halfway between them, where the error of interpolation is greatest."""
         return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES))
 
     @property
-    def speed_interpolation(self) -> Array:
+    def speed_interpolation(self) -> Floats:
         """The matrix from values at the nodes to values at the places between."""
         return np.ascontiguousarray(interpolation(SPEED_NODES, self.speed_between))
 
@@ -83,12 +83,12 @@ class Interpolants:
     be made small enough, because K is singular there or 2^-30 of a piece is still too wide.
     """
 
-    piece: NDArray[np.int64]
-    part: Array
-    width: Array
-    slope: Array
-    slope_error: Array
-    curvature_error: Array
+    piece: Integers
+    part: Floats
+    width: Floats
+    slope: Floats
+    slope_error: Floats
+    curvature_error: Floats
 
     def __len__(self) -> int:
         return len(self.piece)

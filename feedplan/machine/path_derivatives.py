@@ -11,21 +11,20 @@ from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from feedplan._solvers import joint_derivatives, joint_positions
+from feedplan.arrays import Floats
 from feedplan.machine.kinematics import Kinematics
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class TipPieces:
     """Pieces of a tip path as the native module takes them."""
 
-    control_points: Array
-    width: Array
-    weights: Array | None
+    control_points: Floats
+    width: Floats
+    weights: Floats | None
 
     @classmethod
     def of(cls, control_points: ArrayLike, width: ArrayLike, weights: ArrayLike | None) -> TipPieces:
@@ -33,7 +32,7 @@ class TipPieces:
         return cls(contiguous(control_points), contiguous(width), contiguous(weights))
 
 
-def positions(kinematics: Kinematics, tip: ArrayLike) -> Array:
+def positions(kinematics: Kinematics, tip: ArrayLike) -> Floats:
     """Joint positions (…, joints) [mm, deg] for tips (…, axes); angles as K gives them, not continuous."""
     tips = contiguous(tip)
     found = joint_positions(kinematics.recorded, tips.reshape(-1, tips.shape[-1]))
@@ -47,7 +46,7 @@ def derivatives(
     fraction: ArrayLike,
     order: int = 3,
     weights: ArrayLike | None = None,
-) -> Array:
+) -> Floats:
     """q, q', …, q^(order) (order + 1, n, joints) at u = fraction · width of each piece.
 
     Exact but for rounding; not finite where K is singular. For many points of a piece repeat the piece.
@@ -60,7 +59,7 @@ def derivatives(
 @overload
 def contiguous(values: None) -> None: ...
 @overload
-def contiguous(values: ArrayLike) -> Array: ...
-def contiguous(values: ArrayLike | None) -> Array | None:
+def contiguous(values: ArrayLike) -> Floats: ...
+def contiguous(values: ArrayLike | None) -> Floats | None:
     """A C-contiguous array of floats, as the native module takes them."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)

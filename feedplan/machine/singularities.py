@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from feedplan._solvers import joint_path as native_joint_path
+from feedplan.arrays import Floats, Integers
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.path_derivatives import TipPieces, contiguous, derivatives
 
-Array = NDArray[np.float64]
 TURN = 360.0
 
 
@@ -25,11 +25,11 @@ TURN = 360.0
 class Bounds:
     """Lower and upper bounds `lo` ≤ `hi` of one shape; rounding is included."""
 
-    lo: Array
-    hi: Array
+    lo: Floats
+    hi: Floats
 
     @property
-    def middle(self) -> Array:
+    def middle(self) -> Floats:
         """Numbers about half way between the bounds; NaN where unbounded."""
         with np.errstate(invalid="ignore"):
             return np.asarray(0.5 * self.lo + 0.5 * self.hi)
@@ -77,12 +77,12 @@ class JointPath:
 
     kinematics: Kinematics
     tips: TipPieces
-    piece: NDArray[np.int64]
-    part: Array
+    piece: Integers
+    part: Floats
     range: Bounds
     places: tuple[Place, ...]
 
-    def positions(self, piece: NDArray[np.int64], fraction: ArrayLike) -> Array:
+    def positions(self, piece: Integers, fraction: ArrayLike) -> Floats:
         """Joint positions (n, joints) [mm, deg] at fractions of pieces, angles continuous along the path."""
         fraction, tips = np.asarray(fraction), self.tips
         weights = None if tips.weights is None else tips.weights[piece]

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import csv_rows
 from feedplan.arguments import shown
+from feedplan.arrays import Floats
 from feedplan.errors import InputError
 from feedplan.events import TimedEvents, to_json
 from feedplan.outputs import Add, Header
@@ -47,7 +48,7 @@ def row_writer(
     file: FilePath,
     kind: str,
     header: Header,
-    values_of: Callable[[SetpointChunk], NDArray[np.float64]],
+    values_of: Callable[[SetpointChunk], Floats],
     names: str = "",
     separator: bytes = b",",
     extra: dict[str, Any] | None = None,
@@ -61,7 +62,7 @@ def row_writer(
         stream.write(_comment(HEADER, {"kind": kind, **header.about(), **(extra or {})}))
         stream.write(names.encode())
 
-        def write(values: NDArray[np.float64], lines: NDArray[np.int32]) -> None:
+        def write(values: Floats, lines: NDArray[np.int32]) -> None:
             if len(lines):
                 rows = np.ascontiguousarray(values, np.float64), np.ascontiguousarray(lines, np.int32)
                 stream.write(csv_rows(*rows).replace(b",", separator))
@@ -89,7 +90,7 @@ class Rows:
 
     header: dict[str, Any] = field(default_factory=dict)
     names: str = ""
-    table: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    table: Floats = field(default_factory=lambda: np.empty((0, 0)))
     events: TimedEvents = field(default_factory=TimedEvents.none)
 
     def of_header(self, name: str, kind: type, file: FilePath) -> Any:
@@ -135,7 +136,7 @@ def read_rows(
     Raises InputError with file, line and what is wrong.
     """
     rows, size = Rows(), max(file.stat().st_size, 1)
-    parts: list[NDArray[np.float64]] = []
+    parts: list[Floats] = []
     comments: list[str] = []
     done, read, width, waits_for_names = 0, 0, 0, has_names
     try:
@@ -187,9 +188,7 @@ def _named(name: str, comments: list[str], file: FilePath) -> Iterator[Any]:
                 raise InputError(f"{file}: the comment {begin}… is not JSON ({error}): plan again") from None
 
 
-def _table(
-    numbered: list[tuple[int, str]], width: int, separator: str | None, file: FilePath
-) -> NDArray[np.float64]:
+def _table(numbered: list[tuple[int, str]], width: int, separator: str | None, file: FilePath) -> Floats:
     """The table (n, width) of lines that are given with their line numbers."""
     lines = [line for _, line in numbered]
     try:

@@ -13,8 +13,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.outputs import QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.outputs._text import read_columns, row_writer
@@ -35,7 +35,7 @@ def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
     return ",".join(["t [s]", *columns, "line"])
 
 
-def values(chunk: SetpointChunk) -> NDArray[np.float64]:
+def values(chunk: SetpointChunk) -> Floats:
     """The columns of a chunk without the source line (n, k)."""
     return np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
 

@@ -14,8 +14,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path as FilePath
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.errors import InputError
 from feedplan.outputs import SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
@@ -37,7 +37,7 @@ def pins(axes: tuple[str, ...]) -> str:
 def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]:
     """Writes the header, then a line for every setpoint. Raises InputError if the last setpoint is early."""
 
-    def positions(chunk: SetpointChunk) -> NDArray[np.float64]:
+    def positions(chunk: SetpointChunk) -> Floats:
         periods = chunk.t[-1:] / header.period
         if (np.abs(periods - np.round(periods)) > _ROUNDING).any():
             raise InputError(

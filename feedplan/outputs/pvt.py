@@ -18,8 +18,8 @@ from contextlib import AbstractContextManager
 from pathlib import Path as FilePath
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
@@ -46,7 +46,7 @@ def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager
     """Writes the header, then a line for every knot."""
     before = 0.0
 
-    def values(chunk: SetpointChunk) -> NDArray[np.float64]:
+    def values(chunk: SetpointChunk) -> Floats:
         nonlocal before
         steps = np.diff(chunk.t, prepend=before)
         before = chunk.t[-1] if len(chunk) else before

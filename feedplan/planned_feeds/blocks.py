@@ -14,6 +14,8 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
+
 _NUMBER = rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)"
 # Brackets, three deep; parameters by number or name; functions.
 _INNER = rb"\[(?:[^\[\]\r\n]|\[[^\[\]\r\n]*\])*\]"
@@ -94,18 +96,18 @@ class Blocks:
     """
 
     content: bytes
-    start: NDArray[np.int64]
+    start: Integers
     exclusion: NDArray[np.uint8]
-    feed_at: NDArray[np.int64]
-    feed: NDArray[np.float64]
-    inverse: NDArray[np.bool_]
-    per_minute: NDArray[np.bool_]
-    voids: NDArray[np.bool_]
-    modes: NDArray[np.int64]
-    absolute: NDArray[np.bool_]
-    absolute_centres: NDArray[np.bool_]
-    inches: NDArray[np.bool_]
-    plain: NDArray[np.bool_]
+    feed_at: Integers
+    feed: Floats
+    inverse: Flags
+    per_minute: Flags
+    voids: Flags
+    modes: Integers
+    absolute: Flags
+    absolute_centres: Flags
+    inches: Flags
+    plain: Flags
     calls_set_feed: bool
 
     def __len__(self) -> int:
@@ -116,7 +118,7 @@ class Blocks:
         return self.content[self.start[index] : self.start[index + 1]]
 
 
-def line_starts(content: bytes) -> NDArray[np.int64]:
+def line_starts(content: bytes) -> Integers:
     """Where lines begin (n + 1,), the last one is the end; lines end with LF, CR LF or CR."""
     data = np.frombuffer(content, dtype=np.uint8)
     ends = data == ord("\n")
@@ -165,7 +167,7 @@ class _Modes:
         self.given.append((line, {**self.now, "plain": not self.beside}))
         return voids
 
-    def column(self, name: str, count: int, first: bool) -> NDArray[np.bool_]:
+    def column(self, name: str, count: int, first: bool) -> Flags:
         """A mode on each line (count,)."""
         column = np.full(count, first)
         for k, (line, given) in enumerate(self.given):
@@ -263,7 +265,7 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
     )
 
 
-def _tokens(content: bytes, start: NDArray[np.int64]) -> Iterator[tuple[re.Match[bytes], int]]:
+def _tokens(content: bytes, start: Integers) -> Iterator[tuple[re.Match[bytes], int]]:
     """The tokens of a text, each with its line by index; a part at a time, as a text may have millions."""
     found = _TOKEN.finditer(content)
     while tokens := list(islice(found, _AT_ONCE)):
@@ -271,7 +273,7 @@ def _tokens(content: bytes, start: NDArray[np.int64]) -> Iterator[tuple[re.Match
         yield from zip(tokens, at.tolist(), strict=True)
 
 
-def _follow_threads(content: bytes, start: NDArray[np.int64], exclusion: NDArray[np.uint8]) -> None:
+def _follow_threads(content: bytes, start: Integers, exclusion: NDArray[np.uint8]) -> None:
     """Marks lines after a thread as threads too, until another motion code."""
     threading = False
     for line in range(len(exclusion)):

@@ -12,16 +12,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.errors import InputError
 from feedplan.machine.machine import Machine
 from feedplan.planned_feeds.dialects import DialectName
 from feedplan.planned_feeds.number import place_text
 from feedplan.program.events import MESSAGE, Events
 from feedplan.program.program import PathControl, Program
-
-Array = NDArray[np.float64]
 
 _HEADER = b"G21 G90 G17 G94 G40 G49 G80 G54"
 _PLANES = {2: b"G17", 1: b"G18", 0: b"G19"}
@@ -48,9 +46,7 @@ class _Blocks:
         return word
 
 
-def expanded(
-    program: Program, machine: Machine | None, dialect: DialectName
-) -> tuple[bytes, NDArray[np.int64]]:
+def expanded(program: Program, machine: Machine | None, dialect: DialectName) -> tuple[bytes, Integers]:
     """The program as plain blocks, and the move of each block that moves (k,).
 
     Raises InputError for the tool's tip (G43.4, G43.5), and for splines that the dialect lacks.
@@ -101,7 +97,7 @@ def expanded(
     return b"\n".join(out.lines) + b"\n", np.array(of, dtype=np.int64)
 
 
-def _zero(program: Program, machine: Machine | None) -> Array:
+def _zero(program: Program, machine: Machine | None) -> Floats:
     """G54 of the machine file in the program's axes (axes,)."""
     offsets = dict(machine.offsets).get("G54") if machine is not None else None
     if machine is None or offsets is None:
@@ -120,7 +116,7 @@ def _control(program: Program, m: int) -> bytes:
     return b" ".join(words)
 
 
-def _arc(out: _Blocks, program: Program, m: int, row: int, start: Array) -> list[bytes]:
+def _arc(out: _Blocks, program: Program, m: int, row: int, start: Floats) -> list[bytes]:
     """Plane, code, centre and turns of an arc."""
     normal, angle = int(program.arc_normal[row]), float(program.arc_angle[row])
     words = [out.changed("plane", _PLANES[normal]), out.changed("motion", b"G2" if angle < 0.0 else b"G3")]
@@ -132,7 +128,7 @@ def _arc(out: _Blocks, program: Program, m: int, row: int, start: Array) -> list
     return words if turns <= 1 else [*words, b"P%d" % turns]
 
 
-def _spline(out: _Blocks, program: Program, row: int, zero: Array, dialect: DialectName, feed: bytes) -> int:
+def _spline(out: _Blocks, program: Program, row: int, zero: Floats, dialect: DialectName, feed: bytes) -> int:
     """Writes the pieces of a spline; returns how many."""
     curve = program.splines
     assert curve is not None
@@ -165,7 +161,7 @@ def _spline(out: _Blocks, program: Program, row: int, zero: Array, dialect: Dial
     return int(last - first)
 
 
-def _g52(out: _Blocks, points: Array, weights: Array, axes: tuple[str, ...], feed: bytes) -> None:
+def _g52(out: _Blocks, points: Floats, weights: Floats, axes: tuple[str, ...], feed: bytes) -> None:
     """A rational Bézier curve is a NURBS whose order is the number of its points; the first one is where the
     tool is, with the weight 1."""
     out.add(out.changed("plane", b"G17"))
@@ -180,7 +176,7 @@ def _g52(out: _Blocks, points: Array, weights: Array, axes: tuple[str, ...], fee
 
 
 def _g62(
-    out: _Blocks, points: Array, weights: Array, axes: tuple[str, ...], moved: list[int], feed: bytes
+    out: _Blocks, points: Floats, weights: Floats, axes: tuple[str, ...], moved: list[int], feed: bytes
 ) -> None:
     """G6.2: the order P, a knot K and a weight R a point, and the last knots in blocks of their own."""
     count = len(points)

@@ -14,15 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.geometry.feed_groups import GROUPS
 from feedplan.planned_feeds.blocks import REASONS, Blocks, Exclusion
 from feedplan.planned_feeds.number import FEED_ROUNDING, exact_text, feed_texts, rounded_down
 from feedplan.program.program import Program
 from feedplan.units import MM_PER_INCH, SECONDS_PER_MINUTE
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 UNKNOWN_FEED = "the F in force, by G93 or G95, is computed, or set where lines run more than once"
 
@@ -35,9 +32,9 @@ class Changes:
     program and `after` (k,) the new F, in the program's units.
     """
 
-    line: Indices
-    before: Array
-    after: Array
+    line: Integers
+    before: Floats
+    after: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +59,13 @@ class LineSpeeds:
     over the programmed `feed` (k,) [mm/s, deg/s], NaN where the line has no one feed or no plan; `turns` (k,)
     whether that is in deg/s of rotary axes."""
 
-    line: Indices
-    ratio: Array
-    feed: Array
+    line: Integers
+    ratio: Floats
+    feed: Floats
     turns: Flags
 
 
-def line_speeds(program: Program, greatest: Array, group: Indices) -> LineSpeeds:
+def line_speeds(program: Program, greatest: Floats, group: Integers) -> LineSpeeds:
     """From the greatest planned speed in each move (m,) to that of each line; `group` (m,) is which one it is
     along (`SpeedsAlong`)."""
     ratio = greatest / program.feed
@@ -163,8 +160,8 @@ def planned_feeds(
 
 
 def _programmed_feeds(
-    blocks: Blocks, lines: Indices, exclusion: NDArray[np.uint8], own: Flags
-) -> tuple[Array, Indices]:
+    blocks: Blocks, lines: Integers, exclusion: NDArray[np.uint8], own: Flags
+) -> tuple[Floats, Integers]:
     """The program's F in force on lines (k,), NaN where it is not known, and the line that has it (k,)."""
     number = blocks.feed[lines]
     own = own & (exclusion != Exclusion.DELETED)

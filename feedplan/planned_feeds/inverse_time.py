@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.errors import InputError
 from feedplan.planned_feeds.blocks import REASONS, Blocks, Exclusion
 from feedplan.planned_feeds.feeds import Changes, Feeds
@@ -20,8 +21,6 @@ from feedplan.planned_feeds.number import feed_texts, rounded_down
 from feedplan.planned_feeds.parts import Motion, Parts, motions
 from feedplan.program.program import MoveKind, Program
 from feedplan.units import mm_per_min
-
-Array = NDArray[np.float64]
 
 _REMEDY = "leave out --inverse-time, or give --expand"
 # Lines that move nothing also need an F if they have words of axes beside codes of motion only.
@@ -34,7 +33,7 @@ def inverse_feeds(
     blocks: Blocks,
     program: Program,
     exclusion: NDArray[np.uint8],
-    greatest: Array,
+    greatest: Floats,
     parts: Mapping[int, Parts],
     point: bool = False,
 ) -> Feeds:
@@ -102,7 +101,7 @@ def _refused(program: Program, line: int, why: str) -> InputError:
     return InputError(f"{place}: {why}: inverse time (G93) is for plain moves: {_REMEDY}")
 
 
-def _idle(blocks: Blocks, counts: NDArray[np.int64]) -> NDArray[np.int64]:
+def _idle(blocks: Blocks, counts: Integers) -> Integers:
     """Lines whose moves have no length, or that do not run: they need an F as well."""
     found = []
     for line in np.flatnonzero((counts == 0) & (blocks.feed_at[:, 0] < 0)).tolist():

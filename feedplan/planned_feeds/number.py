@@ -5,9 +5,8 @@ from __future__ import annotations
 from decimal import ROUND_HALF_EVEN, Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from feedplan.arrays import Floats
 
 # Significant digits of an F word: it is below the planned speed by less than 1e-4 of it.
 FEED_DIGITS = 5
@@ -17,13 +16,13 @@ FEED_ROUNDING = 10.0 ** (1 - FEED_DIGITS)
 PLACE_DECIMALS = 12
 
 
-def rounded_down(feeds: Array) -> Array:
+def rounded_down(feeds: Floats) -> Floats:
     """Feeds (k,), all positive, rounded down to FEED_DIGITS digits."""
     scale = 10.0 ** (FEED_DIGITS - 1 - np.floor(np.log10(feeds)))
     return np.floor(feeds * scale) / scale
 
 
-def feed_texts(feeds: Array, point: bool = False) -> list[bytes]:
+def feed_texts(feeds: Floats, point: bool = False) -> list[bytes]:
     """Rounded feeds (k,) as text; `point`: always with a decimal point."""
     return [_feed_text(feed, point) for feed in feeds.tolist()]
 

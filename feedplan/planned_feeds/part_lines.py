@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.planned_feeds.number import place_text
 from feedplan.planned_feeds.parts import Parts
 from feedplan.planned_feeds.text import blank_of, code_end, line_end
 from feedplan.units import MM_PER_INCH
-
-Array = NDArray[np.float64]
 
 _WORD = re.compile(rb"([A-Za-z])([ \t]*)([-+]?[ \t]*(?:\d+\.?\d*|\.\d+))")
 _REST = re.compile(rb"[ \t]*(?:\([^()\r\n]*\))?")
@@ -82,7 +80,7 @@ def part_lines(
     words: Sequence[Word],
     sense: Sense,
     axes: Sequence[str],
-    start: Array,
+    start: Floats,
     parts: Parts,
     centre: dict[str, float] | None,
     texts: Sequence[bytes | None],
@@ -122,7 +120,7 @@ def part_lines(
 
 
 def _end(
-    word: Word, sense: Sense, axes: Sequence[str], ends: Array, k: int, summed: dict[bytes, Decimal]
+    word: Word, sense: Sense, axes: Sequence[str], ends: Floats, k: int, summed: dict[bytes, Decimal]
 ) -> bytes:
     """The number of an axis in part k; increments add up to the program's exactly."""
     column, last = axes.index(word.letter.decode()), len(ends) - 1

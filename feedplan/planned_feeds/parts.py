@@ -13,15 +13,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_at
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # The least time of a part in servo periods: a control needs time for each block.
 _LEAST_PERIODS = 10
@@ -36,9 +33,9 @@ class Parts:
     """Parts of a move: `ends` (k, axes) [mm, deg] in the program's axes, the last one is the move's own;
     `shares` (k,) of the move up to each end; `speed` (k,) the greatest planned one in each [mm/s, deg/s]."""
 
-    ends: Array
-    shares: Array
-    speed: Array
+    ends: Floats
+    shares: Floats
+    speed: Floats
 
     def __len__(self) -> int:
         return len(self.ends)
@@ -49,7 +46,7 @@ def parts_of(
     profile: SpeedProfile,
     program: Program,
     along: SpeedsAlong,
-    candidates: Indices,
+    candidates: Integers,
     step: float,
 ) -> dict[int, Parts]:
     """The parts of those `candidates` (moves) whose planned speed varies by more than `step` [mm/s]."""
@@ -91,7 +88,7 @@ def parts_of(
     return found
 
 
-def _cuts(speed: Array, time: Array, free: NDArray[np.bool_], step: float, least: float) -> list[int]:
+def _cuts(speed: Floats, time: Floats, free: Flags, step: float, least: float) -> list[int]:
     """Indices of samples at which to cut: the speed varies by at most a step, and parts take `least` [s]."""
     cuts: list[int] = []
     values, clock, may = speed.tolist(), time.tolist(), free.tolist()
@@ -109,7 +106,7 @@ def _cuts(speed: Array, time: Array, free: NDArray[np.bool_], step: float, least
 
 def _samples(
     problem: Problem, profile: SpeedProfile, along: SpeedsAlong, moves: list[int], step: float
-) -> list[tuple[Array, Array, Array, NDArray[np.bool_]]]:
+) -> list[tuple[Floats, Floats, Floats, Flags]]:
     """Samples of each move in order: points, speeds, times, and whether the path follows it alone there."""
     pieces, parameters, sizes = [], [], []
     for m in moves:
@@ -147,7 +144,7 @@ def motions(program: Program) -> Callable[[int], Motion]:
 class Motion:
     """A line or an arc of a program: positions as a function of the share of it that is done."""
 
-    def __init__(self, program: Program, move: int, start: Array, arc: int | None) -> None:
+    def __init__(self, program: Program, move: int, start: Floats, arc: int | None) -> None:
         self.start, self._way = start, program.target[move] - start
         self.turn, self.plane, self.centre = 0.0, [], np.empty(0)
         if arc is None:
@@ -162,7 +159,7 @@ class Motion:
         self._angle = math.atan2(spoke[1], spoke[0])
         self._radii = math.hypot(*spoke), math.hypot(*last)
 
-    def at(self, share: float) -> Array:
+    def at(self, share: float) -> Floats:
         """The place (axes,) where that share is done."""
         place = self.start + share * self._way
         if self.turn:
@@ -171,7 +168,7 @@ class Motion:
             place[self.plane] = self.centre + radius * np.array([math.cos(angle), math.sin(angle)])
         return np.asarray(place)
 
-    def shares(self, points: Array) -> Array:
+    def shares(self, points: Floats) -> Floats:
         """The shares (n,) that are nearest to places (n, axes) in the order of the motion."""
         if not self.turn:
             return np.asarray((points - self.start) @ self._way / (self._way @ self._way))

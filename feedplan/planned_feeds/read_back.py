@@ -8,19 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.errors import FeedplanError, ProgramError
 from feedplan.planned_feeds.number import FEED_ROUNDING
 from feedplan.planned_feeds.parts import Parts
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 
-Array = NDArray[np.float64]
-
 # The greatest difference of coordinates where lines are split [mm, deg].
 SAME = 1e-9
 
 
-def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], feed: Array) -> None:
+def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], feed: Floats) -> None:
     """Raises ProgramError unless the text `content`, read as `program` was, is the same moves at these feeds.
 
     `parts` are those of moves that were split; `feed` (m,) [mm/s, deg/s] is what each move of `program` asks

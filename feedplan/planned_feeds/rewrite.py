@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.arguments import file_path, flag, number, one_of, positive, refuse
+from feedplan.arrays import Floats, Integers
 from feedplan.errors import InputError
 from feedplan.planned_feeds.blocks import Blocks, Exclusion, blocks_of
 from feedplan.planned_feeds.dialects import DIALECTS, DialectName, lacks, writes_points
@@ -29,8 +30,6 @@ from feedplan.program.program import MoveKind, PathControl, Program
 from feedplan.program.read import read_program
 from feedplan.program.source import MAX_BYTES, content_of
 from feedplan.units import counted, duration_text
-
-Array = NDArray[np.float64]
 
 # Lines of a summary that are shown one by one.
 _SHOWN = 20
@@ -254,7 +253,7 @@ def _expanded(
     return content, again, taken
 
 
-def _curved(program: Program) -> Array:
+def _curved(program: Program) -> Floats:
     """The control points (k, axes) of the curved pieces of splines."""
     if program.splines is None:
         return np.empty((0, len(program.axes)))
@@ -262,7 +261,7 @@ def _curved(program: Program) -> Array:
     return program.splines.control_points[np.repeat(counts > 2, counts)]
 
 
-def _candidates(blocks: Blocks, program: Program, exclusion: NDArray[np.uint8]) -> NDArray[np.int64]:
+def _candidates(blocks: Blocks, program: Program, exclusion: NDArray[np.uint8]) -> Integers:
     """Moves that may be split: lines and arcs at a feed, each alone in a line that runs once."""
     line = program.line.astype(np.int64) - 1
     alone = np.bincount(line, minlength=len(blocks))[line] == 1
@@ -311,7 +310,7 @@ def _split(
     return replaced
 
 
-def _most(blocks: Blocks, program: Program, feeds: Feeds, speeds: LineSpeeds) -> Array:
+def _most(blocks: Blocks, program: Program, feeds: Feeds, speeds: LineSpeeds) -> Floats:
     """The greatest feed that each move may ask for (m,): that of the plan in its line, else its own."""
     ratio = np.ones(len(blocks))
     changed = feeds.changes.line - 1

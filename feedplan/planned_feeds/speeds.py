@@ -12,16 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.event_places import nearest
 from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Columns of a program that are the direction of the tool.
 DIRECTION = ("I", "J", "K")
@@ -36,18 +33,18 @@ class SpeedsAlong:
     `first` > `last` where no piece follows it. `group` (m,) is which of the three its feed counts along, −1
     where it moves nothing."""
 
-    piece: Indices
-    u: Array
-    speed: Array
-    first: Indices
-    last: Indices
-    group: Indices
+    piece: Integers
+    u: Floats
+    speed: Floats
+    first: Integers
+    last: Integers
+    group: Integers
 
-    def of(self, move: int) -> Array:
+    def of(self, move: int) -> Floats:
         """The speeds in a move."""
         return self.speed[self.first[move] : self.last[move] + 1, self.group[move]]
 
-    def greatest(self) -> Array:
+    def greatest(self) -> Floats:
         """The greatest planned speed in each move (m,); NaN where nothing follows it."""
         greatest = np.full(len(self.first), np.nan)
         own = np.flatnonzero((self.first <= self.last) & (self.group >= 0))
@@ -85,7 +82,9 @@ def speeds_along(problem: Problem, profile: SpeedProfile, program: Program) -> S
     )
 
 
-def _ends_of_moves(problem: Problem, program: Program) -> tuple[tuple[Indices, Array], tuple[Indices, Array]]:
+def _ends_of_moves(
+    problem: Problem, program: Program
+) -> tuple[tuple[Integers, Floats], tuple[Integers, Floats]]:
     """Where the path of each move begins and ends: pieces (m,) and parameters (m,)."""
     path = problem.path
     first, last = np.maximum.accumulate(path.move[:, 0]), np.maximum.accumulate(path.move[:, 1])
@@ -108,7 +107,7 @@ def _ends_of_moves(problem: Problem, program: Program) -> tuple[tuple[Indices, A
     return (begin, u_begin), (end, np.where((begin == end) & (u_end < u_begin), u_begin, u_end))
 
 
-def speeds_at(problem: Problem, profile: SpeedProfile, piece: Indices, u: Array) -> tuple[Array, Array]:
+def speeds_at(problem: Problem, profile: SpeedProfile, piece: Integers, u: Floats) -> tuple[Floats, Floats]:
     """The planned speed along each group of axes (k, 3) at places (k,), and when the tool is there (k,) [s].
 
     Speeds are 0 where the curve stands still."""

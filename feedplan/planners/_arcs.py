@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
-
-Array = NDArray[np.float64]
 
 # The joint of an arc of constant joint acceleration has a q' that varies by at most this factor.
 _VARIES = 1e3
@@ -28,15 +27,15 @@ class Arcs:
 
     kind: NDArray[np.uint8]
     axis: NDArray[np.uint8]
-    value: Array
-    ends: Array
-    duration: Array
-    acceleration: Array
-    speed: Array
-    used: Array
+    value: Floats
+    ends: Floats
+    duration: Floats
+    acceleration: Floats
+    speed: Floats
+    used: Floats
 
     @property
-    def worst(self) -> Array:
+    def worst(self) -> Floats:
         """By how much p must fall to keep every limit of a cell (n,)."""
         return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
 
@@ -59,7 +58,7 @@ class Arcs:
         )
 
 
-def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
+def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs:
     """The arcs through p in the stations (n + 1,): p linear in u, or one joint's acceleration constant.
 
     Where `by_axis` allows it, of all such arcs of a cell the one that uses the limits least is taken.
@@ -108,7 +107,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
     )
 
 
-def _peak(values: Array) -> Array:
+def _peak(values: Floats) -> Floats:
     """The greatest values in the cells (n, …), from values at the places (places, n, …).
 
     It is that of parabolas through even places, and an estimate of the error between the places.
@@ -124,23 +123,23 @@ def _peak(values: Array) -> Array:
 class _Motion:
     """p and s of arcs at the places of their cells (places, n)."""
 
-    p: Array
-    s: Array
+    p: Floats
+    s: Floats
 
-    def acceleration(self, mesh: Mesh) -> Array:
+    def acceleration(self, mesh: Mesh) -> Floats:
         """The acceleration of every joint (places, n, joints)."""
         return mesh.slope * self.s[..., None] + mesh.bend * self.p[..., None]
 
-    def speed(self, mesh: Mesh) -> Array:
+    def speed(self, mesh: Mesh) -> Floats:
         """The share of every limit of a speed, squared (places, n, limits)."""
         return np.asarray(mesh.speed * self.p[..., None])
 
-    def worst(self, problem: Problem, mesh: Mesh) -> Array:
+    def worst(self, problem: Problem, mesh: Mesh) -> Floats:
         """The greatest of all at the places (n,)."""
         acceleration = problem.use("acceleration", self.acceleration(mesh)).max(axis=(0, 2))
         return np.asarray(np.maximum(acceleration, self.speed(mesh).max(axis=(0, 2))))
 
-    def where(self, better: NDArray[np.bool_], other: _Motion) -> _Motion:
+    def where(self, better: Flags, other: _Motion) -> _Motion:
         return _Motion(np.where(better, other.p, self.p), np.where(better, other.s, self.s))
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
@@ -15,7 +15,7 @@ INSIDE = 1.5
 HELD = 2e-7
 
 
-def jerk_limits(problem: Problem) -> NDArray[np.float64]:
+def jerk_limits(problem: Problem) -> Floats:
     """The jerk limits (axes,) [mm/s³]; 1 for an axis without one that does not move.
 
     Raises SolverError for an axis that moves without one.
@@ -31,9 +31,7 @@ def jerk_limits(problem: Problem) -> NDArray[np.float64]:
     return limits
 
 
-def lowered_limits(
-    problem: Problem, limits: NDArray[np.float64], profile: SpeedProfile
-) -> NDArray[np.float64] | None:
+def lowered_limits(problem: Problem, limits: Floats, profile: SpeedProfile) -> Floats | None:
     """`limits` of jerk less the error of jerk of the joints' interpolants (`Problem.joints`) on a profile.
 
     None where that error is below the share `HELD` of the limits. The interpolants have exact accelerations;

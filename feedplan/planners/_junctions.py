@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from feedplan.planners._segments import Array, both_ways, in_direction
+from feedplan.arrays import Floats
+from feedplan.planners._segments import both_ways, in_direction
 
 # The limit of speed between short lines: none, half of each line (Klipper), the arc that they approximate
 # (Marlin).
@@ -31,7 +32,7 @@ class Junctions:
     short_lines: ShortLines = "free"
     acceleration: float = math.inf
 
-    def square(self, into: Array, out: Array, before: Array, after: Array, limits: Array) -> Array:
+    def square(self, into: Floats, out: Floats, before: Floats, after: Floats, limits: Floats) -> Floats:
         """v² (m,) [mm²/s²] from lines along `into` to lines along `out`, unit vectors (m, axes).
 
         `before` and `after` (m,) are the lengths of the lines [mm], `limits` (2, axes) the accelerations
@@ -50,7 +51,7 @@ class Junctions:
             square = np.minimum(square, self._between_short_lines(sine, along, across, before, after))
         return np.where(size > 0.0, square, np.inf)
 
-    def _by_rule(self, sine: Array, along: Array, across: Array, into: Array, out: Array) -> Array:
+    def _by_rule(self, sine: Floats, along: Floats, across: Floats, into: Floats, out: Floats) -> Floats:
         if self.axis_jumps is not None:
             # An axis that turns back counts by the greater of its speeds.
             same = into * out > 0.0
@@ -65,8 +66,8 @@ class Junctions:
         return np.asarray(factor * s * (1.0 + s) / sine**2)
 
     def _between_short_lines(
-        self, sine: Array, along: Array, across: Array, before: Array, after: Array
-    ) -> Array:
+        self, sine: Floats, along: Floats, across: Floats, before: Floats, after: Floats
+    ) -> Floats:
         if self.short_lines == "half":
             return np.asarray(0.5 * along * np.minimum(before, after) * np.sqrt(1.0 - sine**2) / sine)
         if self.short_lines == "arc":

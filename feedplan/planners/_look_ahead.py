@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import look_ahead as native_look_ahead
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square, speed_square
 from feedplan.errors import InfeasibleError
 from feedplan.planners._queue import Queue
-from feedplan.planners._segments import Array, Rule, Segments, segments
+from feedplan.planners._segments import Rule, Segments, segments
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
 # Parts of a segment shorter than this many roundings of its parameter and of v² are left out.
@@ -36,9 +36,9 @@ _SLOWS = np.array([0, 0, 0, 1, 0])
 
 def look_ahead(
     problem: Problem,
-    corner_speed: Array,
+    corner_speed: Floats,
     rule: Rule,
-    hold: NDArray[np.float64] | None = None,
+    hold: Floats | None = None,
     queue: Queue | None = None,
 ) -> SpeedProfile:
     """The fastest trapezoids.
@@ -65,8 +65,8 @@ def look_ahead(
 
 
 def _speed_at_ends(
-    problem: Problem, parts: Segments, corner_speed: Array, hold: NDArray[np.float64] | None
-) -> tuple[Array, Array]:
+    problem: Problem, parts: Segments, corner_speed: Floats, hold: Floats | None
+) -> tuple[Floats, Floats]:
     """Greatest speeds at the ends of the segments, and how long each is held (m + 1,)."""
     first = np.searchsorted(parts.piece, np.arange(len(problem.path) + 1))
     limit = np.concatenate([parts.speed, [np.inf]])
@@ -91,7 +91,7 @@ def _speed_at_ends(
     return limit, held
 
 
-def _check_ends(problem: Problem, speed: Array) -> None:
+def _check_ends(problem: Problem, speed: Floats) -> None:
     for name, place, wanted, reached in (
         ("starts", 0, problem.start_speed, float(speed[0])),
         ("ends", -1, problem.end_speed, float(speed[-1])),
@@ -107,7 +107,7 @@ def _check_ends(problem: Problem, speed: Array) -> None:
             )
 
 
-def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> SpeedProfile:
+def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> SpeedProfile:
     """The arcs between the speeds at the ends of the segments."""
     whole = parts.u1 - parts.u0
     start_sq, end_sq = speed[:-1] ** 2, speed[1:] ** 2
@@ -178,7 +178,7 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     )
 
 
-def _counted(problem: Problem, piece: NDArray[np.int64], u: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _counted(problem: Problem, piece: Integers, u: Floats) -> tuple[Floats, Flags]:
     """The square of the speed that the feed limits over that in all axes (n,), and where they differ."""
     if problem.feed_share is None:
         return np.ones(len(piece)), np.zeros(len(piece), dtype=np.bool_)
@@ -188,8 +188,8 @@ def _counted(problem: Problem, piece: NDArray[np.int64], u: Array) -> tuple[Arra
 
 
 def _weighted_length(
-    problem: Problem, piece: NDArray[np.int64], u0: Array, u1: Array, from_sq: Array, to_sq: Array
-) -> Array:
+    problem: Problem, piece: Integers, u0: Floats, u1: Floats, from_sq: Floats, to_sq: Floats
+) -> Floats:
     """The mean of |C'| over v, times u1 − u0: v grows evenly with time where |C'| is constant."""
     start, end = np.sqrt(from_sq), np.sqrt(to_sq)
     total = np.zeros(len(piece))
@@ -202,8 +202,8 @@ def _weighted_length(
 
 
 def shared_acceleration(
-    tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
-) -> tuple[Array, Array]:
+    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
+) -> tuple[Floats, Floats]:
     """Half along the path and √3/2 across it of the acceleration that every direction in their plane allows.
 
     No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a

@@ -15,13 +15,10 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
 
 # Places of a cell in [0, 1]: both ends, and the extremes of the Legendre polynomial between them.
 _DEGREE = 10
@@ -33,7 +30,7 @@ PLACES = np.concatenate(
 _CUSP = 1e-9
 
 
-def _integration() -> Array:
+def _integration() -> Floats:
     """The matrix from values at `PLACES` to integrals from 0 to each of them, exact to the tenth degree."""
     powers = np.arange(_DEGREE + 1)
     values = PLACES[:, None] ** powers
@@ -79,22 +76,22 @@ class Mesh:
     first station). `fixed` holds p at both ends of the subrun where it is given.
     """
 
-    piece: Numbers
-    ends: Array
-    width: Array
-    slope: Array
-    bend: Array
-    speed: Array
-    way: Array
-    gain: Array
-    cap: Array
+    piece: Integers
+    ends: Floats
+    width: Floats
+    slope: Floats
+    bend: Floats
+    speed: Floats
+    way: Floats
+    gain: Floats
+    cap: Floats
     fixed: tuple[float | None, float | None]
 
     def __len__(self) -> int:
         return len(self.piece)
 
     @property
-    def turn(self) -> Array:
+    def turn(self) -> Floats:
         """The change of q' within each cell over its greatest size there (n,)."""
         change = np.linalg.norm(self.slope[-1] - self.slope[0], axis=1)
         return np.asarray(change / np.linalg.norm(self.slope, axis=2).max(axis=0))
@@ -131,7 +128,7 @@ def subruns(problem: Problem) -> Iterator[list[Subrun]]:
         yield result
 
 
-def _norms(*vectors: Array) -> list[Array]:
+def _norms(*vectors: Floats) -> list[Floats]:
     return [np.linalg.norm(vector, axis=1) for vector in vectors]
 
 
@@ -139,14 +136,14 @@ def _norms(*vectors: Array) -> list[Array]:
 class Cuts:
     """The cells of a subrun: `piece` of each (n,), and the shares of it where the cell begins and ends."""
 
-    piece: Numbers
-    lower: Array
-    upper: Array
+    piece: Integers
+    lower: Floats
+    upper: Floats
 
     def __len__(self) -> int:
         return len(self.piece)
 
-    def bisected(self, marked: NDArray[np.bool_]) -> Cuts:
+    def bisected(self, marked: Flags) -> Cuts:
         """The same with the `marked` cells (n,) cut in two."""
         count = 1 + marked.astype(np.int64)
         lower, upper = np.repeat(self.lower, count), np.repeat(self.upper, count)
@@ -228,13 +225,13 @@ def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | No
     )
 
 
-def _derivatives(problem: Problem, piece: Numbers, u: Array) -> tuple[Array, Array]:
+def _derivatives(problem: Problem, piece: Integers, u: Floats) -> tuple[Floats, Floats]:
     """q' and q'' (places, n, joints)."""
     values = problem.derivatives(np.tile(piece, len(u)), np.ascontiguousarray(u).ravel(), 2)
     return values[1].reshape(*u.shape, -1), values[2].reshape(*u.shape, -1)
 
 
-def _speed_square(problem: Problem, piece: Numbers, u: Array, slope: Array) -> Array:
+def _speed_square(problem: Problem, piece: Integers, u: Floats, slope: Floats) -> Floats:
     """The square of the speed that feed and junctions are about, over p (places, n)."""
     tip = problem.tip_speed
     if tip is None:
@@ -243,7 +240,7 @@ def _speed_square(problem: Problem, piece: Numbers, u: Array, slope: Array) -> A
     return tip.evaluate(np.tile(piece, len(u)), t.ravel()).reshape(u.shape)
 
 
-def _chord_speed_square(problem: Problem, piece: Numbers, u: Array) -> Array:
+def _chord_speed_square(problem: Problem, piece: Integers, u: Floats) -> Floats:
     """(2/T)²·(2ρδ − δ²) where ρ is the radius of curvature of the tool's path (places, n), at least δ."""
     if not np.isfinite(problem.chord_tolerance):
         return np.full(u.shape, np.inf)

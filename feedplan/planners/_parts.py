@@ -13,16 +13,14 @@ from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError
 from feedplan._solvers import Problem as NativeProblem
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.lazy import cached_property
 from feedplan.profile import SpeedProfile, joined_runs
 from feedplan.progress import Listener
-
-Floats = NDArray[np.float64]
 
 
 class Elsewhere(Protocol):

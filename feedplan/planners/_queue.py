@@ -12,11 +12,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import look_ahead as native_look_ahead
 from feedplan.arguments import number, positive
-from feedplan.planners._segments import Array, Segments
+from feedplan.arrays import Floats, Integers
+from feedplan.planners._segments import Segments
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Chords:
     # The largest turn from chord to chord is a right angle.
     _HALF_TURN = 0.25 * math.pi
 
-    def half_turn(self, radius: Array) -> Array:
+    def half_turn(self, radius: Floats) -> Floats:
         """Half the angle that a chord takes of a circle of `radius` (m,) [mm]."""
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.tolerance is not None:
@@ -38,7 +38,7 @@ class Chords:
                 half = 0.5 * float(self.length or 0.0) / radius
         return np.minimum(half, self._HALF_TURN)
 
-    def count(self, parts: Segments) -> Array:
+    def count(self, parts: Segments) -> Floats:
         """How many chords each part has (m,), 1 on a line."""
         bent = np.isfinite(parts.radius)
         each = np.full(len(parts), np.inf)
@@ -63,9 +63,9 @@ class Queue:
     acceleration: float = math.inf
     least_time: float = 0.0
     cruise: float = 0.0
-    part: Array | None = None
+    part: Floats | None = None
 
-    def limited(self, parts: Segments, block: NDArray[np.int64]) -> Segments:
+    def limited(self, parts: Segments, block: Integers) -> Segments:
         """The segments with the speeds that `least_time` and the accelerations that `part` leave; `block`
         (pieces,) are a piece's own."""
         if self.part is not None:
@@ -77,7 +77,7 @@ class Queue:
         length = np.bincount(own, parts.length)[own]
         return replace(parts, speed=np.minimum(parts.speed, length / self.least_time))
 
-    def known(self, parts: Segments, at_end: Array) -> tuple[Segments, Array]:
+    def known(self, parts: Segments, at_end: Floats) -> tuple[Segments, Floats]:
         """Segments and speeds at their ends (m + 1,) [mm/s] that let the tool stop in what is known."""
         gain = parts.slope * (parts.u1 - parts.u0)
         braking = gain[1]
@@ -94,7 +94,7 @@ class Queue:
             at_end[1:] = np.minimum(at_end[1:], parts.speed)
         return parts, at_end
 
-    def _blocks(self, parts: Segments) -> Array:
+    def _blocks(self, parts: Segments) -> Floats:
         """The number of blocks of each part (m,): whole numbers for whole pieces."""
         share = 1.0 / np.bincount(parts.piece)[parts.piece]
         if self.chords is None:
@@ -106,7 +106,7 @@ class Queue:
             scaled = count * (wanted / whole)[parts.piece]
         return np.where((whole > 0.0)[parts.piece], scaled, share)
 
-    def _smoothed(self, gain: Array, at_end: Array) -> Array:
+    def _smoothed(self, gain: Floats, at_end: Floats) -> Floats:
         """The greatest speed of each part (m,) where less acceleration leaves room for an even speed.
 
         Klipper (`toolhead.py`): with accelerations of (1 − cruise) of the real ones, each hill between two

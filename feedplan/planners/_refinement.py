@@ -18,17 +18,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.arguments import is_whole, number, shown
+from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.planners._arcs import Arcs, arcs_between, profile
 from feedplan.planners._mesh import Cuts, Mesh, Subrun, end_error, even_cuts, mesh, subruns
 from feedplan.planners._transcription import Rows, Transcription, transcribe
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 # The least numbers of cells of the first mesh in a piece, and in a subrun.
 _LEAST, _FIRST = 4, 32
@@ -66,7 +64,7 @@ class Refusal(Exception):  # noqa: N818 (its handler makes the error of it)
 
 
 # From a transcription and a time limit [s] to x in its stations; raises Refusal.
-Solve = Callable[[Transcription, float], Array]
+Solve = Callable[[Transcription, float], Floats]
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ class Method:
 
     name: str
     solve: Solve
-    rows: Callable[[Mesh, Array, NDArray[np.bool_]], Rows]
+    rows: Callable[[Mesh, Floats, Flags], Rows]
     by_axis: bool = True
     feasible: bool = True
     platform: str = ""
@@ -137,9 +135,9 @@ class _Strictness:
     """How much stricter than the limits the rows are: parts of the `acceleration` (n, joints) and of p in the
     stations, `speed` (n + 1,); and which cells are held `at_ends` (n,). `repeated` after the first time."""
 
-    acceleration: Array
-    speed: Array
-    at_ends: NDArray[np.bool_]
+    acceleration: Floats
+    speed: Floats
+    at_ends: Flags
     repeated: bool = False
 
     @classmethod
@@ -157,12 +155,12 @@ class _Strictness:
         return _Strictness(acceleration, speed, self.at_ends | stubborn, repeated=True)
 
     @property
-    def share(self) -> Array:
+    def share(self) -> Floats:
         """The share of the accelerations that is not used (n,)."""
         return np.asarray(1.0 - self.acceleration.min(axis=1))
 
 
-def _excess(used: Array) -> Array:
+def _excess(used: Floats) -> Floats:
     """The factor by which a limit has to be lowered, 1 where it is kept."""
     return np.where(used > 1.0, used * (1.0 + _EXCESS), 1.0)
 
@@ -211,7 +209,7 @@ class _Planner:
                 f"ask for {remedy}, or use bang-bang"
             )
 
-    def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Array]:
+    def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Floats]:
         """The solution on one mesh, and the time (n,) lost by keeping the limits between the stations."""
         grid = mesh(self.problem, self.subrun, cuts)
         moving = any(p is not None and p > 0.0 for p in grid.fixed)
@@ -246,7 +244,7 @@ class _Planner:
         p = self._solve(task) * task.scale
         return arcs_between(self.problem, grid, p, self.method.by_axis), rows
 
-    def _solve(self, transcription: Transcription) -> Array:
+    def _solve(self, transcription: Transcription) -> Floats:
         left = self.deadline - time.monotonic()
         name = self.method.name
         try:
@@ -270,7 +268,7 @@ class _Planner:
         return f"line {int(self.problem.path.line[self.subrun.first])}: "
 
 
-def _greatest(parts: Array) -> NDArray[np.bool_]:
+def _greatest(parts: Floats) -> Flags:
     """The greatest of the parts (n,) that together are the share `_SHARE` of the sum."""
     order = np.argsort(-parts)
     enough = int(np.searchsorted(np.cumsum(parts[order]), _SHARE * parts.sum())) + 1

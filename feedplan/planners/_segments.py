@@ -11,18 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import feed_between
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import SolverError
 from feedplan.profile import NO_AXIS
 
-Array = NDArray[np.float64]
-
 # From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight), the limits of the
 # axes (2, axes) [mm/s²], upward and downward as sizes, the radius of the path (m,) [mm], infinite where it is
 # straight, and the speed that feed and axis velocities allow (m,) [mm/s]: the greatest accelerations along
 # the path, of speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
-Rule = Callable[[Array, Array, Array, Array, Array], tuple[Array, Array]]
+Rule = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 
 # A curved piece is cut into parts. On each the direction, and ln |C'|, change by about this at most.
 STEP = 0.1
@@ -57,16 +56,16 @@ class Segments:
     some digits, and `radius` (m,) [mm] the least, infinite on lines.
     """
 
-    piece: NDArray[np.int64]
-    u0: Array
-    u1: Array
-    rate: Array
-    speed: Array
-    slope: Array
+    piece: Integers
+    u0: Floats
+    u1: Floats
+    rate: Floats
+    speed: Floats
+    slope: Floats
     axis: NDArray[np.uint8]
-    value: Array
-    length: Array
-    radius: Array
+    value: Floats
+    length: Floats
+    radius: Floats
 
     def __len__(self) -> int:
         return len(self.piece)
@@ -99,7 +98,7 @@ def segments(
     return Segments(**{name: column[..., order] for name, column in columns.items()})
 
 
-def is_line(curve: CompositeCurve) -> NDArray[np.bool_]:
+def is_line(curve: CompositeCurve) -> Flags:
     """(n,) which pieces are lines at constant |C'|, as the path builder makes them."""
     control, first = curve.control_points, curve.offsets[:-1]
     edge = np.diff(control, axis=0)
@@ -113,7 +112,7 @@ def is_line(curve: CompositeCurve) -> NDArray[np.bool_]:
     return np.asarray(line & ~curve.rational)
 
 
-def _lines(problem: Problem, piece: NDArray[np.int64], acceleration: float) -> Segments:
+def _lines(problem: Problem, piece: Integers, acceleration: float) -> Segments:
     curve = problem.curve
     way = curve.control_points[curve.offsets[piece + 1] - 1] - curve.control_points[curve.offsets[piece]]
     length = np.linalg.norm(way, axis=1)
@@ -141,7 +140,7 @@ def _lines(problem: Problem, piece: NDArray[np.int64], acceleration: float) -> S
     )
 
 
-def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule, acceleration: float) -> Segments:
+def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float) -> Segments:
     count = _part_counts(problem, pieces)
     piece = np.repeat(pieces, count)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
@@ -184,14 +183,14 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule, acceleratio
     )
 
 
-def in_direction(limits: Array, direction: Array) -> Array:
+def in_direction(limits: Floats, direction: Floats) -> Floats:
     """The greatest multiples (m,) of directions (m, axes) that the limits (2, axes) allow."""
     with np.errstate(divide="ignore"):
         by_axis = np.where(direction < 0.0, limits[1], limits[0]) / np.abs(direction)
     return _least(by_axis)
 
 
-def both_ways(limits: Array, direction: Array) -> Array:
+def both_ways(limits: Floats, direction: Floats) -> Floats:
     """The greatest multiples (2, m) that the limits allow of directions (m, axes), and of their opposites."""
     size, back = np.abs(direction), direction < 0.0
     with np.errstate(divide="ignore"):
@@ -199,12 +198,12 @@ def both_ways(limits: Array, direction: Array) -> Array:
     return np.stack([_least(np.where(back, low, high)), _least(np.where(back, high, low))])
 
 
-def _least(values: Array) -> Array:
+def _least(values: Floats) -> Floats:
     """The least along the last axis, which is short: faster one by one."""
     return reduce(np.minimum, np.moveaxis(values, -1, 0))
 
 
-def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+def _part_counts(problem: Problem, piece: Integers) -> Integers:
     """How many parts each curved piece is cut into."""
     u = problem.curve.width[piece][:, None] * SURVEY
     first = problem.curve.evaluate(np.repeat(piece, len(SURVEY)), u.ravel(), 1)[1]
@@ -218,7 +217,7 @@ def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64
     return np.asarray(np.maximum(np.ceil(np.maximum(turn, change) / STEP), 1.0), dtype=np.int64)
 
 
-def _speed(problem: Problem, piece: NDArray[np.int64], tangent: Array) -> Array:
+def _speed(problem: Problem, piece: Integers, tangent: Floats) -> Floats:
     """The least of feed and what the axis velocities allow in a direction."""
     by_axis = in_direction(problem.limits("velocity"), tangent)
     feed = problem.feed[piece]
@@ -227,7 +226,7 @@ def _speed(problem: Problem, piece: NDArray[np.int64], tangent: Array) -> Array:
     return np.asarray(np.minimum(feed, by_axis))
 
 
-def _chord_speed(problem: Problem, radius: Array) -> Array:
+def _chord_speed(problem: Problem, radius: Floats) -> Floats:
     """(2/T)·√(2ρδ − δ²), below ρ = δ as there: no shorter way can leave its chord by δ."""
     tolerance = problem.chord_tolerance
     if not np.isfinite(tolerance):
@@ -236,7 +235,7 @@ def _chord_speed(problem: Problem, radius: Array) -> Array:
     return np.asarray(2.0 / problem.period * np.sqrt(2.0 * radius * tolerance - tolerance**2))
 
 
-def _over(top: Array, bottom: Array, otherwise: float = np.inf) -> Array:
+def _over(top: Floats, bottom: Floats, otherwise: float = np.inf) -> Floats:
     """top / bottom, `otherwise` where bottom is 0."""
     quotient = np.full(np.broadcast_shapes(top.shape, bottom.shape), otherwise)
     with np.errstate(over="ignore"):
@@ -244,6 +243,6 @@ def _over(top: Array, bottom: Array, otherwise: float = np.inf) -> Array:
     return quotient
 
 
-def _refuse(problem: Problem, pieces: NDArray[np.int64], sentence: str) -> None:
+def _refuse(problem: Problem, pieces: Integers, sentence: str) -> None:
     if len(pieces):
         raise SolverError(f"line {problem.path.line[pieces[0]]}: {sentence}")

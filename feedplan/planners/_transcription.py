@@ -14,13 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.lazy import cached_property
 from feedplan.planners._mesh import Mesh
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
 
 # A joint slower than this share of all joints together has its limits at both ends: its way may be rounding.
 _SLOW = 1e-6
@@ -33,11 +30,11 @@ class Rows:
     `held` (n, joints): the limit of a joint holds at both ends of the cell, which loses an order of accuracy.
     """
 
-    cell: Numbers
-    near: Array
-    far: Array
-    low: Array
-    held: NDArray[np.bool_]
+    cell: Integers
+    near: Floats
+    far: Floats
+    low: Floats
+    held: Flags
 
 
 @dataclass(frozen=True)
@@ -49,12 +46,12 @@ class Transcription:
     `rows` are of x.
     """
 
-    scale: Array
-    most: Array
+    scale: Floats
+    most: Floats
     fixed: tuple[float | None, float | None]
-    width: Array
-    near: Array
-    far: Array
+    width: Floats
+    near: Floats
+    far: Floats
     rows: Rows
 
     @property
@@ -63,28 +60,28 @@ class Transcription:
         return len(self.width)
 
     @cached_property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Flags:
         """The stations whose x the solver finds (n + 1,)."""
         free = np.ones(self.cells + 1, dtype=bool)
         free[[0, -1]] = [x is None for x in self.fixed]
         return free
 
     @cached_property
-    def known(self) -> Array:
+    def known(self) -> Floats:
         """x in the stations where it is given, 0 elsewhere (n + 1,)."""
         known = np.zeros(self.cells + 1)
         for station, x in zip((0, -1), self.fixed, strict=True):
             known[station] = x or 0.0
         return known
 
-    def time(self, x: Array) -> float:
+    def time(self, x: Floats) -> float:
         """The time of a solution [s]."""
         root = np.sqrt(x)
         return float((2.0 * self.width / (self.near * root[:-1] + self.far * root[1:])).sum())
 
 
 def transcribe(
-    mesh: Mesh, rows: Rows, acceleration: Array, share: Array, feasible: bool = True
+    mesh: Mesh, rows: Rows, acceleration: Floats, share: Floats, feasible: bool = True
 ) -> Transcription:
     """The problem on a mesh; `acceleration` (2, joints) are the limits backward and forward as sizes, `share`
     (n + 1,) of the greatest p is allowed in the stations.
@@ -114,7 +111,7 @@ def transcribe(
     )
 
 
-def _reachable(mesh: Mesh, rows: Rows, greatest: Array) -> Array:
+def _reachable(mesh: Mesh, rows: Rows, greatest: Floats) -> Floats:
     """The greatest p in the stations that the rows allow, one pass from each end of the subrun (n + 1,).
 
     A row with coefficients of both signs limits the growth of p from station to station, as near a stop.
@@ -140,7 +137,7 @@ def _reachable(mesh: Mesh, rows: Rows, greatest: Array) -> Array:
     return np.array(p)
 
 
-def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
+def mean_rows(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
     """The mean acceleration of every joint over its way, within ∓`limit` (2, n, joints) [mm/s²].
 
     In the cells `at_ends` (n,), and where a joint does not keep its direction, that at both ends.
@@ -164,9 +161,7 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
     )
 
 
-def end_rows(
-    mesh: Mesh, limit: Array, chosen: NDArray[np.bool_] | None = None, ends: tuple[int, ...] = (0, -1)
-) -> Rows:
+def end_rows(mesh: Mesh, limit: Floats, chosen: Flags | None = None, ends: tuple[int, ...] = (0, -1)) -> Rows:
     """a_k at `ends` of the cells with p linear in between, within ∓`limit` (2, n, joints), of `chosen`
     joints."""
     if chosen is None:
@@ -185,13 +180,13 @@ def end_rows(
     )
 
 
-def _limit_curve(mesh: Mesh, acceleration: Array, place: int) -> Array:
+def _limit_curve(mesh: Mesh, acceleration: Floats, place: int) -> Floats:
     """The greatest p that some acceleration of the parameter leaves within all limits, at one place of the
     cells."""
     bend, tangent = mesh.bend[place], mesh.slope[place]
     best = np.full(len(mesh), np.inf)
 
-    def most(k: int, factor: Array) -> Array:
+    def most(k: int, factor: Floats) -> Floats:
         """The greatest acceleration of a joint times a factor."""
         return np.asarray(np.where(factor < 0.0, acceleration[0, k], acceleration[1, k]) * np.abs(factor))
 

@@ -10,14 +10,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 ACCURACY = 1e-4
 # Tolerance of IPOPT for optimality and for rows, both scaled to about 1.
@@ -43,7 +41,7 @@ def plan(
     return plan_on_meshes(problem, Method("casadi", _solve, mean_rows), accuracy, cells, time_limit)
 
 
-def _solve(task: Transcription, seconds: float) -> Array:
+def _solve(task: Transcription, seconds: float) -> Floats:
     import casadi
 
     free = np.flatnonzero(task.free)

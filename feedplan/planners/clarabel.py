@@ -12,14 +12,12 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 ACCURACY = 1e-4
 # Tolerances of the solver for the time, far below the error of any mesh, and for the rows; in the end p is
@@ -45,7 +43,7 @@ def plan(
     )
 
 
-def _solve(task: Transcription, seconds: float) -> Array:
+def _solve(task: Transcription, seconds: float) -> Floats:
     import clarabel
     from scipy import sparse
 
@@ -74,7 +72,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
     return x
 
 
-def _program(task: Transcription) -> tuple[Any, Array, list[Any], Array]:
+def _program(task: Transcription) -> tuple[Any, Floats, list[Any], Floats]:
     """A z + s = b, s in cones, minimise cost·z, z being x and c in the free stations and d in the cells.
 
     d is counted in parts of 1/(near + far), so that all of z is about 1.

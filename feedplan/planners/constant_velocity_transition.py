@@ -18,8 +18,8 @@ blend arcs.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.constraints.junction import junction_limit
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
@@ -36,6 +36,6 @@ def plan(problem: Problem) -> SpeedProfile:
     return look_ahead(problem, np.minimum(speed, problem.junction_speed), shared_acceleration, hold)
 
 
-def transition_speed(problem: Problem) -> NDArray[np.float64]:
+def transition_speed(problem: Problem) -> Floats:
     """Speed (n + 1,) [mm/s] at the ends of the pieces: 0 between runs, infinite where there is no corner."""
     return junction_limit(problem.path, problem.limits("acceleration").min(axis=0) * problem.period)

@@ -10,10 +10,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, plan_jerk_limited
 from feedplan.arguments import number
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError
 from feedplan.geometry.corners import Corners
@@ -100,7 +100,7 @@ def plan(
 
 def _kept(
     problem: Problem,
-    limits: NDArray[np.float64],
+    limits: Floats,
     resolution: float,
     gap: float,
     proven: float,
@@ -124,7 +124,7 @@ def _kept(
 
 def _planned(
     problem: Problem,
-    limits: NDArray[np.float64],
+    limits: Floats,
     resolution: float,
     gap: float,
     proven: float,
@@ -158,8 +158,8 @@ def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
 
 
 def plan_part(
-    part: Part, limits: NDArray[np.float64], resolution: float, gap: float, proves: bool, progress: Listener
-) -> tuple[tuple[SpeedProfile, NDArray[np.float64]] | None, tuple[Any, ...]]:
+    part: Part, limits: Floats, resolution: float, gap: float, proves: bool, progress: Listener
+) -> tuple[tuple[SpeedProfile, Floats] | None, tuple[Any, ...]]:
     """The profile of a part and the excess of each of its runs, or None and what the fault tells."""
     try:
         native, _, excess, bounds = plan_jerk_limited(part, limits, resolution, gap, proves, None, progress)

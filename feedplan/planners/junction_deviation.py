@@ -27,13 +27,14 @@ from typing import get_args
 import numpy as np
 
 from feedplan.arguments import number, one_of, positive, refuse, whole
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import end_edges, tangent_jumps
 from feedplan.planners._junctions import Junctions, ShortLines
 from feedplan.planners._look_ahead import look_ahead
 from feedplan.planners._queue import Chords, Queue, along_path
-from feedplan.planners._segments import Array, Rule, both_ways, in_direction
+from feedplan.planners._segments import Rule, both_ways, in_direction
 from feedplan.profile import SpeedProfile
 
 CORNERS = Corners.PROGRAMMED
@@ -90,7 +91,7 @@ def plan(
     return look_ahead(problem, corner_speed(problem, junctions), rule, queue=queue)
 
 
-def corner_speed(problem: Problem, junctions: Junctions) -> Array:
+def corner_speed(problem: Problem, junctions: Junctions) -> Floats:
     """Speed (n + 1,) [mm/s] at the ends of the pieces, infinite where there is no corner."""
     speed = np.full(len(problem.path) + 1, np.inf)
     if len(problem.path) < 2:
@@ -107,8 +108,8 @@ def corner_speed(problem: Problem, junctions: Junctions) -> Array:
 
 
 def each_direction(
-    tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
-) -> tuple[Array, Array]:
+    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
+) -> tuple[Floats, Floats]:
     """The greatest acceleration along the tangent alone, and along the normal alone."""
     del radius, speed
     return both_ways(limits, tangent), in_direction(limits, normal)
@@ -118,8 +119,8 @@ def _from_chord_to_chord(junctions: Junctions, chords: Chords) -> Rule:
     """The rule on curves that are chopped: the speed from chord to chord, as an acceleration across."""
 
     def rule(
-        tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
-    ) -> tuple[Array, Array]:
+        tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
+    ) -> tuple[Floats, Floats]:
         del speed
         half = chords.half_turn(radius)
         ahead, aside = np.cos(half)[:, None] * tangent, np.sin(half)[:, None] * normal

@@ -21,11 +21,11 @@ from __future__ import annotations
 import numpy as np
 
 from feedplan.arguments import whole
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
 from feedplan.planners._look_ahead import look_ahead, shared_acceleration
 from feedplan.planners._queue import Queue, along_path
-from feedplan.planners._segments import Array
 from feedplan.profile import SpeedProfile
 
 CORNERS = Corners.JOINED
@@ -49,7 +49,7 @@ def plan(
     return look_ahead(problem, problem.junction_speed, on_arcs, queue=queue)
 
 
-def _part(problem: Problem) -> Array:
+def _part(problem: Problem) -> Floats:
     """The share of the acceleration along the path in each piece: 0.5 in the last segment before a stop."""
     path = problem.path
     last, rapid = path.runs[1:] - 1, np.isinf(path.feed)
@@ -60,7 +60,9 @@ def _part(problem: Problem) -> Array:
     return np.where(np.isin(segment, segment[last[overlaps]]), 0.5, 1.0)
 
 
-def on_arcs(tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array) -> tuple[Array, Array]:
+def on_arcs(
+    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
+) -> tuple[Floats, Floats]:
     """√3/2 of the acceleration of every direction across the path; along it the rest at the greatest speed.
 
     The rest is half of it (`shared_acceleration`) where the bend limits the speed, more where the feed does

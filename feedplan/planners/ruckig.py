@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, path_segments, profile_of_sections
 from feedplan.arguments import number
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import MissingPackageError
 from feedplan.geometry.corners import Corners
@@ -31,7 +31,6 @@ from feedplan.planners._jerk import jerk_limits
 from feedplan.planners._runs import fastest_runs, within_both
 from feedplan.profile import SpeedProfile
 
-Array = NDArray[np.float64]
 # Speed [mm/s] and acceleration [mm/s²] along the path.
 State = tuple[float, float]
 # A section of constant jerk: duration; at its start position along the subrun, speed, acceleration; jerk.
@@ -214,7 +213,7 @@ def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:
     return SpeedProfile.of(native)
 
 
-def _subruns(problem: Problem, limits: Array) -> list[Subrun]:
+def _subruns(problem: Problem, limits: Floats) -> list[Subrun]:
     """The subruns of the path; those for the jerk-limited planner have no segments."""
     subruns = []
     for rows in path_segments(problem, limits, s_curve.CUTTINGS, s_curve.LOOK_AHEAD):

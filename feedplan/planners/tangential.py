@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._look_ahead import look_ahead
-from feedplan.planners._segments import Array, both_ways
+from feedplan.planners._segments import both_ways
 from feedplan.profile import SpeedProfile
 
 
@@ -23,8 +24,8 @@ def plan(problem: Problem) -> SpeedProfile:
 
 
 def along_only(
-    tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
-) -> tuple[Array, Array]:
+    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
+) -> tuple[Floats, Floats]:
     """No limit across the path."""
     del normal, radius, speed
     return both_ways(limits, tangent), np.full(len(tangent), np.inf)

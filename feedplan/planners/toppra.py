@@ -14,16 +14,14 @@ from __future__ import annotations
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.arguments import one_of
+from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import Mesh
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Rows, Transcription, end_rows
 from feedplan.profile import SpeedProfile
-
-Array = NDArray[np.float64]
 
 ACCURACY = 1e-3
 # Bound of x where no other bound holds, in parts of the median of x.
@@ -54,15 +52,15 @@ def plan(
     return plan_on_meshes(problem, method, accuracy, cells, time_limit)
 
 
-def _at_both_ends(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
+def _at_both_ends(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
     return end_rows(mesh, limit)
 
 
-def _at_start(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
+def _at_start(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
     return end_rows(mesh, limit, ends=(0,))
 
 
-def _solve(task: Transcription, seconds: float) -> Array:
+def _solve(task: Transcription, seconds: float) -> Floats:
     import logging
 
     from toppra.algorithm import TOPPRA
@@ -88,11 +86,11 @@ def _solve(task: Transcription, seconds: float) -> Array:
         log.setLevel(level)
     if speed is None or not np.isfinite(speed).all():
         raise Refusal(str(solver.problem_data.return_code), infeasible=speed is None)
-    x: Array = speed**2 / squares
+    x: Floats = speed**2 / squares
     return x
 
 
-def _constraint(task: Transcription, start: Array, end: Array, grid: Array, squares: Array) -> Any:
+def _constraint(task: Transcription, start: Floats, end: Floats, grid: Floats, squares: Floats) -> Any:
     """−low ≤ (near + far) x + 2 Δ far u ≤ 1 for the rows of each cell, as toppra has them; 0 ≤ x ≤ most."""
     from toppra.constraint import LinearConstraint
 
@@ -122,7 +120,7 @@ def _constraint(task: Transcription, start: Array, end: Array, grid: Array, squa
     return Cells()
 
 
-def _path(grid: Array) -> Any:
+def _path(grid: Floats) -> Any:
     """A path for toppra, which uses only the ends of its parameter."""
     from toppra.interpolator import AbstractGeometricPath
 

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.program.events import COMMENT, MESSAGE, Events
 
 KINDS = (
@@ -37,9 +38,6 @@ KINDS = (
 _PASSING = (61, 62, 63, 67)
 _STOPS = (0, 1, 2, 30, 60)
 
-Floats = NDArray[np.float64]
-Marks = NDArray[np.bool_]
-
 
 @dataclass(frozen=True, eq=False)
 class Actions:
@@ -49,7 +47,7 @@ class Actions:
     kind: NDArray[np.str_]
     channel: Floats
     value: Floats
-    stops: Marks
+    stops: Flags
 
 
 def actions(events: Events) -> Actions:
@@ -57,7 +55,7 @@ def actions(events: Events) -> Actions:
     p, q, number = events.p, events.q, events.number
     letter = {name: events.letter == ord(name) for name in ("M", "S", "T", "G", MESSAGE, COMMENT)}
 
-    def code(*codes: int) -> Marks:
+    def code(*codes: int) -> Flags:
         return np.asarray(letter["M"] & np.isin(number, codes))
 
     spindle = letter["S"] | code(3, 4, 5)
@@ -69,7 +67,7 @@ def actions(events: Events) -> Actions:
     outputs = code(62, 63, 64, 65)
     analog = code(67, 68)
     # The first kind that fits a row counts.
-    cases: list[tuple[str, Marks, Floats]] = [
+    cases: list[tuple[str, Flags, Floats]] = [
         ("spindle", spindle, speed),
         ("coolant", coolant, flows),
         ("select", letter["T"], number),
@@ -92,12 +90,12 @@ def actions(events: Events) -> Actions:
     )
 
 
-def _last(marks: Marks) -> NDArray[np.int64]:
+def _last(marks: Flags) -> Integers:
     """The last marked row up to each row; −1 where there is none."""
     return np.maximum.accumulate(np.where(marks, np.arange(len(marks)), -1))
 
 
-def _latest(values: Floats, marks: Marks) -> Floats:
+def _latest(values: Floats, marks: Flags) -> Floats:
     """The value of the last marked row up to each row; 0 where there is none."""
     last = _last(marks)
     return np.where(last >= 0, values[last], 0.0) if len(values) else values

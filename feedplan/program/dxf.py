@@ -25,14 +25,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, MissingPackageError, ProgramError
 from feedplan.program.moves import NO_FEED, TOUCHING, Moves
 from feedplan.program.program import Program
 
-Point = NDArray[np.float64]
+Point = Floats
 
 MAX_ENTITIES = 5_000_000
 _FARTHEST = 1e6  # [mm]; beyond is a mistake

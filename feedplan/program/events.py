@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
+
 MESSAGE, COMMENT = "(", ";"
 # The M codes whose output has the letter E.
 _ANALOG = (67, 68)
@@ -25,12 +27,12 @@ class Events:
     the place of its text in `texts`.
     """
 
-    move: NDArray[np.int64]
+    move: Integers
     line: NDArray[np.int32]
     letter: NDArray[np.uint8]
-    number: NDArray[np.float64]
-    p: NDArray[np.float64]
-    q: NDArray[np.float64]
+    number: Floats
+    p: Floats
+    q: Floats
     texts: tuple[str, ...] = ()
 
     @classmethod
@@ -73,7 +75,7 @@ def _word(letter: float, number: float, p: float, q: float) -> str:
     return f"{chr(int(letter))}{number:g}{others}"
 
 
-def _different(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _different(*columns: NDArray[Any]) -> tuple[Integers, Integers]:
     """The first of each kind of row, and the kind of each row (m,), by the bits of columns (m,): no NaN is
     equal to another."""
     kind = np.zeros(len(columns[0]), np.int64)

@@ -101,9 +101,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import read_gcode as read_native
+from feedplan.arrays import Floats
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import MachineError
 from feedplan.machine.axis import AXIS_LETTERS
@@ -138,7 +138,7 @@ class Options:
     are as for `read_gcode`.
     """
 
-    places: NDArray[np.float64]
+    places: Floats
     machine_axes: str
     machines_with: Callable[[str], str]
     tip_control: TipControl | None
@@ -202,7 +202,7 @@ def read_gcode(
     return Program.of(moves, name=name, **columns)
 
 
-def _places(machine: Machine | None) -> NDArray[np.float64]:
+def _places(machine: Machine | None) -> Floats:
     """Home, the start of the program and the work offsets as rows (110, 9) over XYZABCUVW."""
     places = np.zeros((2 + len(WORK_OFFSETS), len(AXIS_LETTERS)))
     if machine is None:

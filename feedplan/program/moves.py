@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from feedplan.arrays import Floats
 from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.program.program import MoveKind, PathControl, Program
@@ -21,32 +22,30 @@ class Moves:
 
     def __init__(self, axes: tuple[str, ...]) -> None:
         self.axes = axes
-        self._start: NDArray[np.float64] | None = None
-        self._position: NDArray[np.float64] = np.zeros(len(axes))
+        self._start: Floats | None = None
+        self._position: Floats = np.zeros(len(axes))
         self._rows: list[tuple[MoveKind, float, int]] = []
-        self._targets: list[NDArray[np.float64]] = []
-        self._arcs: list[tuple[int, NDArray[np.float64], float]] = []
+        self._targets: list[Floats] = []
+        self._arcs: list[tuple[int, Floats, float]] = []
         self._splines: list[tuple[int, CompositeCurve]] = []
 
-    def gap(self, point: NDArray[np.float64]) -> float:
+    def gap(self, point: Floats) -> float:
         """The distance [mm] of a point from the end of the last move; 0 before the first move."""
         return 0.0 if self._start is None else float(np.abs(point - self._position).max())
 
-    def go_to(self, point: NDArray[np.float64], line: int) -> None:
+    def go_to(self, point: Floats, line: int) -> None:
         """Adds a rapid to a point (axes,), unless the tool is there; the first point is the start."""
         if self._start is None:
             self._start = self._position = point
         elif self.gap(point) > TOUCHING:
             self._move(MoveKind.RAPID, point, np.inf, line)
 
-    def line(self, target: NDArray[np.float64], feed: float, line: int) -> None:
+    def line(self, target: Floats, feed: float, line: int) -> None:
         """Adds a straight move, unless it has no length."""
         if self.gap(target) > 0.0:
             self._move(MoveKind.LINE, target, feed, line)
 
-    def arc(
-        self, target: NDArray[np.float64], centre: ArrayLike, angle: float, feed: float, line: int
-    ) -> None:
+    def arc(self, target: Floats, centre: ArrayLike, angle: float, feed: float, line: int) -> None:
         """Adds an arc in XY about `centre` (3,) through `angle` [rad], positive counter-clockwise."""
         self._arcs.append((len(self._rows), np.asarray(centre, dtype=np.float64), angle))
         self._move(MoveKind.ARC, target, feed, line)
@@ -62,7 +61,7 @@ class Moves:
         )
         self._move(MoveKind.SPLINE, control[-1], feed, line)
 
-    def _move(self, kind: MoveKind, target: NDArray[np.float64], feed: float, line: int) -> None:
+    def _move(self, kind: MoveKind, target: Floats, feed: float, line: int) -> None:
         self._rows.append((kind, feed, line))
         self._targets.append(target)
         self._position = target

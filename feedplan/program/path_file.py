@@ -20,8 +20,8 @@ import math
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.machine.axis import AXIS_LETTERS, AXIS_NAME, ROTARY_LETTERS
@@ -115,7 +115,7 @@ class _PathFile:
             )
         moves.go_to(start, line)
 
-    def _curve(self, row: dict[str, Any], place: str, points: NDArray[np.float64]) -> CompositeCurve:
+    def _curve(self, row: dict[str, Any], place: str, points: Floats) -> CompositeCurve:
         degree = row.get("degree", _ABSENT)
         good = type(degree) is int and 1 <= degree <= MAX_DEGREE
         self._require(good, f"{place}.degree", degree, f"an integer from 1 to {MAX_DEGREE}")
@@ -177,7 +177,7 @@ class _PathFile:
                 )
         return names
 
-    def _points(self, row: dict[str, Any], place: str, width: int) -> NDArray[np.float64]:
+    def _points(self, row: dict[str, Any], place: str, width: int) -> Floats:
         rows = row.get("control_points", _ABSENT)
         self._require(isinstance(rows, list), place, rows, "a list of points")
         for k, point in enumerate(rows):
@@ -185,7 +185,7 @@ class _PathFile:
             self._require(good, f"{place}[{k}]", point, f"{width} finite numbers")
         return np.array(rows, dtype=np.float64).reshape(-1, width)
 
-    def _numbers(self, values: Any, place: str, count: int) -> NDArray[np.float64]:
+    def _numbers(self, values: Any, place: str, count: int) -> Floats:
         self._require(isinstance(values, list), place, values, f"a list of {count} numbers")
         self._require(len(values) == count, place, f"{len(values)} numbers", f"{count}")
         for k, value in enumerate(values):

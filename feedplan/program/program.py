@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import Moves
+from feedplan.arrays import Flags, Floats, Integers
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.native import OfNative
@@ -101,28 +102,28 @@ class Program(OfNative[Moves]):
 
     name: str
     axes: tuple[str, ...]
-    start: NDArray[np.float64]
+    start: Floats
     kind: NDArray[np.uint8]
-    target: NDArray[np.float64]
-    feed: NDArray[np.float64]
+    target: Floats
+    feed: Floats
     line: NDArray[np.int32]
     control: NDArray[np.uint8]
-    blend_tolerance: NDArray[np.float64]
-    fit_tolerance: NDArray[np.float64]
-    stop: NDArray[np.bool_]
-    dwell: NDArray[np.float64]
-    arc_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    arc_centre: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    blend_tolerance: Floats
+    fit_tolerance: Floats
+    stop: Flags
+    dwell: Floats
+    arc_move: Integers = field(default_factory=lambda: np.empty(0, np.int64))
+    arc_centre: Floats = field(default_factory=lambda: np.empty((0, 3)))
     arc_normal: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
-    arc_angle: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    arc_angle: Floats = field(default_factory=lambda: np.empty(0))
     start_dwell: float = 0.0
-    spline_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    spline_pieces: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    spline_move: Integers = field(default_factory=lambda: np.empty(0, np.int64))
+    spline_pieces: Integers = field(default_factory=lambda: np.zeros(1, np.int64))
     splines: CompositeCurve | None = None
     coordinate_mode: NDArray[np.uint8] | None = None
-    tool_length: NDArray[np.float64] | None = None
-    change_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    change_start: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    tool_length: Floats | None = None
+    change_move: Integers = field(default_factory=lambda: np.empty(0, np.int64))
+    change_start: Floats = field(default_factory=lambda: np.empty((0, 0)))
     warnings: tuple[str, ...] = ()
     sha256: str | None = None
     text: FilePath | bytes | None = None
@@ -141,13 +142,13 @@ class Program(OfNative[Moves]):
     def __repr__(self) -> str:
         return f"<Program {self.name}: {counted(len(self), 'move')} of {' '.join(self.axes)}>"
 
-    def starts(self) -> NDArray[np.float64]:
+    def starts(self) -> Floats:
         """Where each move starts, in its own words (n, axes) [mm, deg]."""
         starts = np.concatenate([self.start[None, :], self.target[:-1]])
         starts[self.change_move] = self.change_start
         return starts
 
-    def moving(self) -> NDArray[np.bool_]:
+    def moving(self) -> Flags:
         """Which moves move which axes (n, axes); an arc moves both axes of its plane."""
         moves = np.empty(self.target.shape, dtype=np.bool_)
         moves[:1] = self.target[:1] != self.start

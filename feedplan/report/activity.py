@@ -12,13 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square
 from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
 from feedplan.report.limits import chord_speed, parameter_speed
-
-Floats = NDArray[np.float64]
 
 # A limit is active from this use on.
 ACTIVE = 0.95
@@ -42,13 +41,13 @@ class Activity:
     names: tuple[str, ...]
     weight: Floats
     piece: NDArray[np.uint32]
-    run: NDArray[np.int64]
+    run: Integers
     speed: Floats
-    active: NDArray[np.int64]
+    active: Integers
     pace: Floats
-    position: NDArray[np.int64]
+    position: Integers
 
-    def at(self, position: NDArray[np.int64]) -> NDArray[np.int64]:
+    def at(self, position: Integers) -> Integers:
         """Numbers of the last moments at or before these positions on the path; 0 if there is none before."""
         return np.maximum(np.searchsorted(self.position, position, "right") - 1, 0)
 
@@ -97,13 +96,13 @@ def activity(
     return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace), position)
 
 
-def path_position(problem: Problem, piece: NDArray[np.integer], u: Floats) -> NDArray[np.int64]:
+def path_position(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Integers:
     """Positions on a path as integers that grow along it: 2^20 for each piece."""
     part = u / problem.path.curve.width[piece]
     return np.asarray((piece.astype(np.int64) << 20) + np.round(part * ((1 << 20) - 1)).astype(np.int64))
 
 
-def _moments(problem: Problem, profile: SpeedProfile) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _moments(problem: Problem, profile: SpeedProfile) -> tuple[Floats, Floats, Integers]:
     """Times by the plan's clock, the time that each represents, and its run.
 
     Each phase is divided evenly; if there are too many phases, the whole time is divided evenly.

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square
 from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
-
-Floats = NDArray[np.float64]
 
 # Most samples in all: 16 for each two of the 12 000 points that the page keeps of a curve.
 _SAMPLES = 100_000
@@ -42,7 +40,7 @@ class LimitSamples:
     feed: Floats
     velocity: Floats
     chord: Floats
-    phase: NDArray[np.int64]
+    phase: Integers
 
 
 def samples_per_phase(profile: SpeedProfile) -> int:
@@ -50,7 +48,7 @@ def samples_per_phase(profile: SpeedProfile) -> int:
     return int(np.clip(_SAMPLES // max(len(profile), 1), 2, _SAMPLES_PER_PHASE))
 
 
-def drawn_phases(profile: SpeedProfile, motion: ToolMotion) -> NDArray[np.int64]:
+def drawn_phases(profile: SpeedProfile, motion: ToolMotion) -> Integers:
     """The phases that have samples: those in which more than rotary axes move, or all if there are none.
 
     Every second, third … of them, if all would have too many samples.
@@ -81,7 +79,7 @@ def _sample(
     profile: SpeedProfile,
     motion: ToolMotion,
     states: Sampler,
-    phases: NDArray[np.int64],
+    phases: Integers,
     fraction: Floats,
 ) -> LimitSamples:
     count = len(fraction)

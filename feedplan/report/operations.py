@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Integers
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
@@ -129,9 +129,7 @@ def operation_times(
     return tuple(rows.values())
 
 
-def _begin_with_changes(
-    of_move: NDArray[np.int64], of_event: NDArray[np.int64], program: Program, changes: NDArray[np.int64]
-) -> None:
+def _begin_with_changes(of_move: Integers, of_event: Integers, program: Program, changes: Integers) -> None:
     """Moves after a tool change that continue the operation of the old tool get the next operation with the
     new tool, or none if there is no such operation. Changes both arrays in place."""
     count, at = len(program), program.events.move
@@ -166,7 +164,7 @@ def by_tool(operations: Iterable[OperationTime]) -> tuple[OperationTime, ...]:
 
 def _operations(
     program: Program,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], list[str]]:
+) -> tuple[Integers, Integers, Integers, list[str]]:
     """The number of the operation of each move and of each event, from 1 (0 for none), and the lines and
     names of the operations."""
     content = b"" if program.text is None else content_of(program.text, program.name).content
@@ -188,7 +186,7 @@ def _operations(
     return result[: len(program)], result[len(program) :], lines, names
 
 
-def _titles(content: bytes) -> tuple[NDArray[np.int64], list[str]]:
+def _titles(content: bytes) -> tuple[Integers, list[str]]:
     """The lines of the comments that name operations, and their texts."""
     offsets: list[int] = []
     names: list[str] = []
@@ -206,7 +204,7 @@ def _titles(content: bytes) -> tuple[NDArray[np.int64], list[str]]:
     return _line_numbers(content, offsets), names
 
 
-def _line_numbers(content: bytes, offsets: list[int]) -> NDArray[np.int64]:
+def _line_numbers(content: bytes, offsets: list[int]) -> Integers:
     """The line numbers, from 1, of offsets in a text."""
     breaks = np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
     return np.asarray(np.searchsorted(breaks, offsets, "left") + 1, dtype=np.int64)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import buckets, thin
+from feedplan.arrays import Floats
 
 Array = NDArray[Any]
-Floats = NDArray[np.float64]
 # Columns that belong together.
 Columns = tuple[Array, ...]
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.program.program import PathControl, Program, StopCause
 from feedplan.report.activity import ACTIVE, Activity
-
-Floats = NDArray[np.float64]
 
 ENDS = "start and end"
 TURN_BACK = "turning back"
@@ -73,7 +72,7 @@ def stops_by_cause(problem: Problem, program: Program | None, activity: Activity
     return sorted(found, key=lambda stops: -(stops.pause + stops.lost))
 
 
-def _causes(problem: Problem, program: Program | None, first: NDArray[np.int64]) -> list[str]:
+def _causes(problem: Problem, program: Program | None, first: Integers) -> list[str]:
     """The causes of the stops before these pieces of the path."""
     path, last = problem.path, first - 1
     turn = _turns(problem, last, first)
@@ -115,7 +114,7 @@ def _turns(problem: Problem, last: NDArray[np.integer], first: NDArray[np.intege
     return np.asarray(np.degrees(2.0 * np.arcsin(np.clip(np.nan_to_num(half), 0.0, 1.0))))
 
 
-def _slow_parts(activity: Activity, rests: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def _slow_parts(activity: Activity, rests: Integers) -> tuple[Floats, Floats]:
     """Time lost before the end and after the start of what lies between two stops [s].
 
     The part after a start ends where the tool reaches a feed or an axis velocity, or first slows down; the

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.report.activity import Activity, path_position
@@ -51,7 +51,7 @@ class ToolPath:
         self._is_cut = np.isfinite(problem.path.feed)
         self._top = self._cutting = 0.0
 
-    def add(self, chunk: SetpointChunk) -> NDArray[np.float64]:
+    def add(self, chunk: SetpointChunk) -> Floats:
         """Takes the next setpoints; returns the tool's speed at each, in drawn units a second."""
         points, speed = self._tool(chunk)
         if len(chunk) == 0:
@@ -103,7 +103,7 @@ class ToolPath:
             "tolerance": tolerance,
         }
 
-    def _lengths(self, t: NDArray[np.float64], speed: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _lengths(self, t: Floats, speed: Floats) -> Floats:
         """The length up to each setpoint, by the trapezoid rule."""
         before, last = self._before
         steps = np.diff(t, prepend=before) * 0.5 * (speed + np.concatenate(([last], speed[:-1])))
@@ -111,7 +111,7 @@ class ToolPath:
         self._length, self._before = float(length[-1]), (float(t[-1]), float(speed[-1]))
         return np.asarray(length)
 
-    def _tool(self, chunk: SetpointChunk) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _tool(self, chunk: SetpointChunk) -> tuple[Floats, Floats]:
         """The tool's position in X, Y, Z and its speed in drawn units; 0 where it only turns."""
         problem, motion = self._problem, self._motion
         if problem.tip_curve is not None and problem.joints is not None:
