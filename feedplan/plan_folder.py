@@ -63,7 +63,7 @@ def write_plan(
     from feedplan.report.figures import SetpointFigures, chart_data
     from feedplan.report.page import FILE as REPORT_FILE
     from feedplan.report.page import write_report
-    from feedplan.report.tool_path import MANY_POINTS, POINTS
+    from feedplan.report.tool_path import MANY_POINTS, POINTS, ToolPath
 
     formats = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")  # type: ignore[assignment]
     folder = _folder(folder)
@@ -82,13 +82,12 @@ def write_plan(
         (part(share, 0.0, SAMPLED), SAMPLED) if plan.audited else (of_stage(progress, "audit"), 0.0)
     )
     tell(reading, 0.0)
-    motion = plan.problem.tool_motion
+    tool_path = ToolPath(plan.problem, MANY_POINTS if drawing else POINTS)
     tell(reading, LENGTHS)
     setpoints = plan.setpoints()
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period, setpoints.events)
-    points = MANY_POINTS if drawing else POINTS
-    figures = SetpointFigures(plan.problem, motion, setpoints.count, points)
+    figures = SetpointFigures(plan.problem, tool_path, setpoints.count)
     with staged(folder, last=SUMMARY_FILE) as stage:
         with beside(partial(_along_path, plan)) as along_path, ExitStack() as stack:
             sinks = [
@@ -100,7 +99,7 @@ def write_plan(
             audit = plan.pass_setpoints((passed_on,), part(reading, LENGTHS, 1.0))
         over_length, account = along_path.result(), plan.account
         for check in audit.broken:
-            figures.mark(setpoints.around(check.time), check.time)
+            tool_path.mark(setpoints.around(check.time), check.time)
         share = part(share, begun, 1.0)
         tell(share, 0.0)
         summary = plan.summary()
@@ -120,7 +119,7 @@ def write_plan(
         data = chart_data(plan.problem, account, figures, audit, over_length)
         if drawing:
             (stage / DRAWING_FILE).write_bytes(contained(data))
-            data["path"] = figures.tool_path(account.activity, POINTS)
+            data["path"] = tool_path.data(account.activity, POINTS)
         write_report(
             stage / REPORT_FILE,
             summary=summary,
@@ -141,8 +140,8 @@ def _along_path(plan: Plan, progress: Listener) -> dict[str, Any]:
     """The account of a plan, which is kept in it, then the curves over length. It needs no setpoints."""
     from feedplan.report.figures import over_length
 
-    motion = plan.make_account(part(progress, 0.0, 0.5)).motion
-    return over_length(plan.problem, plan.profile, motion, part(progress, 0.5, 1.0))
+    plan.make_account(part(progress, 0.0, 0.5))
+    return over_length(plan.problem, plan.profile, part(progress, 0.5, 1.0))
 
 
 @contextmanager
@@ -206,7 +205,7 @@ def write_comparison(
     for number, row in enumerate(rows):
         entry: dict[str, Any] = {"method": row.method, "time": row.time, "error": row.error}
         if row.plan is not None:
-            tool = ToolPath(row.plan.problem, row.plan.account.motion)
+            tool = ToolPath(row.plan.problem)
             for chunk in row.plan.setpoints().chunks(_ROWS_AT_ONCE):
                 tool.add(chunk)
             paths.append({"method": row.method, **tool.data(row.plan.account.activity)})

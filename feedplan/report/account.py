@@ -82,7 +82,7 @@ def account(
     lengths = motion.lengths
     tell(progress, 0.5)
     time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
-    moments = activity(problem, profile, motion, jerk, part(progress, 0.5, 0.95))
+    moments = activity(problem, profile, jerk, part(progress, 0.5, 0.95))
 
     def total(own: Any) -> Total:
         turns = own & motion.turns
@@ -93,7 +93,7 @@ def account(
 
     feed = np.isfinite(path.feed)
     tolerance = path.tolerance if len(path) else np.zeros(1)
-    limits, slow = time_per_limit(problem, moments), slowest_lines(problem, profile, motion, moments)
+    limits, slow = time_per_limit(problem, moments), slowest_lines(problem, profile, moments)
     tell(progress, 1.0)
     return Account(
         motion=motion,

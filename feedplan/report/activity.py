@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square
-from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
 from feedplan.report.limits import chord_speed, parameter_speed
@@ -61,7 +60,6 @@ class Activity:
 def activity(
     problem: Problem,
     profile: SpeedProfile,
-    motion: ToolMotion,
     jerk: bool,
     progress: Listener | None = None,
 ) -> Activity:
@@ -83,7 +81,7 @@ def activity(
         groups = {"velocity": at_velocity, "acceleration": problem.use("acceleration", acceleration)}
         if jerk:
             groups["jerk"] = np.abs(jerks) / problem.max_jerk
-        speed = motion.slope(piece, u) * rate
+        speed = problem.tool_motion.slope(piece, u) * rate
     tell(progress, 0.9)
     names = ("feed", "chord error", *(f"{axis} {name}" for name in groups for axis in problem.axes), NONE)
     use = np.nan_to_num(np.column_stack([at_feed, chord, *groups.values()]), posinf=0.0)

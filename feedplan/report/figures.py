@@ -10,14 +10,12 @@ import numpy as np
 
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
-from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 from feedplan.report.account import Account
-from feedplan.report.activity import Activity
 from feedplan.report.limits import drawn_phases, limit_samples, samples_per_phase
 from feedplan.report.reduce import Envelope
-from feedplan.report.tool_path import POINTS, ToolPath
+from feedplan.report.tool_path import ToolPath
 from feedplan.setpoints import SetpointChunk
 from feedplan.units import finite
 
@@ -31,20 +29,14 @@ _MEAN_POINTS = 1_000  # the mean of each curve, drawn where the curve oscillates
 class SetpointFigures:
     """Takes all setpoints chunk by chunk; holds the curves over time and the tool path.
 
-    `count` is the number of setpoints to come; at most `points` points of the tool path are kept.
+    `count` is the number of setpoints to come; `path` takes them too.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        motion: ToolMotion,
-        count: int,
-        points: int = POINTS,
-    ) -> None:
+    def __init__(self, problem: Problem, path: ToolPath, count: int) -> None:
         self._axes = problem.axes
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
-        self._path = ToolPath(problem, motion, points)
+        self.path = path
         self.count = 0
         self.duration = 0.0
 
@@ -52,15 +44,11 @@ class SetpointFigures:
         """The next setpoints."""
         if len(chunk.t) == 0:
             return
-        speed = self._path.add(chunk)
+        speed = self.path.add(chunk)
         rates = (chunk.velocity, chunk.acceleration, chunk.jerk)
         self._curves.add(chunk.t, chunk.line, speed[:, None], *rates)
         self.count += len(chunk.t)
         self.duration = float(chunk.t[-1])
-
-    def mark(self, chunk: SetpointChunk, time: float) -> None:
-        """See `ToolPath.mark`."""
-        self._path.mark(chunk, time)
 
     def over_time(self) -> dict[str, Any]:
         """Curves over time: speed with its source lines, and velocity, acceleration and jerk of each axis."""
@@ -69,10 +57,6 @@ class SetpointFigures:
         for group, name in enumerate(("velocity", "acceleration", "jerk")):
             result[name] = [_curve(self._curves, 1 + group * axes + k) for k in range(axes)]
         return result
-
-    def tool_path(self, activity: Activity, points: int | None = None) -> dict[str, Any]:
-        """The tool path of at most `points` points, if given: `ToolPath.data`."""
-        return self._path.data(activity, points)
 
 
 def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:
@@ -87,20 +71,18 @@ def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, 
     return result | ({"line": line} if with_line else {})
 
 
-def over_length(
-    problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
-) -> dict[str, Any]:
+def over_length(problem: Problem, profile: SpeedProfile, progress: Listener | None = None) -> dict[str, Any]:
     """Speed and its limits over the path's length; limits that are infinite everywhere are left out.
 
     `cutting_speed` is the greatest speed on moves with a feed; it is the top of the colour scale, because
     with rapids the colours of cutting moves would hardly differ.
     """
     names = ("speed", "acceleration", "feed", "velocity", "chord")
-    count = len(drawn_phases(profile, motion)) * samples_per_phase(profile)
+    count = len(drawn_phases(problem, profile)) * samples_per_phase(profile)
     curves = Envelope(count, _LENGTH_POINTS)
     is_cut = np.isfinite(problem.path.feed)[profile.piece.astype(np.int64)]
     top = cutting = 0.0
-    for block in limit_samples(problem, profile, motion, progress):
+    for block in limit_samples(problem, profile, progress):
         line = problem.path.line[profile.piece[block.phase]]
         curves.add(block.length, line, *(getattr(block, name)[:, None] for name in names))
         speed = block.speed[np.isfinite(block.speed)]
@@ -142,7 +124,7 @@ def chart_data(
         "judged": sorted(judged),
         "feed": float(problem.feed.max()) if len(problem.feed) else None,
         "duration": figures.duration,
-        "path": figures.tool_path(account.activity),
+        "path": figures.path.data(account.activity),
         "length": length,
         "time": figures.over_time(),
         "slow": [asdict(line) for line in account.slow],

@@ -15,7 +15,6 @@ import numpy as np
 from feedplan._solvers import Sampler
 from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square
-from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
 
@@ -48,21 +47,21 @@ def samples_per_phase(profile: SpeedProfile) -> int:
     return int(np.clip(_SAMPLES // max(len(profile), 1), 2, _SAMPLES_PER_PHASE))
 
 
-def drawn_phases(profile: SpeedProfile, motion: ToolMotion) -> Integers:
+def drawn_phases(problem: Problem, profile: SpeedProfile) -> Integers:
     """The phases that have samples: those in which more than rotary axes move, or all if there are none.
 
     Every second, third … of them, if all would have too many samples.
     """
-    drawn = np.flatnonzero(motion.drawn[profile.piece.astype(np.int64)])
+    drawn = np.flatnonzero(problem.tool_motion.drawn[profile.piece.astype(np.int64)])
     return drawn[:: 1 + len(drawn) * samples_per_phase(profile) // (_SAMPLES + 1)]
 
 
 def limit_samples(
-    problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
+    problem: Problem, profile: SpeedProfile, progress: Listener | None = None
 ) -> Iterator[LimitSamples]:
     """Samples of the phases that have samples, computed for a block of phases at a time."""
     count = samples_per_phase(profile)
-    drawn = drawn_phases(profile, motion)
+    drawn = drawn_phases(problem, profile)
     states = profile.sampler(problem, part(progress, 0.0, 0.2))
     report = part(progress, 0.2, 1.0)
     tell(report, 0.0)
@@ -70,14 +69,13 @@ def limit_samples(
     fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     step = max(1, _SAMPLES_AT_ONCE // count)
     for first in range(0, len(drawn), step):
-        yield _sample(problem, profile, motion, states, drawn[first : first + step], fraction)
+        yield _sample(problem, profile, states, drawn[first : first + step], fraction)
         tell(report, min(first + step, len(drawn)) / len(drawn))
 
 
 def _sample(
     problem: Problem,
     profile: SpeedProfile,
-    motion: ToolMotion,
     states: Sampler,
     phases: Integers,
     fraction: Floats,
@@ -90,7 +88,7 @@ def _sample(
     phase = np.repeat(phases, count)
     piece = profile.piece[phase].astype(np.int64)
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
-    slope = motion.slope(piece, u)
+    slope = problem.tool_motion.slope(piece, u)
     # u̇ at both ends of each phase is the profile's own, and costs nothing.
     ends = np.empty((len(phases), count))
     ends[:, 0], ends[:, -1] = np.sqrt(profile.p0[phases]), np.sqrt(profile.p1[phases])
@@ -102,7 +100,7 @@ def _sample(
         joint = np.linalg.norm(tangent, axis=1)
         feed = _quotient(problem.feed[piece], np.sqrt(feed_square(problem, piece, u)))
         return LimitSamples(
-            length=motion.drawn_length(piece, u),
+            length=problem.tool_motion.drawn_length(piece, u),
             speed=slope * rate,
             acceleration=slope
             * np.sqrt(limit_curve(tangent, second, problem.max_acceleration, problem.min_acceleration)),

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from feedplan.constraints.problem import Problem
-from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.profile import SpeedProfile
 from feedplan.report.activity import Activity
 
@@ -53,7 +52,7 @@ def time_per_limit(problem: Problem, activity: Activity) -> list[Share]:
 
 
 def slowest_lines(
-    problem: Problem, profile: SpeedProfile, motion: ToolMotion, activity: Activity, count: int = 20
+    problem: Problem, profile: SpeedProfile, activity: Activity, count: int = 20
 ) -> list[SlowLine]:
     """The source lines that lose most time, the greatest loss first."""
     if len(profile) == 0:
@@ -74,7 +73,7 @@ def slowest_lines(
         costs = np.bincount(activity.active[own], activity.lost[own])
         active = int(costs.argmax())
         # The speed is in mm/s or deg/s, by what the line does for longer: moving or turning alone.
-        turning = motion.turns[activity.piece[own]]
+        turning = problem.tool_motion.turns[activity.piece[own]]
         turns = bool(activity.weight[own][turning].sum() > 0.5 * time[index])
         own = own[turning == turns]
         length, spent = (activity.speed[own] * activity.weight[own]).sum(), activity.weight[own].sum()

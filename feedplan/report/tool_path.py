@@ -8,7 +8,6 @@ import numpy as np
 
 from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
-from feedplan.constraints.tool_motion import ToolMotion
 from feedplan.report.activity import Activity, path_position
 from feedplan.report.limits import parameter_speed
 from feedplan.report.reduce import Polyline
@@ -30,9 +29,9 @@ _SPEED_TOLERANCE = 0.01
 class ToolPath:
     """Takes all setpoints chunk by chunk; at most `points` points are kept."""
 
-    def __init__(self, problem: Problem, motion: ToolMotion, points: int = POINTS) -> None:
+    def __init__(self, problem: Problem, points: int = POINTS) -> None:
         self._axes = problem.axes
-        self._problem, self._motion = problem, motion
+        self._problem, self._motion = problem, problem.tool_motion
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
         columns = [column for column, name in enumerate(problem.path.axes) if name in ("X", "Y", "Z")]
         # Column by column, so that the points are not copied.

@@ -17,7 +17,7 @@ from feedplan.report.limits import LimitSamples, limit_curve, limit_samples
 
 
 def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
-    blocks = list(limit_samples(problem, profile, problem.tool_motion))
+    blocks = list(limit_samples(problem, profile))
     names = ("length", "speed", "acceleration", "feed", "velocity", "chord", "phase")
     return LimitSamples(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 

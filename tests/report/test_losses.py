@@ -16,12 +16,11 @@ from feedplan.report.losses import time_per_limit as time_of
 
 
 def time_per_limit(problem: Any, profile: SpeedProfile) -> list[Share]:
-    return time_of(problem, activity(problem, profile, problem.tool_motion, False))
+    return time_of(problem, activity(problem, profile, False))
 
 
 def slowest_lines(problem: Any, profile: SpeedProfile, count: int = 20) -> list[SlowLine]:
-    motion = problem.tool_motion
-    return slowest_of(problem, profile, motion, activity(problem, profile, motion, False), count)
+    return slowest_of(problem, profile, activity(problem, profile, False), count)
 
 
 def test_the_square_is_at_its_feed_for_three_fifths(square: Any) -> None:

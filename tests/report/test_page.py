@@ -14,6 +14,7 @@ import pytest
 from feedplan.report.container import contained
 from feedplan.report.figures import SetpointFigures, chart_data, over_length
 from feedplan.report.page import SCRIPT, asset, missing_pictures, write_report
+from feedplan.report.tool_path import ToolPath
 from tests.report.drawn import data_of, unpacked
 
 pytestmark = pytest.mark.skipif(bool(missing_pictures()), reason="the drawing code is not built: make page")
@@ -21,10 +22,10 @@ pytestmark = pytest.mark.skipif(bool(missing_pictures()), reason="the drawing co
 
 def page(plan: Any, file: Path, source: Path | None = None) -> str:
     account = plan.account
-    figures = SetpointFigures(plan.problem, account.motion, len(plan.chunk.t))
+    figures = SetpointFigures(plan.problem, ToolPath(plan.problem), len(plan.chunk.t))
     figures.add(plan.chunk)
     for check in plan.verdict.broken:
-        figures.mark(plan.chunk, check.time)
+        figures.path.mark(plan.chunk, check.time)
     write_report(
         file,
         summary=plan.summary(),
@@ -36,7 +37,7 @@ def page(plan: Any, file: Path, source: Path | None = None) -> str:
             account,
             figures,
             plan.verdict,
-            over_length(plan.problem, plan.profile, account.motion),
+            over_length(plan.problem, plan.profile),
         ),
         setpoints=figures.count,
         text=source,
@@ -161,7 +162,7 @@ def test_without_the_program_the_page_lacks_only_its_text(square: Any, tmp_path:
 
 
 def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:
-    figures = SetpointFigures(square.problem, square.account.motion, 1_000_000)
+    figures = SetpointFigures(square.problem, ToolPath(square.problem), 1_000_000)
     random = np.random.default_rng(5)
     chunk = square.chunk
     for first in range(0, 1_000_000, 50_000):
@@ -169,7 +170,7 @@ def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:
         t = (first + np.arange(50_000)) * 1e-3
         piece, u = np.zeros(50_000, np.uint32), np.zeros(50_000)
         figures.add(type(chunk)(t, *tables, np.full(50_000, 3, np.int32), chunk.axes, piece, u))
-    path = figures.tool_path(square.account.activity)
+    path = figures.path.data(square.account.activity)
     assert len(contained({"time": figures.over_time(), "path": path})) < 5_000_000
     assert len(path["x"]) <= 60_000
 
