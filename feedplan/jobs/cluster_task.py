@@ -54,33 +54,29 @@ def run(name: str, expected: str, limits: tuple[float, float], jobs: Sequence[Se
 def _run_one(progress: _JobProgress, job: Sent) -> Returned:
     """Works on a job; errors are in the outcome, so that no exception is sent."""
     try:
-        return _worked(progress, job)
+        with tempfile.TemporaryDirectory(prefix="feedplan-") as temporary:
+            scratch = FilePath(temporary)
+            folder, called, table = scratch / "plan", scratch / "called", scratch / "tools.tbl"
+            called.mkdir()
+            for name, content in job.called.items():
+                (called / name).write_bytes(content)
+            if job.tool_table is not None:
+                table.write_bytes(job.tool_table)
+            outcome = work_on(
+                Order.of(job.order),
+                job.program,
+                folder,
+                progress.progress,
+                tool_table=None if job.tool_table is None else table,
+                subprograms=[called] if job.called else [],
+            )
+            if outcome.state == "stopped" and progress.over_time:
+                outcome = progress.limits.over_time()
+            text = outcome.text().replace(f"{scratch}/", "")
+            files = {file.name: file.read_bytes() for file in folder.iterdir()} if folder.exists() else {}
+            return Returned(text, files)
     except Exception as error:
         return Returned(Outcome.of_error(error).text(), {})
-
-
-def _worked(progress: _JobProgress, job: Sent) -> Returned:
-    with tempfile.TemporaryDirectory(prefix="feedplan-") as temporary:
-        scratch = FilePath(temporary)
-        folder, called, table = scratch / "plan", scratch / "called", scratch / "tools.tbl"
-        called.mkdir()
-        for name, content in job.called.items():
-            (called / name).write_bytes(content)
-        if job.tool_table is not None:
-            table.write_bytes(job.tool_table)
-        outcome = work_on(
-            Order.of(job.order),
-            job.program,
-            folder,
-            progress.progress,
-            tool_table=None if job.tool_table is None else table,
-            subprograms=[called] if job.called else [],
-        )
-        if outcome.state == "stopped" and progress.over_time:
-            outcome = progress.limits.over_time()
-        text = outcome.text().replace(f"{scratch}/", "")
-        files = {file.name: file.read_bytes() for file in folder.iterdir()} if folder.exists() else {}
-        return Returned(text, files)
 
 
 class _JobProgress:

@@ -57,42 +57,30 @@ def work_on(
     `progress` may raise Stopped.
     """
     start = time.perf_counter()
-    try:
-        figures, size = _planned(order, content, folder, progress, tool_table, subprograms)
-    except Stopped:
-        return Outcome("stopped")
-    except Exception as error:
-        return Outcome.of_error(error, time.perf_counter() - start)
-    return Outcome("done", figures, seconds=time.perf_counter() - start, size=size)
-
-
-def _planned(
-    order: Order,
-    content: bytes,
-    folder: FilePath,
-    progress: Progress,
-    tool_table: FilePath | None,
-    subprograms: Sequence[FilePath],
-) -> tuple[dict[str, Any], int]:
-    """Plans and writes; returns the key figures and the number of bytes written."""
     reading = Reading(**order.reading)  # type: ignore[typeddict-item]
     if tool_table is not None:
         reading["tool_table"] = tool_table
     if subprograms:
         reading["subprograms"] = subprograms
-    source: Program | io.BytesIO = _Named(content, order.name)
-    if order.machine == AUTO:
-        feed = order.options.get("feed")
-        machine, source = smallest_machine(
-            lambda known: read_program(content, known, name=order.name, feed=feed, **reading)
-        )
-    else:
-        machine = Machine.from_toml(order.machine, "of the order")
     method: Any = order.method
-    made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
     formats: Any = order.formats
-    files = write_plan(made, folder, formats, drawing=order.drawing, progress=progress)
-    return _figures(made), sum(file.stat().st_size for file in files)
+    try:
+        source: Program | io.BytesIO = _Named(content, order.name)
+        if order.machine == AUTO:
+            feed = order.options.get("feed")
+            machine, source = smallest_machine(
+                lambda known: read_program(content, known, name=order.name, feed=feed, **reading)
+            )
+        else:
+            machine = Machine.from_toml(order.machine, "of the order")
+        made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
+        files = write_plan(made, folder, formats, drawing=order.drawing, progress=progress)
+        size = sum(file.stat().st_size for file in files)
+        return Outcome("done", _figures(made), seconds=time.perf_counter() - start, size=size)
+    except Stopped:
+        return Outcome("stopped")
+    except Exception as error:
+        return Outcome.of_error(error, time.perf_counter() - start)
 
 
 def _figures(made: Plan) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from typing import Any
 from feedplan.jobs.address import is_address
 from feedplan.service import front
 from feedplan.service.limits import MB, Limits
-from feedplan.service.refusals import FOREIGN, MEDIA_TYPE, TOKEN, TOO_LARGE, TOO_SLOW, Refusal
+from feedplan.service.refusals import FOREIGN, MEDIA_TYPE, TOKEN, TOO_LARGE, TOO_SLOW, Refusal, over
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -113,7 +113,7 @@ class Guard:
     def _too_large(self) -> Refusal:
         most = self._limits.max_upload
         said = f"the request has more than {most:g} MB, which is max_upload: split the program"
-        return Refusal(TOO_LARGE, said, limit=self._limits.named_in(said))
+        return over(self._limits, TOO_LARGE, said)
 
     def _counted(self, receive: Receive) -> Receive:
         """The same messages; raises Refusal if the body is too long or too late."""
@@ -133,7 +133,7 @@ class Guard:
                     f"the request took longer than {self._limits.max_upload_time:g} s, which is "
                     "max_upload_time: send it on a quicker line"
                 )
-                raise Refusal(TOO_SLOW, said, limit=self._limits.named_in(said)) from None
+                raise over(self._limits, TOO_SLOW, said) from None
             received += len(message.get("body", b""))
             whole = not message.get("more_body", False)
             if received > self._limits.max_upload * MB:

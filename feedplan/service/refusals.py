@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from feedplan.errors import FeedplanError
+from feedplan.service.limits import Limits
 
 MEDIA_TYPE = "application/problem+json"
 TYPE = "urn:feedplan:"
@@ -86,6 +87,11 @@ class Refusal(Exception):  # noqa: N818 (it is an answer)
     def text(self) -> str:
         """The problem as JSON."""
         return json.dumps(self.to_json(), ensure_ascii=False)
+
+
+def over(limits: Limits, kind: Kind, sentence: str) -> Refusal:
+    """The refusal of a request that exceeds the limit in the sentence."""
+    return Refusal(kind, sentence, limit=limits.named_in(sentence))
 
 
 def refusal_of(error: FeedplanError) -> Refusal:

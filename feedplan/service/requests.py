@@ -21,7 +21,7 @@ from feedplan.planners import MethodName, given_options, methods, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
 from feedplan.service.limits import Limits
-from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal
+from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal, over
 from feedplan.setpoints import Interpolator
 
 # Longest name of a program. Messages and reports show names; no file is named by them.
@@ -181,7 +181,8 @@ def order_of(request: PlanRequest, limits: Limits) -> Order:
     options = request.options.model_dump(exclude_none=True)
     asked = options.get("max_setpoints", 1)
     if asked > limits.max_setpoints:
-        raise over(limits, f"max_setpoints is {asked}, the service has {limits.max_setpoints}: ask for fewer")
+        said = f"max_setpoints is {asked}, the service has {limits.max_setpoints}: ask for fewer"
+        raise over(limits, LIMIT, said)
     own = {name: value for name, value in options.items() if name not in (*OF_ALL_METHODS, *READING)}
     given_options(request.method, own, OF_ALL_METHODS)
     if "controller" in options:
@@ -215,11 +216,6 @@ def _title(given: str) -> str:
     """The printable characters of the last part of a name; may be empty."""
     name = PurePosixPath(given.replace("\\", "/")).name
     return "".join(letter for letter in name if letter.isprintable()).strip()
-
-
-def over(limits: Limits, sentence: str) -> Refusal:
-    """The refusal of a request that exceeds the limit in the sentence."""
-    return Refusal(LIMIT, sentence, limit=limits.named_in(sentence))
 
 
 def parsed(model: type[Model], text: bytes | str) -> Model:

@@ -30,7 +30,7 @@ from typing import Any
 from feedplan.errors import InputError
 from feedplan.service.database import Database
 from feedplan.service.limits import MB, Limits
-from feedplan.service.refusals import BUSY, CANCELLED, DISK, INPUT, UNKNOWN, Refusal
+from feedplan.service.refusals import BUSY, CANCELLED, DISK, INPUT, UNKNOWN, Refusal, over
 from feedplan.service.requests import Order
 
 ENDED = ("done", "failed", "cancelled")
@@ -237,14 +237,14 @@ class Store:
         waiting = db.execute("SELECT COUNT(*) FROM jobs WHERE state = 'queued'").fetchone()[0]
         if waiting >= limits.max_queue:
             said = f"{waiting} jobs wait, as many as max_queue allows: send it again in a while"
-            raise Refusal(BUSY, said, limit=limits.named_in(said))
+            raise over(limits, BUSY, said)
         kept = db.execute("SELECT COALESCE(SUM(size), 0) FROM jobs").fetchone()[0]
         if kept + size > limits.max_disk * MB:
             said = (
                 f"the jobs that are kept take {kept / MB:.6g} MB of the {limits.max_disk:g} MB of max_disk: "
                 "delete some of them"
             )
-            raise Refusal(DISK, said, limit=limits.named_in(said))
+            raise over(limits, DISK, said)
 
     def claim(self) -> Record | None:
         """Sets the job that has waited longest to running and returns it; None if no job waits."""

@@ -17,8 +17,8 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.requests import Request
 
 from feedplan.service.limits import Limits
-from feedplan.service.refusals import INPUT, MEDIA, PROGRAM, Refusal
-from feedplan.service.requests import JobRequest, Options, PlanRequest, over, parsed
+from feedplan.service.refusals import INPUT, LIMIT, MEDIA, PROGRAM, Refusal, over
+from feedplan.service.requests import JobRequest, Options, PlanRequest, parsed
 from feedplan.service.store import Upload
 
 # Longest text beside the program [bytes].
@@ -104,6 +104,7 @@ def _stored(stream: IO[bytes], new: FilePath, limits: Limits) -> Upload:
                 if lines > limits.max_blocks:
                     raise over(
                         limits,
+                        LIMIT,
                         f"the program has more lines than the {limits.max_blocks} of max_blocks: split it",
                     )
         if size == 0:
