@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -73,22 +72,21 @@ def plan(
     limits = jerk_limits(problem)
     resolution = max(RESOLUTION * (1e-4 / accuracy) ** 0.5, LEAST_RESOLUTION)
     proven = 1.0 - GRID_ERROR * accuracy
-    whole = partial(_kept, problem, limits, resolution, GAP * accuracy, proven, elsewhere)
+    whole = _Task(problem, limits, resolution, GAP * accuracy, proven, elsewhere)
     if time_limit is None:
-        return whole(None, progress)
+        return whole.plan(None, progress)
     end = time.perf_counter() + time_limit
     try:
-        first = _kept(
-            problem, limits, FIRST_RESOLUTION, FIRST_GAP, 0.0, None, None, part(progress, 0.0, FIRST)
-        )
+        coarse = _Task(problem, limits, FIRST_RESOLUTION, FIRST_GAP, 0.0, None)
+        first = coarse.plan(None, part(progress, 0.0, FIRST))
     except InfeasibleError:
         # A coarse grid may miss a speed at an end that can just be had.
-        return whole(None, part(progress, FIRST, 1.0))
+        return whole.plan(None, part(progress, FIRST, 1.0))
     if reserve is not None and time.perf_counter() < end:
         end -= reserve(first)
     found = [first]
     if time.perf_counter() < end:
-        best = whole(end, part(progress, FIRST, OTHER))
+        best = whole.plan(end, part(progress, FIRST, OTHER))
         if not best.stopped:
             return best
         found.append(best)
@@ -98,63 +96,54 @@ def plan(
     return replace(fastest_runs(found), stopped=True)
 
 
-def _kept(
-    problem: Problem,
-    limits: Floats,
-    resolution: float,
-    gap: float,
-    proven: float,
-    elsewhere: Elsewhere | None,
-    end: float | None,
-    progress: Listener | None,
-) -> SpeedProfile:
-    """The plan by a time of the clock; again with lower limits where the joints miss those of jerk.
+@dataclass(frozen=True)
+class _Task:
+    """A plan within `limits` of jerk [mm/s³] on a grid of a `resolution` (see `RESOLUTION`), by an interior
+    point that stops at a `gap` of complementarity.
 
-    Its lower bounds are the part `proven` of those on its grid; without that part it has none.
+    Its lower bounds are the part `proven` of those on its grid; without that part it has none. Without a time
+    limit runs are planned `elsewhere`, if that is given.
     """
-    once = 0.5 if problem.words else 1.0
-    profile = _planned(problem, limits, resolution, gap, proven, elsewhere, end, part(progress, 0.0, once))
-    lowered = lowered_limits(problem, limits, profile)
-    if lowered is None:
-        return profile
-    again = _planned(problem, lowered, resolution, gap, 0.0, elsewhere, end, part(progress, once, 1.0))
-    # What no plan within the limits can beat, no plan within lower ones can.
-    return again.with_others(run_bounds=profile.run_bounds)
 
+    problem: Problem
+    limits: Floats
+    resolution: float
+    gap: float
+    proven: float
+    elsewhere: Elsewhere | None
 
-def _planned(
-    problem: Problem,
-    limits: Floats,
-    resolution: float,
-    gap: float,
-    proven: float,
-    elsewhere: Elsewhere | None,
-    end: float | None,
-    progress: Listener | None,
-) -> SpeedProfile:
-    own = _parts_of(problem, elsewhere) if end is None else []
-    if elsewhere is not None and len(own) > 1:
-        given = [(each, limits, resolution, gap, proven > 0) for each in own]
-        planned = elsewhere.map(plan_part, given, progress)
-        for each, (found, fault) in zip(own, planned, strict=True):
-            if found is None:
-                raise error_of(problem, fault_of(each, fault))
-        profile = joined(own, [found for found, _ in planned])
-    else:
-        left = None if end is None else max(end - time.perf_counter(), 0.0)
-        try:
-            native, stopped, excess, bounds = plan_jerk_limited(
-                problem, limits, resolution, gap, proven > 0, left, progress
-            )
-        except PlanError as fault:
-            raise error_of(problem, fault) from None
-        profile = SpeedProfile.of(native, stopped=stopped, excess=math.fsum(excess), run_bounds=bounds)
-    return profile.with_others(run_bounds=proven * profile.run_bounds if proven else np.empty(0))
+    def plan(self, end: float | None, progress: Listener | None) -> SpeedProfile:
+        """The plan by a time of the clock; again with lower limits where the joints miss those of jerk."""
+        once = 0.5 if self.problem.words else 1.0
+        profile = self._once(end, part(progress, 0.0, once))
+        lowered = lowered_limits(self.problem, self.limits, profile)
+        if lowered is None:
+            return profile
+        again = replace(self, limits=lowered, proven=0.0)._once(end, part(progress, once, 1.0))
+        # What no plan within the limits can beat, no plan within lower ones can.
+        return again.with_others(run_bounds=profile.run_bounds)
 
-
-def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
-    """The parts that are planned elsewhere; fewer than two: there is nothing to share."""
-    return [] if elsewhere is None else parts(problem, elsewhere.count())
+    def _once(self, end: float | None, progress: Listener | None) -> SpeedProfile:
+        problem, settings = self.problem, (self.limits, self.resolution, self.gap, self.proven > 0)
+        elsewhere = self.elsewhere if end is None else None
+        # Fewer than two parts: there is nothing to share.
+        own = [] if elsewhere is None else parts(problem, elsewhere.count())
+        if elsewhere is not None and len(own) > 1:
+            planned = elsewhere.map(plan_part, [(each, *settings) for each in own], progress)
+            for each, (found, fault) in zip(own, planned, strict=True):
+                if found is None:
+                    raise error_of(problem, fault_of(each, fault))
+            profile = joined(own, [found for found, _ in planned])
+        else:
+            left = None if end is None else max(end - time.perf_counter(), 0.0)
+            try:
+                native, stopped, excess, bounds = plan_jerk_limited(problem, *settings, left, progress)
+            except PlanError as fault:
+                raise error_of(problem, fault) from None
+            profile = SpeedProfile.of(native, stopped=stopped, excess=math.fsum(excess), run_bounds=bounds)
+        return profile.with_others(
+            run_bounds=self.proven * profile.run_bounds if self.proven else np.empty(0)
+        )
 
 
 def plan_part(
