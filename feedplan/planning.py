@@ -373,6 +373,9 @@ def plan(
     """
     given = planners.given_options(method, options, OF_ALL_METHODS)
     solve: Callable[..., SpeedProfile] = planners.planner(method, **given)
+    if elsewhere is not None:
+        _require_parts(elsewhere, method, given.get("time_limit"))
+        solve = partial(solve, elsewhere=elsewhere)
     time_limit = given.get("time_limit")
     # The limit of a method that can tell early what follows its plan is one for all of it.
     early = planners.takes(method, planners.RESERVE)
@@ -387,8 +390,6 @@ def plan(
     one_of(interpolator, "interpolator", INTERPOLATORS)
     whole(max_setpoints, "max_setpoints", "a whole number from 1")
     callback(progress)
-    if elsewhere is not None:
-        _require_parts(elsewhere, method, time_limit)
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
     program: Program | None = None
@@ -435,8 +436,6 @@ def plan(
         problem = stated(followed)
         report("plan", 0.0)
         planned = 1.0 if planners.grid_error(method) else PLANNING
-        others = {} if elsewhere is None else {"elsewhere": elsewhere}
-        solve = partial(solve, **others)
         # Equal parts of the progress for each plan.
         each = planned / (1 + rounds if refits else 1)
         turns = count()
@@ -517,11 +516,8 @@ def plan(
         options={
             **settings,
             "tolerance": tolerance,
-            "feed": feed,
-            "feed_override": feed_override,
+            **speeds,
             "period": period,
-            "start_speed": start_speed,
-            "end_speed": end_speed,
             "interpolator": interpolator,
             "path": path,
             "path_rounds": path_rounds,

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from feedplan._solvers import joint_path as native_joint_path
 from feedplan.arrays import Floats, Integers
+from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.path_derivatives import TipPieces, contiguous, derivatives
 
@@ -124,12 +125,9 @@ def joint_path(
 
 def _singular(kinematics: Kinematics, tips: TipPieces, piece: int, fraction: float) -> Place:
     """A singular place; its name is that of the measure of `Kinematics.singular` that vanishes there."""
-    level = tips.control_points[piece]
-    if tips.weights is not None:
-        level = np.concatenate([level * tips.weights[piece, :, None], tips.weights[piece, :, None]], axis=1)
-    while len(level) > 1:
-        level = (1 - fraction) * level[:-1] + fraction * level[1:]
-    point = level[0] if tips.weights is None else level[0, :-1] / level[0, -1]
+    weights = None if tips.weights is None else tips.weights[piece]
+    curve = CompositeCurve.from_bezier(tips.control_points[piece], weights)
+    point = curve.evaluate(0, fraction)[0, 0]
     with np.errstate(all="ignore"):
         measures = kinematics.singular(tuple(point))
     what = min(measures, key=lambda name: float(np.nan_to_num(measures[name])), default="")

@@ -36,7 +36,6 @@ Point = Floats
 
 MAX_ENTITIES = 5_000_000
 _FARTHEST = 1e6  # [mm]; beyond is a mistake
-_QUARTER = math.pi / 2.0
 # Errors of the package for an entity with missing entries or entries of another type.
 _DAMAGED = (ValueError, ArithmeticError, TypeError, LookupError, AttributeError)
 
@@ -210,10 +209,15 @@ def _segments(entity: Any, scale: float) -> list[_Segment]:
         ]
         side = _side(entity) if entity.is_2d_polyline else 1.0
         return _polyline(corners, bool(entity.is_closed), side, scale)
-    if kind == "ELLIPSE":
-        return [_ellipse(entity, scale)]
-    if kind == "SPLINE":
+    if kind in ("ELLIPSE", "SPLINE"):
         spline = entity.construction_tool()
+        if kind == "ELLIPSE":
+            from ezdxf.math import BSpline
+
+            # Equal parameters mean the whole ellipse.
+            span = (spline.end_param - spline.start_param) % math.tau or math.tau
+            spline.end_param = spline.start_param + span
+            spline = BSpline.from_ellipse(spline)
         points = np.array([tuple(point) for point in spline.control_points]) * scale
         weights = list(spline.weights())
         return [_Curve(CompositeCurve.from_nurbs(points, spline.knots(), spline.degree, weights or None))]
@@ -278,27 +282,3 @@ def _bulge(start: Point, end: Point, bulge: float) -> _Arc:
     height = (1.0 - bulge * bulge) / (2.0 * bulge)
     centre = 0.5 * (start + end) + height * np.array([-y, x, 0.0])
     return _Arc(start, end, centre, 4.0 * math.atan(bulge))
-
-
-def _ellipse(entity: Any, scale: float) -> _Curve:
-    """C + a cos t + b sin t, in parts of at most a quarter turn: Piegl & Tiller 1997, section 7.5."""
-    centre, major = _point(entity.dxf.center, scale), _point(entity.dxf.major_axis, scale)
-    normal = _point(entity.dxf.get("extrusion", (0.0, 0.0, 1.0)), 1.0)
-    minor = np.cross(normal / np.linalg.norm(normal), major) * float(entity.dxf.ratio)
-    first, last = float(entity.dxf.start_param), float(entity.dxf.end_param)
-    sweep = (last - first) % (2.0 * math.pi) or 2.0 * math.pi
-    parts = math.ceil(sweep / _QUARTER - 1e-9)
-    half = 0.5 * sweep / parts
-
-    def at(angle: float, out: float = 1.0) -> Point:
-        return np.asarray(centre + out * (major * math.cos(angle) + minor * math.sin(angle)))
-
-    ends = [at(first + 2.0 * half * i) for i in range(parts + 1)]
-    if sweep == 2.0 * math.pi:
-        ends[-1] = ends[0]
-    control = [
-        (ends[i], at(first + half * (2 * i + 1), 1.0 / math.cos(half)), ends[i + 1]) for i in range(parts)
-    ]
-    weights = np.tile([1.0, math.cos(half), 1.0], parts)
-    offsets = 3 * np.arange(parts + 1)
-    return _Curve(CompositeCurve(np.concatenate(control), weights, offsets, np.full(parts, 2.0 * half)))
