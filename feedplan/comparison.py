@@ -168,15 +168,6 @@ def _show(progress: Progress | None, method: str, stage: str, done: float) -> No
 def _bounds(other: Plan, made: Plan) -> bool:
     """Whether the lower bound of `other` holds for `made`: both follow the same path, and `made` keeps the
     limits of jerk if `other` does."""
-    return _same_way(made, other) and limits_jerk(made.method) >= limits_jerk(other.method)
-
-
-def _same_way(one: Plan, other: Plan) -> bool:
-    """Whether both follow the same path with the same stops."""
-    return all(
-        np.array_equal(a, b)
-        for a, b in (
-            (one.path.curve.control_points, other.path.curve.control_points),
-            (one.problem.junction_speed, other.problem.junction_speed),
-        )
-    )
+    same_path = np.array_equal(made.path.curve.control_points, other.path.curve.control_points)
+    same_stops = np.array_equal(made.problem.junction_speed, other.problem.junction_speed)
+    return same_path and same_stops and limits_jerk(made.method) >= limits_jerk(other.method)

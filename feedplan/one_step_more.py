@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from feedplan.errors import FeedplanError
@@ -29,7 +29,7 @@ class Step:
 
     def to_json(self) -> dict[str, Any]:
         """The numbers by name."""
-        return {"limit": self.limit, "factor": self.factor, "time": self.time, "saved": self.saved}
+        return asdict(self)
 
 
 def one_step_more(made: Plan) -> tuple[Step, ...]:

@@ -87,6 +87,7 @@ def plan(
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
+    from feedplan.one_step_more import one_step_more as steps_of
     from feedplan.outputs._staging import require_folder
     from feedplan.plan_folder import files_of_plan, summary_text
     from feedplan.report.page import missing_pictures
@@ -123,7 +124,7 @@ def plan(
             **option.given_only(**options, elsewhere=elsewhere),
         )
         planned = wanted.make(result)
-        steps = _steps(result) if one_step_more else ()
+        steps = steps_of(result) if one_step_more else ()
         files: tuple[FilePath, ...] = ()
         if output:
             own = planned if wanted.in_folder else None
@@ -154,13 +155,6 @@ def plan(
             if planned is not None:
                 print(planned.summary())
     return DONE if audit.ok else fail(terminal.failure_sentence(audit), BROKEN)
-
-
-def _steps(made: Any) -> tuple[Any, ...]:
-    """The time saved by one step more of each limit."""
-    from feedplan.one_step_more import one_step_more
-
-    return one_step_more(made)
 
 
 def _elsewhere(cluster: ClusterAddress | None) -> AbstractContextManager[Any]:

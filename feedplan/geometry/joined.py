@@ -29,7 +29,10 @@ def joined(program: Program, tolerance: Floats, halt: Flags) -> tuple[Program, I
     if len(last) == len(program):
         return program, last
     new = np.searchsorted(last, np.arange(len(program)))
-    changes: dict[str, Any] = {name: _taken(getattr(program, name), last) for name in _BY_MOVE}
+    columns = {name: getattr(program, name) for name in _BY_MOVE}
+    changes: dict[str, Any] = {
+        name: None if column is None else column[last] for name, column in columns.items()
+    }
     for name in ("arc_move", "spline_move", "change_move"):
         changes[name] = new[getattr(program, name)]
     return replace(program, **changes), last
@@ -49,10 +52,6 @@ _BY_MOVE = (
     "tool_length",
     "stop_cause",
 )
-
-
-def _taken(column: Floats | None, last: Integers) -> Floats | None:
-    return None if column is None else column[last]
 
 
 def _ends(program: Program, tolerance: Floats, halt: Flags) -> Integers:

@@ -30,7 +30,7 @@ def called_files(content: bytes, folders: Sequence[FilePath]) -> dict[str, bytes
         for name in sorted(_names(text)):
             if (file := find(name)) is not None:
                 new[file[0]] = file[1]
-        if _is_computed(text):
+        if _COMPUTED.search(text) or b"" in _BY_NUMBER.findall(text):
             new |= numbered_files(folders, MAX_BYTES)
         texts += [own for name, own in new.items() if name not in found]
         found = {**new, **found}
@@ -41,7 +41,3 @@ def _names(text: bytes) -> set[str]:
     by_name = {name or number for name, number in _BY_NAME.findall(text)}
     numbers = {number for number in _BY_NUMBER.findall(text) if number}
     return {b"".join(name.split()).decode("utf-8", "replace").lower() for name in by_name | numbers}
-
-
-def _is_computed(text: bytes) -> bool:
-    return bool(_COMPUTED.search(text)) or b"" in _BY_NUMBER.findall(text)

@@ -13,7 +13,7 @@ from feedplan.jobs.executor import JobLimits
 from feedplan.jobs.identity import identity
 from feedplan.jobs.order import Order
 from feedplan.jobs.outcome import Outcome
-from feedplan.jobs.work import Pace, Stopped, work_on
+from feedplan.jobs.work import Stopped, paced, work_on
 
 TOPIC = "feedplan"
 
@@ -87,7 +87,7 @@ class _JobProgress:
         self._end = time.monotonic() + limits.max_time
         self.over_time = False
         send = worker.log_event
-        self._pace = Pace(lambda stage, part: send(TOPIC, {"task": name, "progress": [number, stage, part]}))
+        self._tell = paced(lambda stage, part: send(TOPIC, {"task": name, "progress": [number, stage, part]}))
 
     def progress(self, stage: str, part: float) -> None:
         """Reports the part of a stage that is done. Raises Stopped."""
@@ -95,7 +95,7 @@ class _JobProgress:
         if self.over_time:
             raise Stopped
         require_wanted(self._worker, self._name)
-        self._pace.progress(stage, part)
+        self._tell(stage, part)
 
 
 def require_wanted(worker: Any, name: str) -> None:

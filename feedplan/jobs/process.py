@@ -18,7 +18,7 @@ from typing import Any
 
 from feedplan.jobs.order import Job, Order
 from feedplan.jobs.outcome import Outcome
-from feedplan.jobs.work import Pace, Stopped, work_on
+from feedplan.jobs.work import Stopped, paced, work_on
 from feedplan.program.source import content_of
 
 # Modules that most jobs need; the fork server imports them once. `__main__` is that of the command.
@@ -111,11 +111,11 @@ class _Parent:
 
     def progress(self) -> Any:
         """A progress function for one job, which raises Stopped after the process was told to stop."""
-        pace = Pace(lambda stage, part: self.send({"stage": stage, "part": part}))
+        tell = paced(lambda stage, part: self.send({"stage": stage, "part": part}))
 
         def report(stage: str, part: float) -> None:
             if self._stop.is_set():
                 raise Stopped
-            pace.progress(stage, part)
+            tell(stage, part)
 
         return report

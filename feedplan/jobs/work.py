@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -94,20 +94,18 @@ def _figures(made: Plan) -> dict[str, Any]:
     }
 
 
-class Pace:
-    """Reports the progress of a job by `tell(stage, part)`, every EVERY seconds at most."""
+def paced(tell: Progress) -> Progress:
+    """A progress function that tells how far a job is, every EVERY seconds at most."""
+    told, last = "", 0.0
 
-    def __init__(self, tell: Callable[[str, float], None]) -> None:
-        self._tell = tell
-        self._told = ("", 0.0)
-
-    def progress(self, stage: str, part: float) -> None:
-        """Reports the part of a stage that is done."""
+    def report(stage: str, part: float) -> None:
+        nonlocal told, last
         now = time.monotonic()
-        last_stage, last = self._told
-        if stage in STAGES and (stage != last_stage or now - last >= EVERY):
-            self._told = (stage, now)
-            self._tell(stage, part)
+        if stage in STAGES and (stage != told or now - last >= EVERY):
+            told, last = stage, now
+            tell(stage, part)
+
+    return report
 
 
 def of_whole(stage: str, part: float) -> float:

@@ -75,7 +75,7 @@ def axis_words(
         if not isinstance(kinematics, RotaryChain) or len(kinematics.joint_names) != 5:
             raise MachineError(
                 f"machine {machine.name} has no two rotary axes that point the tool along I, J, K: "
-                "program rotary words, or use a five-axis machine"
+                "program rotary words (G43.4), or use a five-axis machine"
             )
         kinematics = ToolVector(kinematics)
     known = kinematics.tip_names

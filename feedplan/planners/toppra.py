@@ -47,17 +47,13 @@ def plan(
     """
     one_of(scheme, "scheme of toppra", SCHEMES)
     feasible = scheme == "one-sided"
-    rows = _at_both_ends if feasible else _at_start
+    ends = (0, -1) if feasible else (0,)
+
+    def rows(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
+        return end_rows(mesh, limit, ends=ends)
+
     method = Method("toppra", _solve, rows, by_axis=False, feasible=feasible, platform="Linux on x86-64")
     return plan_on_meshes(problem, method, accuracy, cells, time_limit)
-
-
-def _at_both_ends(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
-    return end_rows(mesh, limit)
-
-
-def _at_start(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
-    return end_rows(mesh, limit, ends=(0,))
 
 
 def _solve(task: Transcription, seconds: float) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from feedplan.errors import MachineError
 from feedplan.machine.axis import AXIS_LETTERS
+from feedplan.machine.axis_words import DIRECTION, axis_words
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
@@ -33,12 +34,9 @@ class TipControl:
     def check(self, mode: int) -> None:
         """Raises MachineError where the machine does not have that coordinate mode."""
         if mode != CoordinateMode.JOINTS:
-            chain = self._chain(math.nan)
-            if mode == CoordinateMode.VECTOR and len(chain.joint_names) != 5:
-                raise MachineError(
-                    f"machine {self.machine.name} has no two rotary axes that point the tool along I, J, K: "
-                    "program rotary words (G43.4), or use a five-axis machine"
-                )
+            self._chain(math.nan)
+        if mode == CoordinateMode.VECTOR:
+            axis_words(self.machine, DIRECTION, CoordinateMode.VECTOR)
 
     def joints(
         self,

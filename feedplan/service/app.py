@@ -303,7 +303,7 @@ def _add_results(app: FastAPI, service: Service) -> None:
         job: Annotated[list[str], Query(min_length=1, max_length=MOST_COMPARED)],
     ) -> dict[str, Any]:
         """One row for each job, in the order of the request: `?job=ID&job=ID`."""
-        return {"rows": views.compared(store, job)}
+        return {"rows": [views.compared(store, name) for name in job]}
 
     app.include_router(router)
 

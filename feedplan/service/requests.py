@@ -187,16 +187,11 @@ def order_of(request: PlanRequest, limits: Limits) -> Order:
     given_options(request.method, own, OF_ALL_METHODS)
     if "controller" in options:
         Controller.of(options["controller"])
-    text, machine_name = _text_of(request.machine)
+    text = machine_name = AUTO
+    if request.machine != AUTO:
+        machine = _machine(request.machine, AUTO)
+        text, machine_name = machine.to_toml(), machine.name
     return Order(_title(request.name), text, machine_name, request.method, options, request.tool_table)
-
-
-def _text_of(given: str) -> tuple[str, str]:
-    """The whole text of a machine (or `auto`), and its name."""
-    if given == AUTO:
-        return AUTO, AUTO
-    machine = _machine(given, AUTO)
-    return machine.to_toml(), machine.name
 
 
 def _machine(given: str, *others: str) -> Machine:

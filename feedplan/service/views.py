@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path as FilePath
 from typing import Any
@@ -53,12 +52,9 @@ def summary(folder: FilePath) -> dict[str, Any]:
     return table
 
 
-def compared(store: Store, names: Sequence[str]) -> list[dict[str, Any]]:
-    """Jobs as rows of a comparison. Raises Refusal for an unknown job."""
-    return [_row(store, store.job(name)) for name in names]
-
-
-def _row(store: Store, record: Record) -> dict[str, Any]:
+def compared(store: Store, name: str) -> dict[str, Any]:
+    """A job as a row of a comparison. Raises Refusal for an unknown job."""
+    record = store.job(name)
     row: dict[str, Any] = {
         "id": record["id"],
         "program": record["name"],
