@@ -20,7 +20,7 @@ from feedplan.arrays import Floats
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.audit.events import require_events
 from feedplan.audit.knots import audit_knots
-from feedplan.errors import InputError
+from feedplan.errors import InputError, unreadable
 from feedplan.geometry.corners import Corners
 from feedplan.machine.machine import Machine
 from feedplan.outputs import KNOTS, SETPOINTS, SetpointFile, load_setpoints, require_format
@@ -139,7 +139,7 @@ def _read(file: FilePath) -> _Plan:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file} is not valid JSON ({error}): plan again") from None
     except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}") from None
+        raise InputError(unreadable(file, error, "the whole folder of a plan")) from None
     entries = _Entries(file, summary)
     require_format(entries.take("format", int), str(file))
     text = entries.take("machine_file", str)

@@ -34,6 +34,11 @@ def _shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[:start]}...{text[start + 3 - most :]}"
 
 
+def unreadable(what: object, error: Exception, remedy: str) -> str:
+    """The sentence on a file that cannot be read: `part.ngc cannot be read (no such file): give …`."""
+    return f"{what} cannot be read ({getattr(error, 'strerror', None) or error}): give {remedy}"
+
+
 class InputError(FeedplanError):
     """An argument, file or array cannot be used as it is."""
 

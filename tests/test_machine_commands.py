@@ -112,7 +112,7 @@ def test_a_file_that_there_is_stays(dump: Path, capsys: Any) -> None:
     ("arguments", "words"),
     [
         (["machines", "import"], "Missing argument 'FILE'"),
-        (["machines", "import", "none.ini"], "none.ini cannot be read: No such file"),
+        (["machines", "import", "none.ini"], "none.ini cannot be read (No such file or directory): give "),
         (
             ["machines", "import", "DUMP", "--limit", "X.jerk"],
             "--limit 'X.jerk' is no limit: give one such as",

@@ -19,7 +19,14 @@ from feedplan.arguments import callback, file_path, list_of_names, number, posit
 from feedplan.client.remote import RemotePlan
 from feedplan.client.transport import Transport, error_of, form
 from feedplan.comparison import TIME_LIMIT, Row
-from feedplan.errors import FeedplanError, InfeasibleError, InputError, MissingPackageError, SolverError
+from feedplan.errors import (
+    FeedplanError,
+    InfeasibleError,
+    InputError,
+    MissingPackageError,
+    SolverError,
+    unreadable,
+)
 from feedplan.geometry.corners import FollowedPath
 from feedplan.geometry.path import Path
 from feedplan.machine.controller import Controller
@@ -276,7 +283,7 @@ def _text(file: str | os.PathLike[str]) -> str:
     try:
         return place.read_bytes().decode("utf-8", "replace")
     except OSError as error:
-        raise InputError(f"the tool table {place} cannot be read: {error.strerror or error}") from None
+        raise InputError(unreadable(f"the tool table {place}", error, "the path of a .tbl file")) from None
 
 
 def _plain(value: Any) -> Any:

@@ -22,7 +22,7 @@ class CurveLength:
 
     def __init__(self, curve: CompositeCurve, accuracy: float = 1e-13) -> None:
         if len(curve) == 0:
-            raise InputError("the curve is empty: it has no length table")
+            raise InputError("the curve is empty: give at least one piece")
         if not 1e-16 <= accuracy < 1:
             raise InputError(f"the accuracy of lengths is {accuracy:g}: give a part from 1e-16 to 1")
         self._table = Native(curve.native, accuracy)

@@ -11,7 +11,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from feedplan.arguments import shown
-from feedplan.errors import MachineError
+from feedplan.errors import MachineError, unreadable
 from feedplan.lazy import cached_property
 from feedplan.machine.axis import Axis, size_of, sizes_of
 from feedplan.machine.checks import numbers, one_by_one, require, require_text, set_within, written
@@ -152,7 +152,8 @@ class Machine:
                 with path.open(encoding="utf-8") as file:
                     content = file.read(MAX_LETTERS + 1)
             except (OSError, ValueError) as error:
-                raise MachineError(f"machine file {text} cannot be read: {error}") from None
+                remedy = "the path of a .toml file in UTF-8"
+                raise MachineError(unreadable(f"machine file {text}", error, remedy)) from None
             return cls.from_toml(content, text)
         return cls.from_toml(bundled_text(text), text)
 
@@ -179,7 +180,7 @@ class Machine:
         except MachineError as error:
             raise MachineError(f"machine file {name}: {error}") from None
         except (ValueError, RecursionError) as error:
-            raise MachineError(f"machine file {name} is not valid TOML: {error}") from None
+            raise MachineError(f"machine file {name} is not valid TOML ({error}): correct it there") from None
 
     def to_toml(self) -> str:
         """The text of a machine file that gives the same machine."""

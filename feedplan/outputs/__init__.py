@@ -23,7 +23,7 @@ from pathlib import Path as FilePath
 from typing import Any, Literal, Protocol, cast, get_args
 
 from feedplan.arguments import callback, file_path, one_of, shown
-from feedplan.errors import InputError
+from feedplan.errors import InputError, unreadable
 from feedplan.events import TimedEvents
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
@@ -148,4 +148,4 @@ def _load(name: str, file: FilePath, progress: Listener | None) -> SetpointFile:
     except FileNotFoundError:
         raise InputError(f"{file} does not exist: give the setpoints or the folder of a plan") from None
     except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}") from None
+        raise InputError(unreadable(file, error, "the setpoints or the folder of a plan")) from None

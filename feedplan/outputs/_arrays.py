@@ -27,7 +27,9 @@ def chunk_of(
     """
     missing = [name for name in (*columns, "axes") if name not in arrays]
     if missing:
-        raise InputError(f"{file} is not a file of setpoints: {', '.join(missing)} is missing")
+        raise InputError(
+            f"{file} is not a file of setpoints: it lacks {', '.join(missing)}: give one that has them"
+        )
     require_format(_single(arrays.get("format", FORMAT)), str(file))
     axes = tuple(str(name) for name in np.asarray(arrays["axes"]).ravel())
     if len(axes) > len(AXIS_LETTERS):

@@ -200,10 +200,12 @@ def _table(numbered: list[tuple[int, str]], width: int, separator: str | None, f
     for number, text in numbered:
         fields = text.rstrip("\r\n").split(separator)
         if len(fields) != width:
-            raise InputError(f"{file}, line {number}: {len(fields)} values where {width} are needed")
+            raise InputError(
+                f"{file}, line {number}: {len(fields)} values where {width} are needed: plan again"
+            )
         wrong = next((given for given in fields if not _is_number(given)), None)
         if wrong is not None:
-            raise InputError(f"{file}, line {number}: '{wrong}' is not a number")
+            raise InputError(f"{file}, line {number}: '{wrong}' is not a number: plan again")
     raise InputError(f"{file}: the rows cannot be read: give one line of {width} numbers a setpoint")
 
 

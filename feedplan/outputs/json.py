@@ -75,7 +75,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{file} is not valid JSON: {error}") from None
+        raise InputError(f"{file} is not valid JSON ({error}): plan again") from None
     if not isinstance(table, dict):
         raise InputError(f"{file} is not a file of setpoints: an object with t, position, … is needed")
     try:

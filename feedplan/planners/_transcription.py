@@ -74,11 +74,6 @@ class Transcription:
             known[station] = x or 0.0
         return known
 
-    def time(self, x: Floats) -> float:
-        """The time of a solution [s]."""
-        root = np.sqrt(x)
-        return float((2.0 * self.width / (self.near * root[:-1] + self.far * root[1:])).sum())
-
 
 def transcribe(
     mesh: Mesh, rows: Rows, acceleration: Floats, share: Floats, feasible: bool = True

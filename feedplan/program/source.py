@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from feedplan.arguments import file_path, shown
-from feedplan.errors import InputError, ProgramError
+from feedplan.errors import InputError, ProgramError, unreadable
 
 Source = str | bytes | os.PathLike[str] | IO[str] | IO[bytes]
 
@@ -60,7 +60,7 @@ def _of_file(path: Path, max_bytes: int) -> bytes:
             # Pipes and other special files have the size 0 whatever they hold.
             content = stream.read(size + 1) if size else b"".join(_parts(stream, max_bytes))
     except OSError as error:
-        raise ProgramError(f"{path} cannot be read: {error.strerror or error}") from None
+        raise ProgramError(unreadable(path, error, "the path of a part program")) from None
     return _checked(content, str(path), max_bytes)
 
 
@@ -70,7 +70,7 @@ def _of_stream(stream: Any, name: str | None, max_bytes: int) -> Content:
     try:
         parts = list(_parts(stream, max_bytes))
     except (OSError, ValueError) as error:  # closed, open for writing alone, no text
-        raise ProgramError(f"{name} cannot be read: {error}") from None
+        raise ProgramError(unreadable(name, error, "an open stream of text or bytes")) from None
     texts = [part.encode("utf-8", "surrogateescape") if isinstance(part, str) else part for part in parts]
     odd = next((part for part in texts if not isinstance(part, bytes)), None)
     if odd is not None:

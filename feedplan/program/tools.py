@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from feedplan.errors import InputError
+from feedplan.errors import InputError, unreadable
 from feedplan.machine.axis import AXIS_LETTERS
 
 MAX_BYTES = 1 << 20
@@ -38,7 +38,7 @@ def read_tools(file: Path) -> tuple[Tool, ...]:
             raise InputError(f"{file} has more than {MAX_BYTES} bytes: give a tool table")
         lines = file.read_bytes().decode("utf-8", "replace").splitlines()
     except OSError as error:
-        raise InputError(f"the tool table {file} cannot be read: {error.strerror or error}") from None
+        raise InputError(unreadable(f"the tool table {file}", error, "the path of a .tbl file")) from None
     tools: dict[int, Tool] = {}
     for number, line in enumerate(lines, 1):
         words = _words(line, f"{file.name} line {number}")

@@ -40,7 +40,7 @@ def test_a_sweep_has_a_folder_and_a_row_for_each_plan(tmp_path: Path) -> None:
     ]
     assert [row["ok"] for row in found] == [True] * 4 + [None] * 8
     assert {row["kind"] for row in found[4:]} == {"program"}
-    assert "missing.ngc cannot be read: No such file" in found[-1]["error"]
+    assert "missing.ngc cannot be read (No such file" in found[-1]["error"]
     for row in found[:4]:
         made = feedplan.plan(program, row["machine"], tolerance=row["tolerance"])
         assert (row["time"], row["lower_bound"], row["gap"]) == (made.time, made.lower_bound, made.gap)
@@ -161,7 +161,7 @@ def test_one_batch_at_a_time_works_on_a_folder(tmp_path: Path) -> None:
         ),
         (("--format", "npz", "--format", "none"), "--format none excludes other formats: leave one"),
         (("-m", "mil"), "machine"),
-        (("--tool-table", "none.tbl"), "the tool table none.tbl cannot be read: No such file"),
+        (("--tool-table", "none.tbl"), "the tool table none.tbl cannot be read (No such file"),
         (("--jobs", "2", "--cluster", "127.0.0.1:8786"), "--jobs is for processes of this computer"),
         (("--tls-ca", "ca.pem"), "are for a cluster: give --cluster too"),
         (("-o", "part0.ngc"), "is a file, not a folder: choose another folder with -o"),

@@ -152,7 +152,7 @@ def test_npz_of_another_shape_or_with_objects_is_refused(tmp_path: Path) -> None
     with pytest.raises(InputError, match=r"jerk has the shape \(50, 2\)"):
         load_setpoints(tmp_path / "shape.npz")
     np.savez(tmp_path / "lacks.npz", t=whole.t)
-    with pytest.raises(InputError, match="position, velocity, acceleration, jerk, line, axes is missing"):
+    with pytest.raises(InputError, match="position, velocity, acceleration, jerk, line, axes: give"):
         load_setpoints(tmp_path / "lacks.npz")
     np.savez(tmp_path / "objects.npz", **(arrays | {"t": np.array([None] * 50)}))
     with pytest.raises(InputError, match="not a whole npz file"):

@@ -23,7 +23,9 @@ def test_a_file_is_read_under_its_name(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ProgramError, match=r"part\.ngc cannot be read: No such file or directory$"):
+    with pytest.raises(
+        ProgramError, match=r"part\.ngc cannot be read \(No such file or directory\): give the path"
+    ):
         read_program(tmp_path / "part.ngc")
 
 

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from feedplan.arguments import shown
-from feedplan.errors import MachineError
+from feedplan.errors import MachineError, unreadable
 
 # Bounds of all files together: size [bytes], number, and depth of inclusion.
 MAX_BYTES = 1 << 20
@@ -68,8 +68,7 @@ class TextFiles:
             with path.open("rb") as stream:
                 content = stream.read(MAX_BYTES + 1 - self._bytes)
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise MachineError(f"{path} cannot be read: {reason}") from None
+            raise MachineError(unreadable(path, error, "the path of a controller's file")) from None
         self._bytes += len(content)
         if self._bytes > MAX_BYTES:
             raise MachineError(f"{path} has more than {MAX_BYTES} bytes: give the part with the limits")
