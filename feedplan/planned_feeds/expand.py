@@ -82,7 +82,7 @@ def expanded(program: Program, machine: Machine | None, dialect: DialectName) ->
                 if ends[m, column] != starts[m, column] or (m in arcs and name in "XYZ")
             ]
             if m in arcs:
-                code = _arc(out, program, m, arcs[m], starts[m] + zero)
+                code = _arc(out, program, arcs[m], starts[m] + zero)
             else:
                 code = [out.changed("motion", b"G0" if rapid else b"G1")]
             out.add(*code[:2], *moved, *code[2:], feed)
@@ -116,7 +116,7 @@ def _control(program: Program, m: int) -> bytes:
     return b" ".join(words)
 
 
-def _arc(out: _Blocks, program: Program, m: int, row: int, start: Floats) -> list[bytes]:
+def _arc(out: _Blocks, program: Program, row: int, start: Floats) -> list[bytes]:
     """Plane, code, centre and turns of an arc."""
     normal, angle = int(program.arc_normal[row]), float(program.arc_angle[row])
     words = [out.changed("plane", _PLANES[normal]), out.changed("motion", b"G2" if angle < 0.0 else b"G3")]

@@ -143,7 +143,7 @@ class _Motion:
         return _Motion(np.where(better, other.p, self.p), np.where(better, other.s, self.s))
 
 
-def profile(problem: Problem, parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
+def profile(parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
     """The arcs of all subruns as one profile; `runs` are the arcs' offsets of the runs."""
     meshes, arcs = [mesh for mesh, _ in parts], [part for _, part in parts]
     return SpeedProfile(

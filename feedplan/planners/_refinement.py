@@ -127,7 +127,7 @@ def plan_on_meshes(
             parts.append(part)
             count += len(part[0])
         runs.append(count)
-    return profile(problem, parts, runs)
+    return profile(parts, runs)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 MB = 1_000_000
@@ -40,6 +40,5 @@ class Limits:
     def to_json(self) -> dict[str, dict[str, Any]]:
         """All limits with their values and units."""
         return {
-            own.name: {"value": value, "unit": own.metadata["unit"]}
-            for own, value in zip(fields(self), asdict(self).values(), strict=True)
+            own.name: {"value": getattr(self, own.name), "unit": own.metadata["unit"]} for own in fields(self)
         }

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 
 from feedplan.service.answers import Problem
 from feedplan.service.refusals import MEDIA_TYPE
-from feedplan.service.requests import JobRequest
+from feedplan.service.requests import JobRequest, PlanRequest
 
 DESCRIPTION = """\
 Time-optimal feed planning for CNC part programs. Send a program and a machine to `POST /v1/jobs`; follow the
@@ -33,6 +33,11 @@ _EXAMPLE = {
     "options": {"tolerance": 0.02},
 }
 _TEXT = {"type": "string"}
+# The fields of a form are texts, with the descriptions that they have in JSON.
+_FIELDS = {
+    name: {**_TEXT, "description": own.description} if own.description else _TEXT
+    for name, own in PlanRequest.model_fields.items()
+}
 SUBMISSION: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -62,14 +67,8 @@ SUBMISSION: dict[str, Any] = {
                             **BINARY,
                             "description": "The program as a file; the job gets the file's name",
                         },
-                        "name": _TEXT,
-                        "machine": {
-                            **_TEXT,
-                            "description": "A bundled machine, auto, or a machine file (TOML)",
-                        },
-                        "method": _TEXT,
+                        **_FIELDS,
                         "options": {**_TEXT, "description": "The options as JSON"},
-                        "tool_table": {**_TEXT, "description": "LinuxCNC's tool table (.tbl)"},
                     },
                 },
                 "example": {"program": _PROGRAM, "machine": "mill", "options": '{"tolerance": 0.02}'},

@@ -24,7 +24,7 @@ from feedplan.service.store import Upload
 # Longest text beside the program [bytes].
 LONGEST_TEXT = 1 << 20
 _PART = 1 << 20
-_FIELDS = ("name", "machine", "method", "options", "tool_table")
+_FIELDS = tuple(PlanRequest.model_fields)
 
 
 async def received(request: Request, new: FilePath, limits: Limits) -> tuple[Upload, PlanRequest]:

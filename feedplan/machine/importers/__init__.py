@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 
 from feedplan.arguments import file_path, shown
 from feedplan.errors import InputError, MachineError
@@ -60,4 +61,6 @@ def find_machine(
         raise MachineError(f"{path.name} is no file of a machine that is known: give {_REMEDY}")
     files = TextFiles(path)
     found: FoundMachine = form.read(path, files)
-    return found.with_name(name).with_missing_files(files.missing).with_limits(limits or {})
+    missing = tuple(f"{shown(own)} is not there: what it holds is left out" for own in files.missing)
+    found = replace(found, name=found.name if name is None else name, warnings=(*found.warnings, *missing))
+    return found.with_limits(limits or {})

@@ -87,15 +87,6 @@ class FoundMachine:
     controller: str = ""
     parameters: Mapping[str, Found] = field(default_factory=dict)
 
-    def with_name(self, name: str | None) -> FoundMachine:
-        """The same by another name, if one is given."""
-        return self if name is None else replace(self, name=name)
-
-    def with_missing_files(self, names: Iterable[str]) -> FoundMachine:
-        """The same with a warning of included files that do not exist."""
-        missing = tuple(f"{shown(name)} is not there: what it holds is left out" for name in names)
-        return replace(self, warnings=(*self.warnings, *missing))
-
     def with_limits(self, given: Mapping[str, float]) -> FoundMachine:
         """The same with limits given by name, such as `X.jerk`, in place of the file's.
 
