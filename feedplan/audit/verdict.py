@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from feedplan.audit.worst import Findings
 from feedplan.units import finite
@@ -19,8 +19,7 @@ PASS_MARK = 1.0 + 1e-6
 _LONGEST = 1e12
 
 
-@dataclass(frozen=True)
-class _Kind:
+class _Kind(NamedTuple):
     """How a check is called in a sentence, and its unit."""
 
     quantity: str
@@ -55,6 +54,9 @@ _KINDS = {
 
 # What is told and never judged: it is no part of a plan.
 _TOLD = ("cubic_acceleration",)
+
+# What None stands for in JSON.
+_NOT_FINITE = {"worst": math.nan, "limit": math.inf, "ratio": math.nan, "time": math.nan}
 
 # Where these fail, the differences over those times and numbers mean nothing.
 _EXPLAINING = ("numbers", "grid")
@@ -175,15 +177,7 @@ class Audit:
                 continue
             by_axis = {None: entry} if "ratio" in entry else entry
             for axis, row in by_axis.items():
-                numbers = {
-                    key: missing if row[key] is None else row[key]
-                    for key, missing in (
-                        ("worst", math.nan),
-                        ("limit", math.inf),
-                        ("ratio", math.nan),
-                        ("time", math.nan),
-                    )
-                }
+                numbers = {key: other if row[key] is None else row[key] for key, other in _NOT_FINITE.items()}
                 unit = length if axis is None else units[axis]
                 checks.append(
                     LimitCheck(name, axis, **numbers, line=row["line"], judged=row["judged"], length=unit)
