@@ -8,8 +8,6 @@ the place of it that is nearest to the programmed point.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from feedplan._solvers import Sampler
@@ -34,10 +32,10 @@ class PlannedEvents:
         self._program, self._path = program, path
         self._placed: list[PlacedEvents] = []
 
-    def placed(self, motion: Callable[[], Sampler]) -> PlacedEvents:
+    def __call__(self, motion: Sampler) -> PlacedEvents:
         """By the runs of the path, found once; `motion` reads the plan's motion, whatever its period is."""
         if not self._placed:
-            self._placed.append(place_events(self._program, self._path, motion()))
+            self._placed.append(place_events(self._program, self._path, motion))
         return self._placed[0]
 
 

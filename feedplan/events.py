@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import Sampler
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.program.actions import KINDS
 from feedplan.units import counted
@@ -95,12 +94,6 @@ class TimedEvents:
             digest.update(np.where(np.isnan(values), np.nan, values).tobytes())
         digest.update(json.dumps([self.kind.tolist(), self.text]).encode())
         return digest.hexdigest()
-
-
-class Events(Protocol):
-    """The events of a plan, with their times in its runs."""
-
-    def placed(self, motion: Callable[[], Sampler]) -> PlacedEvents: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)

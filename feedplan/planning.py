@@ -172,7 +172,7 @@ class Plan:
 
     @property
     def _placed(self) -> PlacedEvents | None:
-        return None if self._events is None else self._events.placed(lambda: self.trajectory.sampler)
+        return None if self._events is None else self._events(self.trajectory.sampler)
 
     @cached_property
     def trajectory(self) -> Trajectory:

@@ -15,7 +15,7 @@ from feedplan.arguments import is_whole, number, one_of, positive, shown, whole
 from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
-from feedplan.events import Events, TimedEvents
+from feedplan.events import PlacedEvents, TimedEvents
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 from feedplan.units import counted
@@ -106,7 +106,7 @@ class Setpoints:
         interpolator: Interpolator = "sarfraz",
         max_setpoints: int = MAX_SETPOINTS,
         progress: Listener | None = None,
-        events: Events | None = None,
+        events: Callable[[Sampler], PlacedEvents] | None = None,
     ) -> None:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
@@ -150,7 +150,7 @@ class Setpoints:
         """
         if self._events is None:
             return TimedEvents.none()
-        return self._events.placed(lambda: self._sampler).on(self.run_starts)
+        return self._events(self._sampler).on(self.run_starts)
 
     @property
     def run_starts(self) -> Floats:
