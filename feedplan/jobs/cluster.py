@@ -218,7 +218,7 @@ def _sent(job: Job) -> cluster_task.Sent:
         table = None if job.tool_table is None else job.tool_table.read_bytes()
         called = called_files(content, job.subprograms)
     except (OSError, ValueError) as error:
-        raise InputError(f"{job.order.name} calls a file that cannot be sent: {error}") from None
+        raise InputError(f"{job.order.name} calls a file that cannot be sent ({error}): correct it") from None
     return cluster_task.Sent(job.order.text(), content, table, called)
 
 

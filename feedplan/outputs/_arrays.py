@@ -45,7 +45,7 @@ def chunk_of(
         raise InputError(f"{file}: the period is {shown(period)}: give a positive number [s]")
     t = np.asanyarray(arrays["t"])
     if t.ndim != 1 or len(t) == 0:
-        raise InputError(f"{file} holds no setpoints: t has the shape {t.shape}, (n,) is needed")
+        raise InputError(f"{file} holds no setpoints: t has the shape {t.shape}: give times of shape (n,)")
     shapes = {"t": (len(t),), "line": (len(t),)} | {name: (len(t), len(axes)) for name in QUANTITIES}
     known = {name: arrays[name] for name in columns}
     for name in columns:

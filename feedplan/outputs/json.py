@@ -77,7 +77,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file} is not valid JSON ({error}): plan again") from None
     if not isinstance(table, dict):
-        raise InputError(f"{file} is not a file of setpoints: an object with t, position, … is needed")
+        raise InputError(f"{file} is not a file of setpoints: give an object with t, position, …")
     try:
         arrays: dict[str, Any] = {
             name: np.array(table[name], dtype=np.float64) for name in ("t", *QUANTITIES) if name in table

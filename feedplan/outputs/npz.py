@@ -79,7 +79,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     except (OSError, InputError):
         raise
     except Exception as error:  # zipfile and numpy raise many classes of errors for damaged files
-        raise InputError(f"{file} is not a whole npz file: {error}") from None
+        raise InputError(f"{file} is not a whole npz file ({error}): plan again") from None
     if "events" in arrays:
         texts = arrays.get("event_texts", np.empty(0, np.uint8))
         arrays["events"] = from_records(arrays["events"], texts, file)

@@ -79,7 +79,8 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     axes, units = (about.get("axes"), about.get("units")) if isinstance(about, dict) else (None, None)
     if not isinstance(axes, list) or not isinstance(units, list):
         raise InputError(
-            f"{file} is not a file of setpoints: its metadata have no {_KEY.decode()} with axes and units"
+            f"{file} is not a file of setpoints: its metadata have no {_KEY.decode()} with axes and units: "
+            "plan again"
         )
     names = column_names(axes, units) if len(axes) == len(units) else "units for its axes"
     if ",".join(table.column_names) != names:

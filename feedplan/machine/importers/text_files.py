@@ -100,7 +100,7 @@ class TextFiles:
             known = [own.resolve() for own in inside]
             again = next((entry for entry in found if entry.resolve() in known), None)
         except (OSError, ValueError, RuntimeError) as error:  # no path, no such home
-            raise MachineError(f"{place}: {shown(name)} cannot be included: {error}") from None
+            raise MachineError(f"{place}: {shown(name)} cannot be included ({error}): correct it") from None
         if again is not None:
             raise MachineError(f"{place}: {again.name} includes itself: take this line out")
         return found
