@@ -27,13 +27,13 @@ def archive(count: int) -> io.BytesIO:
     return file
 
 
-@pytest.mark.parametrize("wide_from", [_zip._ESCAPE, 1, 300])
-def test_members_written_in_turns_are_read_whole(wide_from: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_zip, "_WIDE_FROM", wide_from)
+@pytest.mark.parametrize("limit", [zipfile.ZIP64_LIMIT, 1, 300])
+def test_members_written_in_turns_are_read_whole(limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zipfile, "ZIP64_LIMIT", limit)
     file = archive(100)
     with zipfile.ZipFile(file) as check:
         assert check.testzip() is None
-        assert any(info.extract_version == 45 for info in check.infolist()) == (wide_from < _zip._ESCAPE)
+        assert any(info.extract_version == 45 for info in check.infolist()) == (limit < 1000)
     file.seek(0)
     with np.load(file) as arrays:
         np.testing.assert_array_equal(arrays["b"], np.arange(100))
