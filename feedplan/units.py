@@ -33,15 +33,17 @@ def finite(value: float) -> float | None:
 
 def duration_text(seconds: float) -> str:
     """A duration as people read it: `842 µs`, `1.234 s`, `12 min 03.4 s`, `2 h 05 min 10 s`."""
-    if seconds < 1e-3:
+    # Rounded first, so that no unit shows as many as make the next one.
+    if round(seconds, 6) < 1e-3:
         return f"{seconds * 1e6:.0f} µs"
-    if seconds < 1.0:
+    if round(seconds, 4) < 1.0:
         return f"{seconds * 1e3:.1f} ms"
-    if seconds < SECONDS_PER_MINUTE:
+    if round(seconds, 3) < SECONDS_PER_MINUTE:
         return f"{seconds:.3f} s"
-    minutes, rest = divmod(seconds, SECONDS_PER_MINUTE)
+    minutes, rest = divmod(round(seconds, 1), SECONDS_PER_MINUTE)
     if minutes < 60:
         return f"{minutes:.0f} min {rest:04.1f} s"
+    minutes, rest = divmod(round(seconds, 0), SECONDS_PER_MINUTE)
     hours, minutes = divmod(minutes, 60)
     return f"{hours:.0f} h {minutes:02.0f} min {rest:02.0f} s"
 
