@@ -13,7 +13,7 @@ from numbers import Real
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from feedplan.arguments import callback, file_path, flag, list_of_names, refuse
+from feedplan.arguments import callback, file_path, flag, instance, list_of_names, refuse
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, formats_named
 from feedplan.outputs._staging import require_folder, staged
@@ -72,7 +72,9 @@ def write_plan(
         raise refuse("the plan", plan, "what feedplan.plan returns")
     outputs = formats_named(formats)
     if program is not None:
-        _require_program(program)
+        from feedplan.planned_feeds.rewrite import PlannedProgram
+
+        instance(program, PlannedProgram, "the program", "what feedplan.planned_program returns")
     flag(drawing, "the drawing")
     steps = _steps(one_step_more)
     knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)
@@ -239,13 +241,6 @@ def _folder(given: str | os.PathLike[str]) -> FilePath:
     folder = file_path(given, "the folder", "the path of a folder, as a text or a pathlib.Path")
     require_folder(folder)
     return folder
-
-
-def _require_program(given: object) -> None:
-    from feedplan.planned_feeds.rewrite import PlannedProgram
-
-    if not isinstance(given, PlannedProgram):
-        raise refuse("the program", given, "what feedplan.planned_program returns")
 
 
 def _steps(given: Sequence[Step]) -> tuple[Step, ...]:

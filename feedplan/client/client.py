@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any, cast
 
-from feedplan.arguments import callback, file_path, list_of_names, number, positive, refuse
+from feedplan.arguments import callback, file_path, instance, list_of_names, number, positive, refuse
 from feedplan.client.remote import RemotePlan
 from feedplan.client.transport import Transport, error_of, form
 from feedplan.comparison import TIME_LIMIT, Row
@@ -147,8 +147,7 @@ class Client:
         progress: Progress | None = None,
     ) -> tuple[FilePath, ...]:
         """Loads the files of a plan from the service into a folder, as `feedplan.write_plan` writes it."""
-        if not isinstance(plan, RemotePlan):
-            raise refuse("the plan", plan, "what Client.plan returns")
+        instance(plan, RemotePlan, "the plan", "what Client.plan returns")
         names = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")
         place = file_path(folder, "the folder", "the path of a folder, as a text or a pathlib.Path")
         return plan.write(place, cast("tuple[FormatName, ...]", names), progress)
