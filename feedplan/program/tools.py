@@ -15,6 +15,7 @@ from feedplan.errors import InputError, unreadable
 from feedplan.machine.axis import AXIS_LETTERS
 
 MAX_BYTES = 1 << 20
+_GREATEST = 2**32 - 1  # of T, P and Q
 
 _WORD = re.compile(r"\s*([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
 _KNOWN = frozenset("TPDQIJ").union(AXIS_LETTERS)
@@ -65,13 +66,19 @@ def _words(line: str, place: str) -> dict[str, float]:
 
 
 def _tool(words: dict[str, float], place: str) -> Tool:
-    number = words.get("T", -1.0)
-    if number < 0 or number != int(number):
+    if "T" not in words:
         raise InputError(f"{place}: the tool has no number: give a whole T from 0")
+
+    def whole(letter: str, least: int = 0) -> int:
+        value = words.get(letter, 0.0)
+        if not least <= value <= _GREATEST or value != int(value):
+            raise InputError(f"{place}: {letter} is {value:g}: give a whole number from 0 to {_GREATEST}")
+        return int(value)
+
     return Tool(
-        number=int(number),
-        pocket=max(int(words.get("P", 0.0)), 0),
+        number=whole("T"),
+        pocket=max(whole("P", least=-1), 0),  # LinuxCNC has -1 for none
         offset=tuple(words.get(letter, 0.0) for letter in AXIS_LETTERS),
         diameter=words.get("D", 0.0),
-        orientation=max(int(words.get("Q", 0.0)), 0),
+        orientation=whole("Q"),
     )

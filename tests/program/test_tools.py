@@ -8,7 +8,7 @@ from feedplan.errors import InputError, ProgramError
 from feedplan.program.read import read_program
 from feedplan.program.tools import Tool, read_tools
 
-TABLE = "; tools of the shop\nT1 P2 X+1.5 Z-50.25 A90 D6 Q9 ;6 mm T9\n\nt12 d.5 i45 j-10\n"
+TABLE = "; tools of the shop\nT1 P2 X+1.5 Z-50.25 A90 D6 Q9 ;6 mm T9\n\nt12 p-1 d.5 i45 j-10\n"
 
 
 def test_a_line_is_a_tool(tmp_path: Path) -> None:
@@ -23,7 +23,10 @@ def test_a_line_is_a_tool(tmp_path: Path) -> None:
     [
         ("T1 Z", "tool.tbl line 1: 'Z' is no word of a tool table"),
         ("Z5", "line 1: the tool has no number"),
-        ("T1.5", "line 1: the tool has no number"),
+        ("T1.5", "line 1: T is 1.5: give a whole number from 0"),
+        ("T" + 400 * "9", "line 1: T is inf: give a whole number from 0 to 4294967295"),
+        ("T1\nT2 P99999999999", "line 2: P is 1e\\+11: give a whole number"),
+        ("T1 Q-1", "line 1: Q is -1: give a whole number"),
         ("T1\nT2 K5", "line 2: 'K5' is no word"),
     ],
 )
