@@ -209,7 +209,7 @@ class _Entries:
     def take(self, name: str, kind: type) -> Any:
         """An entry of that type. Raises InputError if it is missing or has another type."""
         value = self._table.get(name)
-        if not isinstance(value, kind) or isinstance(value, bool):
+        if not isinstance(value, kind) or (isinstance(value, int) and not is_number(value)):
             what = "missing" if value is None else shown(value)
             raise InputError(f"{self._file}: {self._place}{name} is {what}: plan again")
         return value

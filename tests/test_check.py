@@ -263,6 +263,7 @@ def no_machine(summary: dict[str, Any]) -> None:
         (changed(setpoints=[]), "setpoints is []"),
         (changed(setpoints={}), "setpoints axes is missing"),
         (changed(runs=1e9), "runs is 1000000000.0"),
+        (changed(runs=10**400), "runs is 10000000"),
     ],
 )
 def test_a_changed_plan_is_refused_in_one_sentence(change: Any, words: str, folder: Any, capsys: Any) -> None:

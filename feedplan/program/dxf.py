@@ -173,7 +173,8 @@ def _add(moves: Moves, segments: Sequence[_Segment], number: int) -> None:
 
 
 def _hidden(document: Any, entity: Any) -> bool:
-    layer = entity.dxf.get("layer", "0")
+    # Kinds that the package does not know have no such attribute.
+    layer = entity.dxf.layer if entity.dxf.hasattr("layer") else "0"
     if layer not in document.layers:
         return False
     row = document.layers.get(layer)

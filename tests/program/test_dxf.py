@@ -182,6 +182,16 @@ def test_what_is_left_out_is_counted_by_kind() -> None:
     )
 
 
+def test_kinds_that_nobody_knows_are_left_out() -> None:
+    def draw(space: Any) -> None:
+        space.add_line((0, 0), (1, 0))
+        space.add_point((5, 5))
+
+    program = read_dxf(drawing(draw).replace(b"\nPOINT\n", b"\nACME_PIPE\n"), "part.dxf")
+    assert len(program) == 1
+    assert program.warnings[0] == "part.dxf: 1 entity left out: ACME_PIPE"
+
+
 def test_a_drawing_can_be_planned_at_a_feed(tmp_path: Path) -> None:
     file = tmp_path / "part.dxf"
     file.write_bytes(drawing(lambda space: space.add_lwpolyline([(0, 0), (60, 0), (60, 60)])))
