@@ -16,6 +16,9 @@ const SAMPLES: usize = STEPS * LAST + 1;
 /// Peaks are only sought where a sample uses more than this part of a limit.
 const NEAR: f64 = 0.97;
 
+/// Relative error of an interval's length, in units of the rounding of a length as long as the path: that of its phases.
+const ROUNDINGS: f64 = 4.0;
+
 /// The basis and its first two derivatives at each sample.
 const BASES: [[Basis; 3]; SAMPLES] = bases();
 
@@ -45,6 +48,8 @@ struct Block {
     at_stations: [Lanes; 2],
     /// Factor by which the limits of jerk are tighter.
     jerk_factor: Lanes,
+    /// The relative error of the lengths.
+    rounding: Lanes,
 }
 
 /// The limits of a window at all samples.
@@ -87,6 +92,8 @@ impl IntersampleCheck {
         self.blocks.clear();
         self.q.clear();
         self.q.resize(rows.blocks.len() * M, [[Lanes::ZERO; 3]; SAMPLES]);
+        let knots = geometry.knots();
+        let error = ROUNDINGS * f64::EPSILON * (knots[knots.len() - 1] - knots[0]);
         for (b, own) in rows.blocks.iter().enumerate() {
             let first = b * LANES;
             let mut caps = [Lanes::ZERO; SAMPLES];
@@ -115,11 +122,13 @@ impl IntersampleCheck {
                 }
             }
             let at_stations = [0, LAST].map(|p| own.points[p].speed);
-            self.blocks.push(Block { caps, at_stations, jerk_factor: own.jerk });
+            let rounding = own.h.map(|h| error / h);
+            self.blocks.push(Block { caps, at_stations, jerk_factor: own.jerk, rounding });
         }
     }
 
-    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x.
+    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x; that of jerk with the
+    /// rounding of the lengths, which short intervals of long paths feel.
     ///
     /// Peaks are sought for each axis alone: the maximum over several axes is not smooth.
     pub fn utilisation(&self, rows: &Constraints, x: &[f64]) -> Vec<[f64; 3]> {
@@ -158,7 +167,14 @@ impl IntersampleCheck {
                     let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
                     uses[i] = (q3 * w + q2 * half * 3.0 + q1 * bend) * v * jerk;
                 }
-                worst[2] = peak(&uses, [1.0; 2]).max(worst[2]);
+                // The jerk as it is at a length that is rounded: w'' changes by twice its error, w' by once.
+                let mut terms = zero;
+                for i in [0, SAMPLES - 1] {
+                    let ([_, half, bend, v], [q1, q2, _]) = (motion[i], q[i]);
+                    terms = terms.max(((q2 * half).abs() * 3.0 + (q1 * bend).abs() * 2.0) * v);
+                }
+                let rounding = terms * jerk * block.rounding;
+                worst[2] = (peak(&uses, [1.0; 2]) + rounding).max(worst[2]);
             }
             let worst = worst.map(Register::values);
             for (lane, out) in out.iter_mut().enumerate() {

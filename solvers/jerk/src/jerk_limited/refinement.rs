@@ -18,7 +18,7 @@ const PRICE: f64 = 0.06;
 const LOWER: f64 = 0.93;
 const TIMES: i32 = 255;
 /// A grid whose loss is at most this part of the time, over the square of the resolution, is fine enough.
-const LITTLE: f64 = 0.003;
+const LITTLE: f64 = 0.0025;
 /// The most parts of an interval.
 const MOST: u32 = 8;
 /// Complementarity gap of the rough plan, as a part of the time, times the square of the resolution.
