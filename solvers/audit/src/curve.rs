@@ -133,12 +133,17 @@ impl Pieces<'_> {
         rows.clone().all(|other| row(other) == row(rows.start))
     }
 
-    /// Piece `i`, ready to be evaluated.
-    pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
+    /// Piece `i` by its polygon.
+    #[inline]
+    fn polygon<const M: usize>(&self, i: usize) -> Polygon<M> {
         let rows = self.rows(i);
         let weights = if self.weights.is_empty() { &[][..] } else { &self.weights[rows.clone()] };
-        let points = rows.map(|row| self.point(row));
-        Curve::new(Polygon::new(points, weights), self.width[i])
+        Polygon::new(rows.map(|row| self.point(row)), weights)
+    }
+
+    /// Piece `i`, ready to be evaluated.
+    pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
+        Curve::new(self.polygon(i), self.width[i])
     }
 
     /// At least how far `q` is from piece `i`: from the box around its control points.
@@ -166,14 +171,21 @@ impl<'a, const M: usize> Curves<'a, M> {
     }
 
     pub fn get(&mut self, i: usize) -> &Rc<Curve<M>> {
-        let is_kept =
-            |kept: &Option<(usize, Rc<Curve<M>>)>| matches!(kept, Some((number, _)) if *number == i);
-        let place = self.kept.iter().position(is_kept).unwrap_or_else(|| {
+        let place = self.kept.iter().position(|kept| matches!(kept, Some((number, _)) if *number == i));
+        let place = place.unwrap_or_else(|| {
             self.kept.swap(0, 1);
-            self.kept[0] = None;
+            let kept = &mut self.kept[0];
+            match kept.as_mut().and_then(|(number, curve)| Some((number, Rc::get_mut(curve)?))) {
+                // Nobody else has it: its memory is used again.
+                Some((number, curve)) => {
+                    *number = i;
+                    curve.set(self.pieces.polygon(i), self.pieces.width[i]);
+                }
+                None => *kept = Some((i, Rc::new(self.pieces.curve(i)))),
+            }
             0
         });
-        let (_, curve) = self.kept[place].get_or_insert_with(|| (i, Rc::new(self.pieces.curve(i))));
+        let Some((_, curve)) = &self.kept[place] else { unreachable!("it is kept") };
         curve
     }
 }
@@ -195,10 +207,23 @@ pub struct Curve<const M: usize> {
 
 impl<const M: usize> Curve<M> {
     pub fn new(polygon: Polygon<M>, width: f64) -> Self {
-        let (hodographs, per_width) = (Hodographs::new(&polygon), 1.0 / width);
-        let sizes = by_width(*hodographs.sizes(), per_width);
-        let size_lengths = sizes.each_ref().map(length);
-        Self { hodographs, polygon, width, per_width, sizes, size_lengths }
+        let (hodographs, sizes) = (Hodographs::none(), [[0.0; M]; 3]);
+        let mut curve =
+            Self { polygon, hodographs, width, per_width: 1.0 / width, sizes, size_lengths: [0.0; 3] };
+        curve.derive();
+        curve
+    }
+
+    /// Becomes another piece.
+    fn set(&mut self, polygon: Polygon<M>, width: f64) {
+        (self.polygon, self.width, self.per_width) = (polygon, width, 1.0 / width);
+        self.derive();
+    }
+
+    fn derive(&mut self) {
+        self.hodographs.set(&self.polygon);
+        self.sizes = by_width(*self.hodographs.sizes(), self.per_width);
+        self.size_lengths = self.sizes.each_ref().map(length);
     }
 
     /// Length of the parameter interval, in mm.

@@ -6,7 +6,7 @@
 use fearless_simd::{dispatch, Level};
 
 use super::polygon::{Polygon, MOST};
-use super::vectors::{inner, length, vector_of};
+use super::vectors::{from_to, inner, length, vector_of};
 
 /// Coefficients of a function of the piece, times binomials.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];
@@ -44,10 +44,9 @@ macro_rules! with_degree {
 pub struct Hodographs<const M: usize> {
     start: [f64; M],
     degree: usize,
-    rational: bool,
-    /// Of N and its first three derivatives by t, and of ω and its own.
+    /// Of N and its first three derivatives by t; of ω and its own, on rational pieces.
     rows: [Rows<M>; 4],
-    weights: [Rows<1>; 4],
+    weights: Option<Box<[Rows<1>; 4]>>,
     /// What the rounding of the first three derivatives is relative to.
     sizes: [[f64; M]; 3],
     /// The greatest lengths of the second to the fifth derivative; infinite on rational pieces.
@@ -55,9 +54,17 @@ pub struct Hodographs<const M: usize> {
 }
 
 impl<const M: usize> Hodographs<M> {
-    pub fn new(polygon: &Polygon<M>) -> Self {
+    /// Of a point at the origin.
+    pub fn none() -> Self {
+        let (rows, bounds) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 4]);
+        Self { start: [0.0; M], degree: 0, rows, weights: None, sizes: [[0.0; M]; 3], bounds }
+    }
+
+    /// Becomes those of a polygon.
+    #[inline]
+    pub fn set(&mut self, polygon: &Polygon<M>) {
         let (steps, weights) = (polygon.steps(), polygon.weights());
-        let (degree, rational) = (steps.len(), polygon.is_rational());
+        let degree = steps.len();
         let (mut ways, mut longest) = ([[0.0; M]; MOST + 1], [0.0_f64; M]);
         for (i, step) in steps.iter().enumerate() {
             for k in 0..M {
@@ -65,38 +72,33 @@ impl<const M: usize> Hodographs<M> {
                 longest[k] = longest[k].max(step[k].abs());
             }
         }
-        let mut of_weights = [[0.0]; MOST + 1];
+        (self.start, self.degree) = (polygon.start, degree);
         let mut ratio = 1.0;
-        if rational {
+        if polygon.is_rational() {
+            let (mut of_weights, mut found) = ([[0.0]; MOST + 1], Box::new([[[0.0]; MOST + 1]; 4]));
             for i in 0..=degree {
                 ways[i] = vector_of(|k| weights[i] * ways[i][k]);
                 of_weights[i] = [weights[i]];
             }
+            derive(&mut ways, 1.0, degree, 4, &mut self.rows);
+            derive(&mut of_weights, 1.0, degree, 4, &mut found[..]);
+            (self.weights, self.bounds) = (Some(found), [f64::INFINITY; 4]);
             let least = weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
             ratio = degree as f64 * weights.iter().fold(0.0_f64, |most, w| most.max(*w)) / least;
+        } else {
+            with_degree!(degree, n, derive(&mut ways, 1.0, n, 1, &mut self.rows[..1]));
+            // From the steps themselves: differences of sums of them lose digits.
+            ways[..degree].copy_from_slice(steps);
+            self.bounds = with_degree!(degree, n, {
+                derive(&mut ways, n as f64, n.saturating_sub(1), 5, &mut self.rows[1..])
+            });
+            self.weights = None;
         }
         let mut scale = 0.5;
-        let sizes = std::array::from_fn(|order| {
+        for order in 0..3 {
             scale *= 2.0 * ratio * degree.saturating_sub(order) as f64;
-            longest.map(|step| scale * step)
-        });
-        let (rows, weights) = ([[[0.0; M]; MOST + 1]; 4], [[[0.0]; MOST + 1]; 4]);
-        let bounds = [f64::INFINITY; 4];
-        let mut own = Self { start: polygon.start, degree, rational, rows, weights, sizes, bounds };
-        if rational {
-            derive(ways, 1.0, degree, 4, &mut own.rows);
-            derive(of_weights, 1.0, degree, 4, &mut own.weights);
-        } else {
-            with_degree!(degree, n, derive(ways, 1.0, n, 1, &mut own.rows[..1]));
-            // From the steps themselves: differences of sums of them lose digits.
-            let mut slopes = [[0.0; M]; MOST + 1];
-            slopes[..degree].copy_from_slice(steps);
-            let [_, bounds @ ..] = with_degree!(degree, n, {
-                derive(slopes, n as f64, n.saturating_sub(1), 5, &mut own.rows[1..])
-            });
-            own.bounds = bounds;
+            self.sizes[order] = vector_of(|k| scale * longest[k]);
         }
-        own
     }
 
     /// C, counted from the start of the piece, and its first R − 1 derivatives by t, where `rest` is 1 − t.
@@ -108,10 +110,10 @@ impl<const M: usize> Hodographs<M> {
                 c[order] = sum(&self.rows[order][..=n - order], t, rest);
             }
         });
-        if self.rational {
+        if let Some(weights) = &self.weights {
             let mut w = [0.0; R];
             for order in 0..R.min(self.degree + 1) {
-                [w[order]] = sum(&self.weights[order][..=self.degree - order], t, rest);
+                [w[order]] = sum(&weights[order][..=self.degree - order], t, rest);
             }
             for order in 0..R {
                 let mut binomial = 1.0;
@@ -139,7 +141,7 @@ impl<const M: usize> Hodographs<M> {
     /// dC/dt.
     #[inline]
     pub fn slope(&self, t: f64, rest: f64) -> [f64; M] {
-        if self.rational {
+        if self.weights.is_some() {
             self.local::<2>(t, rest)[1]
         } else {
             with_degree!(self.degree, n, sum(&self.rows[1][..n], t, rest))
@@ -154,7 +156,7 @@ impl<const M: usize> Hodographs<M> {
         (per, scale): (f64, &[f64; M]),
     ) -> [f64; K] {
         let factors = (per, scale);
-        if self.rational {
+        if self.weights.is_some() {
             return std::array::from_fn(|i| {
                 let slope = self.slope(t[i], rest[i]);
                 length(&vector_of::<M>(|k| slope[k] * per * scale[k]))
@@ -168,7 +170,7 @@ impl<const M: usize> Hodographs<M> {
     /// The first three derivatives by t.
     #[inline]
     pub fn rates(&self, t: f64, rest: f64) -> [[f64; M]; 3] {
-        if self.rational {
+        if self.weights.is_some() {
             let [_, rates @ ..] = self.local::<4>(t, rest);
             return rates;
         }
@@ -271,34 +273,35 @@ fn lengths<const M: usize, const K: usize>(
     sum
 }
 
-/// The coefficients, times binomials and a factor, of a function of this degree and of its first derivatives; returns the greatest
-/// lengths of the coefficients of so many orders, times the factor.
+/// The coefficients, times binomials and a factor, of a function of this degree and of its first derivatives up to so many orders,
+/// whose differences take the place of `rows`; returns the greatest lengths of those of the derivatives, times the factor.
 #[inline(always)]
 fn derive<const M: usize>(
-    mut rows: Rows<M>,
-    factor: f64,
+    rows: &mut Rows<M>,
+    mut factor: f64,
     degree: usize,
     orders: usize,
     found: &mut [Rows<M>],
-) -> [f64; 5] {
-    let mut squares = [0.0_f64; 5];
+) -> [f64; 4] {
+    let mut lengths = [0.0_f64; 4];
     for order in 0..5.min(orders).min(degree + 1) {
         let count = degree - order;
-        let rows = &mut rows[..=count];
-        for row in &*rows {
-            squares[order] = squares[order].max(inner(row, row));
+        if order > 0 {
+            let square = rows[..=count].iter().fold(0.0_f64, |most, row| most.max(inner(row, row)));
+            lengths[order - 1] = factor * square.sqrt();
         }
         if let Some(found) = found.get_mut(order) {
-            for ((found, row), binomial) in found.iter_mut().zip(&*rows).zip(&BINOMIALS[count]) {
-                *found = vector_of(|k| factor * (binomial * row[k]));
+            for i in 0..=count {
+                let coefficient = factor * BINOMIALS[count][i];
+                found[i] = vector_of(|k| coefficient * rows[i][k]);
             }
         }
-        let scale = count as f64;
-        for i in 1..rows.len() {
-            rows[i - 1] = vector_of(|k| scale * (rows[i][k] - rows[i - 1][k]));
+        for i in 0..count {
+            rows[i] = from_to(&rows[i], &rows[i + 1]);
         }
+        factor *= count as f64;
     }
-    squares.map(|square| factor * square.sqrt())
+    lengths
 }
 
 #[cfg(test)]
@@ -311,7 +314,8 @@ mod tests {
         let points = [[1000.0, 1.0], [1002.0, 3.0], [1005.0, -1.0], [1006.0, 2.0], [1009.0, 9.0]];
         for weights in [&[][..], &[1.0, 0.5, 3.0, 2.0, 0.7]] {
             let polygon = Polygon::new(points.into_iter(), weights);
-            let hodographs = Hodographs::new(&polygon);
+            let mut hodographs = Hodographs::none();
+            hodographs.set(&polygon);
             for t in [0.0, 0.1, 0.4, 0.6, 0.9, 1.0] {
                 assert!(distance(&hodographs.at(t, 1.0 - t), &polygon.at(t)) < 1e-12, "{t}");
             }
@@ -334,7 +338,8 @@ mod tests {
     #[test]
     fn a_rational_quarter_of_a_circle_has_its_curvature_everywhere() {
         let points = [[1010.0, 0.0], [1010.0, 10.0], [1000.0, 10.0]];
-        let quarter = Hodographs::new(&Polygon::new(points.into_iter(), &[1.0, 0.5_f64.sqrt(), 1.0]));
+        let mut quarter = Hodographs::none();
+        quarter.set(&Polygon::new(points.into_iter(), &[1.0, 0.5_f64.sqrt(), 1.0]));
         for i in 0..=20 {
             let t = f64::from(i) / 20.0;
             let [_, tangent, bend] = quarter.derivatives::<3>(t, 1.0 - t);
