@@ -135,6 +135,7 @@ class SetpointAudit:
         feed: _Floats | None = None,
         profile: SpeedProfile | None = None,
         program: Program | None = None,
+        deviation: float = 0.0,
     ) -> SetpointAudit: ...
     def push(
         self,

@@ -3,7 +3,7 @@
 mod at_once;
 
 use super::columns::Columns;
-use super::deviation::{enough, settled, window};
+use super::deviation::{allowed, enough, settled, window};
 use super::nearest::Place;
 use super::neighbours::Neighbours;
 use super::profile_reader::ACCELERATION_SHARE;
@@ -24,14 +24,12 @@ pub struct Comparison<'a, const M: usize> {
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
-    /// At most how far the piece is from one straight move, where no setpoint close to it changes the tally.
-    beside: Option<f64>,
 }
 
 impl<'a, const M: usize> Comparison<'a, M> {
     pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let columns = plan.columns(limits);
-        Self { plan, limits, columns, near: Neighbours::default(), piece: None, beside: None }
+        Self { plan, limits, columns, near: Neighbours::default(), piece: None }
     }
 
     /// Which rows change nothing but by their distance from the program; see `at_once`.
@@ -54,24 +52,21 @@ impl<'a, const M: usize> Comparison<'a, M> {
 
     /// The distance of one setpoint from the program.
     pub fn deviation(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
-        let (nearest, time, line) = (&row.nearest, row.t, row.line);
-        let (path, piece) = (&self.plan.path, nearest.place.piece);
-        if let Some(program) = &self.plan.program {
-            let limit = path.tolerance[piece] + PLACE_TOLERANCE;
-            let (settled, unmeasured) = (settled(tally), settled(tally) * limit);
-            if self.piece != Some(piece) {
-                self.near.replace(program, window(path, piece, program.len()));
-                self.piece = Some(piece);
-                let points = path.rows(piece).map(|row| path.point(row));
-                self.beside = self.near.straight_beside(points, unmeasured);
-            }
-            let is_beside =
-                nearest.is_good() && self.beside.is_some_and(|most| most + PLACE_TOLERANCE <= unmeasured);
-            if !is_beside {
-                let away = self.near.distance(&row.q, enough(settled, limit, rounding));
-                tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
-            }
+        let Some(program) = &self.plan.program else { return };
+        let (path, nearest, known) = (&self.plan.path, &row.nearest, self.plan.deviation);
+        let piece = nearest.place.piece;
+        let limit = path.tolerance[piece] + PLACE_TOLERANCE;
+        // A setpoint is no farther from the program than its place is, and it from that.
+        let most = known * allowed(path, piece) + nearest.off.max(0.0);
+        if nearest.is_good() && most <= known * limit {
+            return;
         }
+        if self.piece != Some(piece) {
+            self.near.replace(program, window(path, piece, program.len()));
+            self.piece = Some(piece);
+        }
+        let away = self.near.distance(&row.q, enough(settled(tally).max(known), limit, rounding));
+        tally.offer(Check::Deviation, 0, away - rounding, limit, row.t, row.line);
     }
 
     /// Recorded velocity and acceleration against the profile's.
@@ -292,7 +287,35 @@ impl<'a, const M: usize> Comparison<'a, M> {
 mod tests {
     use super::*;
     use crate::curve::{Followed, Pieces};
+    use crate::moves::Programmed;
     use crate::rows::Nearest;
+
+    #[test]
+    fn a_setpoint_is_measured_against_the_program_where_the_path_does_not_tell_its_distance() {
+        // The path is 0.3 beside the program.
+        let (control, offsets, width) = (&[0.0, 0.3, 1.0, 0.3], &[0, 2], &[1.0]);
+        let pieces = Pieces { axes: 2, stride: 2, control, weights: &[], offsets, width };
+        let path = Followed { tolerance: &[1.0], ..Followed::of_one(pieces) };
+        let program = Some(Programmed::of_lines(&[0.0, 0.0], &[1.0, 0.0], &[1]));
+        let limits = Limits::none();
+        for (known, off, found) in
+            [(0.3, 2.9e-7, -1.0), (0.3, 3.1e-7, 0.3), (0.0, 1e-9, 0.3), (0.3, 0.2, 0.5), (9.0, 0.2, 0.5)]
+        {
+            let plan = Plan { path, profile: None, program, deviation: known, joints: None };
+            let row = Row {
+                t: 0.0,
+                q: [0.5, 0.3 + off],
+                velocity: None,
+                acceleration: None,
+                line: 1,
+                nearest: Nearest { place: Place { piece: 0, u: 0.5 }, off, ..Nearest::default() },
+            };
+            let mut tally = Tally::<2>::default();
+            Comparison::new(&plan, &limits).deviation(&row, 0.0, &mut tally);
+            let ratio = tally.get(Check::Deviation, 0).ratio;
+            assert!((ratio - found).abs() < 1e-5, "{known} {off}: {ratio}");
+        }
+    }
 
     #[test]
     fn the_path_around_a_corner_is_as_far_from_the_chord_as_the_corner_and_the_sagittas() {
@@ -306,7 +329,7 @@ mod tests {
         };
         let path = Followed { moves: &[0, 0, 1, 1], ..Followed::of_one(pieces) };
         let limits = Limits { chord_tolerance: 1.0, ..Limits::none() };
-        let plan = Plan { path, profile: None, program: None, joints: None };
+        let plan = Plan { path, profile: None, program: None, deviation: 0.0, joints: None };
         let comparison = Comparison::new(&plan, &limits);
         let row = |q: [f64; 2], piece: usize, u: f64, bend: f64| Row {
             t: 0.0,

@@ -180,7 +180,7 @@ pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
 }
 
 /// How far a piece may be from the program, in mm.
-fn allowed(path: &Followed, piece: usize) -> f64 {
+pub fn allowed(path: &Followed, piece: usize) -> f64 {
     path.tolerance[piece].max(GAP_TOLERANCE)
 }
 

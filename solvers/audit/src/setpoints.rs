@@ -452,7 +452,7 @@ mod tests {
             let (kind, axis, value, u, p) = ([FEED], [255], [100.0], [0.0, 3.0], [100.0; 2]);
             let phases = Phases::of_one(&kind, &axis, &value, &u, &p);
             let profile = Some(ProfileClock { phases, starts: &[0.0, 0.3], run_starts: &[0.0] });
-            let plan = Plan { path, profile, program: None, joints: None };
+            let plan = Plan { path, profile, program: None, deviation: 0.0, joints: None };
             let stream = Stream::new(limits, 1e-9);
             let view = View { differences: stream.differences(&rows), plan: has_plan.then_some(&plan) };
             let (mut found, mut wanted) = (Tally::default(), Tally::default());

@@ -43,6 +43,8 @@ pub struct Plan<'a> {
     pub path: Followed<'a>,
     pub profile: Option<ProfileClock<'a>>,
     pub program: Option<Programmed<'a>>,
+    /// The greatest share of its tolerance that the path has been found off the program.
+    pub deviation: f64,
     /// On the same path, where the setpoints are those of joints that are not its axes.
     pub joints: Option<&'a JointPath<'a>>,
 }

@@ -46,6 +46,8 @@ struct Compared {
     feed: Py<PyAny>,
     profile: Option<Py<Profile>>,
     program: Option<Py<Moves>>,
+    /// The greatest share of its tolerance that the path has been found off the program.
+    deviation: f64,
     /// When every phase of the profile begins.
     starts: Vec<f64>,
     /// Where the setpoints are those of joints that are not the path's axes.
@@ -69,7 +71,7 @@ impl Compared {
             self.program.as_ref().map(|moves| programmed(moves.get(), problem.axes())).transpose()?;
         let profile = phases.map(|phases| ProfileClock { phases, starts: &self.starts, run_starts: &[] });
         let work = |joints: Option<&JointPath>| {
-            let plan = Plan { path, profile, program, joints };
+            let plan = Plan { path, profile, program, deviation: self.deviation, joints };
             run(py, progress, |watch| work(&plan, watch))
         };
         match &self.joints {
@@ -90,7 +92,7 @@ pub struct SetpointAudit {
 #[pymethods]
 impl SetpointAudit {
     #[new]
-    #[pyo3(signature = (limits, resolution=0.0, problem=None, feed=None, profile=None, program=None))]
+    #[pyo3(signature = (limits, resolution=0.0, problem=None, feed=None, profile=None, program=None, deviation=0.0))]
     fn new(
         limits: LimitArrays,
         resolution: f64,
@@ -98,11 +100,12 @@ impl SetpointAudit {
         feed: Option<Bound<'_, PyAny>>,
         profile: Option<Of<Profile>>,
         program: Option<Of<Moves>>,
+        deviation: f64,
     ) -> PyResult<Self> {
         let axes = limits.axes();
         let compared = problem
             .zip(feed)
-            .map(|(problem, feed)| compare(axes, problem, feed, profile, program))
+            .map(|(problem, feed)| compare(axes, problem, feed, profile, (program, deviation)))
             .transpose()?
             .flatten();
         let of_path = compared.as_ref().map_or(0, |(_, axes)| *axes);
@@ -170,7 +173,7 @@ fn compare(
     problem: Bound<'_, PyAny>,
     feed: Bound<'_, PyAny>,
     profile: Option<Of<Profile>>,
-    program: Option<Of<Moves>>,
+    (program, deviation): (Option<Of<Moves>>, f64),
 ) -> PyResult<Option<(Compared, usize)>> {
     let arrays: ProblemArrays = problem.extract()?;
     let feeds: PyReadonlyArray2<f64> = feed.extract()?;
@@ -194,7 +197,7 @@ fn compare(
     }
     let (program, of_path) = (program.map(Of::into_native), path.axes);
     let (problem, feed) = (problem.unbind(), feed.unbind());
-    Ok(Some((Compared { problem, feed, profile: usable, program, starts, joints, axes }, of_path)))
+    Ok(Some((Compared { problem, feed, profile: usable, program, deviation, starts, joints, axes }, of_path)))
 }
 
 fn finished() -> PyErr {
