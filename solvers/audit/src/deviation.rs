@@ -1,9 +1,12 @@
 //! How far the followed path is from the programmed one, both ways, and whether it holds together.
 //!
-//! From the path: places of every piece against the moves it says it follows, one move more on each side. From
-//! the program: ends and inner places of every move against the pieces that follow it, one piece more on each
-//! side. Distances are those from true segments, circles, helices and parabolas. Where a piece comes near its
-//! tolerance it is looked at again, closer.
+//! From the program: ends and inner places of every move against the pieces that follow it, one piece more on each
+//! side. From the path: places of every piece against the moves it says it follows, one move more on each side; but
+//! where the ends of a straight move tell that path and move are close enough all along it. Distances are those from true
+//! segments, circles, helices and parabolas. Where a piece comes near its tolerance it is looked at again, closer.
+
+use std::cmp::Ordering::Equal;
+use std::sync::{Mutex, PoisonError};
 
 use super::close_places::ClosePlaces;
 use super::curve::Followed;
@@ -124,16 +127,10 @@ pub(crate) fn audit_deviation<const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let times = entry_times(path, phases);
-    let followers = followers(path, program.len());
-    let from_path = parallel::tally(&Tally::default(), path.len(), BLOCK, &|block, tally| {
-        let mut near = Neighbours::default();
-        for i in block {
-            tell(seen, i);
-            piece_to_moves(path, program, (&followers, &mut near), (i, times[i]), tally);
-        }
-    });
-    let from_program = parallel::tally(&from_path, program.len(), BLOCK, &|block, tally| {
-        let mut follow = Follow { path, close: ClosePlaces::new(path.pieces), last: None };
+    let (followers, close) = (followers(path, program.len()), Mutex::new(Vec::new()));
+    let from_program = parallel::tally(&Tally::default(), program.len(), BLOCK, &|block, tally| {
+        let mut follow =
+            Follow { path, places: ClosePlaces::new(path.pieces), last: None, close: Vec::new() };
         for m in block {
             tell(seen, m);
             let (programmed, line) = (program.get(m), program.line[m]);
@@ -145,8 +142,22 @@ pub(crate) fn audit_deviation<const M: usize>(
                 None => tally.offer(Check::Deviation, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, line),
                 Some(end) => {
                     let pieces = (first.min(end), last.min(end));
-                    follow.measure((&programmed, line), pieces, times[pieces.0], tally);
+                    follow.measure((m, &programmed, line), pieces, times[pieces.0], tally);
                 }
+            }
+        }
+        close.lock().unwrap_or_else(PoisonError::into_inner).extend(follow.close);
+    });
+    let mut close = close.into_inner().unwrap_or_else(PoisonError::into_inner);
+    close.sort_by(|[a, _]: &Part, [b, _]| (a.piece, a.u).partial_cmp(&(b.piece, b.u)).unwrap_or(Equal));
+    let from_path = parallel::tally(&from_program, path.len(), BLOCK, &|block, tally| {
+        let mut near = Neighbours::default();
+        for i in block {
+            tell(seen, i);
+            let before = close.partition_point(|[from, _]| (from.piece, from.u) <= (i, 0.0));
+            let known = before.checked_sub(1).map(|last| close[last][1]);
+            if known.is_none_or(|to| (to.piece, to.u) < (i, path.width[i])) {
+                piece_to_moves(path, program, (&followers, &mut near), (i, times[i]), tally);
             }
         }
     });
@@ -171,6 +182,12 @@ pub fn window(path: &Followed, piece: usize, moves: usize) -> impl Iterator<Item
     let first = first.clamp(0, moves as i64) as usize;
     let last = last.saturating_add(1).clamp(first as i64, moves as i64) as usize;
     (first..last).chain(first.checked_sub(1)).chain(Some(last).filter(|&m| m < moves))
+}
+
+/// Whether a move is one of them.
+fn follows(path: &Followed, piece: usize, number: usize) -> bool {
+    let [first, last] = [path.moves[2 * piece], path.moves[2 * piece + 1]];
+    (first.saturating_sub(1)..=last.saturating_add(1)).contains(&(number as i64))
 }
 
 /// What a place may be off its nearest neighbour without changing the tally: no more than its worst so far. The first neighbour
@@ -273,19 +290,24 @@ fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
     ranges
 }
 
+/// A part of the path, from one place to another.
+type Part = [Place; 2];
+
 /// Measures places of moves, one after the other, against the pieces that follow them.
 struct Follow<'a, const M: usize> {
     path: &'a Followed<'a>,
-    close: ClosePlaces<'a, M>,
+    places: ClosePlaces<'a, M>,
     /// The point measured last, the place that is near it, and its distance from there, less rounding.
     last: Option<([f64; M], Place, f64)>,
+    /// Parts of the path whose distance from the program changes nothing.
+    close: Vec<Part>,
 }
 
 impl<const M: usize> Follow<'_, M> {
     /// A move that the pieces from `first` to `last` follow.
     fn measure(
         &mut self,
-        (programmed, line): (&Move<M>, i32),
+        (number, programmed, line): (usize, &Move<M>, i32),
         (first, last): Followers,
         time: f64,
         tally: &mut Tally<M>,
@@ -297,22 +319,49 @@ impl<const M: usize> Follow<'_, M> {
             let q = programmed.at(i as f64 / places as f64);
             own.place(q, pieces, (time, line, rounding), tally)
         };
-        let (from, away) = at(self, 0, tally);
+        let from = at(self, 0, tally);
         if programmed.is_straight() {
-            let (to, away_there) = at(self, places, tally);
-            // The chord between both places is no farther from the move than its ends are, and the piece from its chord than this.
-            let sagitta = self.close.curves.get(to.piece).sagitta(to.u - from.u);
-            let most = away.max(away_there) + sagitta;
-            if from.piece == to.piece && most <= settled(tally) * allowed(self.path, to.piece) {
+            // The parameter of every piece is in mm.
+            let way = distance(&programmed.from, &programmed.to);
+            self.places.start_at(from.0.moved(way, self.path.width, pieces));
+            let to = at(self, places, tally);
+            if self.is_close((number, programmed), [from, to], settled(tally)) {
+                match self.close.last_mut() {
+                    Some([_, end]) if *end == from.0 => *end = to.0,
+                    _ => self.close.push([from.0, to.0]),
+                }
                 tally.samples += 2;
                 return;
             }
-            self.close.start_at(from);
+            self.places.start_at(from.0);
         }
         for i in 1..=places {
             at(self, i, tally);
         }
         tally.samples += places as u64 + 1;
+    }
+
+    /// Whether a straight move and the path between two places near its ends, whose distances from them are known, are no farther
+    /// from each other than this share of what is allowed, and the pieces say that they follow it or one next to it: on each piece the
+    /// chord is no farther from the move than its ends are, and the piece no farther from the chord than its sagitta.
+    fn is_close(
+        &mut self,
+        (number, programmed): (usize, &Move<M>),
+        [from, to]: [(Place, f64); 2],
+        share: f64,
+    ) -> bool {
+        let (path, curves) = (self.path, &mut self.places.curves);
+        from.0.piece <= to.0.piece
+            && (from.0.piece..=to.0.piece).all(|piece| {
+                let end = |(place, away): (Place, f64), u: f64, q: [f64; M]| match place.piece == piece {
+                    true => (place.u, away),
+                    false => (u, programmed.distance(&q, 0.0)),
+                };
+                let (start, before) = end(from, 0.0, path.start(piece));
+                let (end, after) = end(to, path.width[piece], path.end(piece));
+                let most = before.max(after) + curves.get(piece).sagitta(end - start);
+                start <= end && most <= share * allowed(path, piece) && follows(path, piece, number)
+            })
     }
 
     /// A place that is near a point of a move.
@@ -330,9 +379,9 @@ impl<const M: usize> Follow<'_, M> {
             return (place, away);
         }
         let most_so_far = settled(tally);
-        let (path, expected) = (self.path, self.close.place().piece);
+        let (path, expected) = (self.path, self.places.place().piece);
         let close = |piece: usize| enough(most_so_far, allowed(path, piece), rounding);
-        let (place, away) = match self.close.find(&q, [least, most], close) {
+        let (place, away) = match self.places.find(&q, [least, most], close) {
             Some((place, distance)) => (place, distance - rounding),
             None => {
                 // The nearest piece counts, measured by its own tolerance.
@@ -344,7 +393,7 @@ impl<const M: usize> Follow<'_, M> {
                     {
                         continue;
                     }
-                    let (u, distance) = nearest_on_piece(self.close.curves.get(piece), &q);
+                    let (u, distance) = nearest_on_piece(self.places.curves.get(piece), &q);
                     let away = distance - rounding;
                     if away / tolerance < nearest.0 {
                         nearest = (away / tolerance, Place { piece, u }, away);
@@ -353,7 +402,7 @@ impl<const M: usize> Follow<'_, M> {
                         break;
                     }
                 }
-                self.close.start_at(nearest.1);
+                self.places.start_at(nearest.1);
                 (nearest.1, nearest.2)
             }
         };
@@ -439,8 +488,9 @@ mod tests {
         for (known, found) in [(0.3, 0.5), (0.7, 0.7)] {
             let mut tally = Tally::<2>::default();
             tally.offer(Check::Deviation, 0, known, 1.0, 0.0, 0);
-            let mut follow = Follow { path: &path, close: ClosePlaces::new(pieces), last: None };
-            follow.measure((&programmed, 1), (0, 0), 0.0, &mut tally);
+            let places = ClosePlaces::new(pieces);
+            let mut follow = Follow { path: &path, places, last: None, close: Vec::new() };
+            follow.measure((0, &programmed, 1), (0, 0), 0.0, &mut tally);
             let ratio = tally.get(Check::Deviation, 0).ratio;
             assert!((ratio - found).abs() < 1e-12, "{known}: {ratio}");
         }
