@@ -21,6 +21,8 @@ const PER_TERM: [f64; MOST_TERMS] = {
     }
     per
 };
+/// A step of Newton's method, in parts of the time of a series, whose error, about its square, is below rounding.
+const LAST_STEP: f64 = 1e-10;
 /// A series may end so far beyond the length, in parts of it: where the duration is that of the motion but for rounding.
 const OVER: f64 = 1e-3;
 /// Series are no shorter than this part of the duration, and no more than so many: speeds that are absurd have more.
@@ -170,15 +172,17 @@ impl Series {
         // ẍ = p0 + p1 x + p2 x² about the start.
         let [p0, p1, p2] = [half * slope, half * bend, half * 3.0 * speed_sq.c[3]];
         let mut terms = [0.0; MOST_TERMS];
-        (terms[1], terms[2]) = (scale * w.sqrt(), 0.5 * p0);
-        let mut count = 3;
-        while count < MOST_TERMS && terms[count - 1].abs() + terms[count - 2].abs() > NOTHING {
+        // The last two terms beside the table: a pair of numbers that have just been stored cannot be loaded at once.
+        let (mut before, mut last, mut count) = (scale * w.sqrt(), 0.5 * p0, 3);
+        (terms[1], terms[2]) = (before, last);
+        while count < MOST_TERMS && before.abs() + last.abs() > NOTHING {
             let k = count - 2;
             // Each product but that of the middle comes twice.
             let pairs: f64 = (1..k.div_ceil(2)).map(|i| terms[i] * terms[k - i]).sum();
             let middle = if k % 2 == 0 { terms[k / 2] * terms[k / 2] } else { 0.0 };
             let square = 2.0 * pairs + middle;
-            terms[count] = (p1 * terms[k] + p2 * square) * PER_TERM[k];
+            (before, last) = (last, (p1 * before + p2 * square) * PER_TERM[k]);
+            terms[count] = last;
             count += 1;
         }
         // The series misses the equation by the terms of P from the power `count` − 2 on. With a slope of P of no more than 1 an error
@@ -206,7 +210,7 @@ impl Series {
 
     /// The part of the time at a part of the length, at the end or before.
     fn time(&self, x: f64) -> f64 {
-        time_of_way(|s| self.at(s), x, [1.0, 2.0], 4.0 * f64::EPSILON)
+        time_of_way(|s| self.at(s), x, [1.0, 2.0], LAST_STEP)
     }
 }
 
