@@ -212,9 +212,9 @@ impl<const M: usize> Integrand for Speed<'_, M> {
 /// |h|/width of a polynomial piece at several u, in the vectors of the processor.
 #[inline(always)]
 fn lengths<const M: usize, const K: usize>(rows: &[[f64; M]], width: f64, mut u: [f64; K]) -> [f64; K] {
-    let (mut rest, mut sum) = ([1.0; K], [0.0; K]);
+    let (mut rest, mut sum, per_width) = ([1.0; K], [0.0; K], 1.0 / width);
     for l in 0..K {
-        u[l] /= width;
+        u[l] *= per_width;
         rest[l] -= u[l];
     }
     // One axis after the other: with all at once the compiler makes vectors of axes.
@@ -231,7 +231,7 @@ fn lengths<const M: usize, const K: usize>(rows: &[[f64; M]], width: f64, mut u:
         }
     }
     for l in 0..K {
-        sum[l] = sum[l].sqrt() / width;
+        sum[l] = sum[l].sqrt() * per_width;
     }
     sum
 }
