@@ -23,18 +23,19 @@ pub struct Located {
     pub iterations: u32,
 }
 
-/// The Sarfraz curve u(S) between two rows; NaN if S' is 0 at one of them.
+/// The Sarfraz curve u(S) between two rows; NaN or an end of them if S' is 0 at one.
 ///
-/// Over the common denominator the terms of (3.12) are d₀ΔS θ(1−θ) + Δu θ³. All are positive, so no digits are lost.
+/// Over the common denominator the terms of (3.12) are d₀ΔS θ(1−θ) + Δu θ³; with S' instead of d = 1/S' there is one division for all.
+/// All are positive, so no digits are lost.
 #[inline]
 pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
     let (width, rise) = (to.u - from.u, to.sum - from.sum);
-    let (d0, d1) = (1.0 / from.rate, 1.0 / to.rate);
     let theta = (s - from.sum) / rise;
     let mixed = theta * (1.0 - theta);
-    let omega = (d1 + d0) * rise / width;
+    let all = from.rate * to.rate * width;
     // θ³ + (1−θ)³ = 1 − 3 θ(1−θ).
-    from.u + (d0 * rise * mixed + width * theta * theta * theta) / (1.0 + (omega - 3.0) * mixed)
+    let below = all + ((from.rate + to.rate) * rise - 3.0 * all) * mixed;
+    from.u + width * (to.rate * rise * mixed + all * theta * theta * theta) / below
 }
 
 /// The u with S(u) = s within `tolerance`; beyond either end that end. Rows that are `known` beside those of the table may be nearer to
