@@ -3,6 +3,7 @@
 mod at_once;
 
 use super::columns::Columns;
+use super::curve::sagitta;
 use super::deviation::{allowed, enough, settled, window};
 use super::nearest::Place;
 use super::neighbours::Neighbours;
@@ -195,7 +196,6 @@ impl<'a, const M: usize> Comparison<'a, M> {
     /// each piece it is no farther from its own chord than the sagitta, and that no farther than where both pieces meet.
     fn is_flat(&self, [before, row]: [&Row<M>; 2], tips: &[[f64; M]; 2], tally: &Tally<M>) -> bool {
         let (path, (from, to)) = (&self.plan.path, (before.nearest.place, row.nearest.place));
-        let sagitta = |bend: f64, way: f64| 0.125 * bend * way * way;
         let most = match to.piece.checked_sub(from.piece) {
             Some(0) => sagitta(row.nearest.bend, to.u - from.u),
             Some(1) if self.columns.are_axes() => {

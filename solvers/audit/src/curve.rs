@@ -339,7 +339,7 @@ impl<const M: usize> Curve<M> {
 
     /// No part of the piece that is as long as a step of u is farther from its chord than this.
     pub fn sagitta(&self, step: f64) -> f64 {
-        0.125 * self.bounds()[0] * step * step
+        sagitta(self.bounds()[0], step)
     }
 
     /// For each axis what the rounding of C' is relative to.
@@ -383,6 +383,13 @@ impl<const M: usize> Curve<M> {
     pub fn extremes(&self, axis: usize) -> [f64; 2] {
         self.polygon.extremes(axis)
     }
+}
+
+/// No part of a curve that is as long as a step of u is farther from its chord than this, where its second derivative is at most
+/// `bend`.
+#[inline(always)]
+pub fn sagitta(bend: f64, step: f64) -> f64 {
+    0.125 * bend * step * step
 }
 
 /// Derivatives by t to those by u.

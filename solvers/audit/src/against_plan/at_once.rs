@@ -6,6 +6,7 @@
 
 use fearless_simd::{dispatch, Level};
 
+use crate::curve::sagitta;
 use crate::profile_reader::ACCELERATION_SHARE;
 use crate::rows::Row;
 use crate::setpoints::at_once::{fill, judge, ALL, BEFORE, COUNT};
@@ -93,8 +94,7 @@ fn settled_in_vectors<const M: usize>(
         fill(&mut here, rows, |row| row.nearest.bend);
         fill(&mut there, rows, |row| row.nearest.place.u);
         let most = tally.most(Check::Chord, 0, limits.chord_tolerance);
-        let sagitta = |i: usize| 0.125 * here[i] * (there[i] - there[i - 1]) * (there[i] - there[i - 1]);
-        judge(&mut is_open, sagitta, |_| most);
+        judge(&mut is_open, |i| sagitta(here[i], there[i] - there[i - 1]), |_| most);
     }
     let mut settled = [false; COUNT];
     for i in 0..COUNT {
