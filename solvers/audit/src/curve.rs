@@ -159,34 +159,27 @@ impl Pieces<'_> {
     }
 }
 
-/// Pieces made ready one after the other: the last two are kept.
+/// Pieces made ready one after the other: the last two are kept, with their numbers.
 pub struct Curves<'a, const M: usize> {
     pub pieces: Pieces<'a>,
-    kept: [Option<(usize, Rc<Curve<M>>)>; 2],
+    kept: [(usize, Rc<Curve<M>>); 2],
 }
 
 impl<'a, const M: usize> Curves<'a, M> {
     pub fn new(pieces: Pieces<'a>) -> Self {
-        Self { pieces, kept: [None, None] }
+        Self { pieces, kept: [0, 1].map(|_| (usize::MAX, Rc::new(Curve::none()))) }
     }
 
     pub fn get(&mut self, i: usize) -> &Rc<Curve<M>> {
-        let place = self.kept.iter().position(|kept| matches!(kept, Some((number, _)) if *number == i));
-        let place = place.unwrap_or_else(|| {
+        let place = self.kept.iter().position(|(number, _)| *number == i).unwrap_or_else(|| {
             self.kept.swap(0, 1);
-            let kept = &mut self.kept[0];
-            match kept.as_mut().and_then(|(number, curve)| Some((number, Rc::get_mut(curve)?))) {
-                // Nobody else has it: its memory is used again.
-                Some((number, curve)) => {
-                    *number = i;
-                    curve.set(self.pieces.polygon(i), self.pieces.width[i]);
-                }
-                None => *kept = Some((i, Rc::new(self.pieces.curve(i)))),
-            }
+            let (number, curve) = &mut self.kept[0];
+            *number = i;
+            // In the memory of the piece before, unless somebody still has that.
+            Rc::make_mut(curve).set(self.pieces.polygon(i), self.pieces.width[i]);
             0
         });
-        let Some((_, curve)) = &self.kept[place] else { unreachable!("it is kept") };
-        curve
+        &self.kept[place].1
     }
 }
 
@@ -206,21 +199,28 @@ pub struct Curve<const M: usize> {
 }
 
 impl<const M: usize> Curve<M> {
+    /// A point at the origin.
+    fn none() -> Self {
+        let (polygon, sizes) = (Polygon::new([[0.0; M]].into_iter(), &[]), [[0.0; M]; 3]);
+        Self {
+            polygon,
+            hodographs: Hodographs::none(),
+            width: 0.0,
+            per_width: 0.0,
+            sizes,
+            size_lengths: [0.0; 3],
+        }
+    }
+
     pub fn new(polygon: Polygon<M>, width: f64) -> Self {
-        let (hodographs, sizes) = (Hodographs::none(), [[0.0; M]; 3]);
-        let mut curve =
-            Self { polygon, hodographs, width, per_width: 1.0 / width, sizes, size_lengths: [0.0; 3] };
-        curve.derive();
+        let mut curve = Self::none();
+        curve.set(polygon, width);
         curve
     }
 
     /// Becomes another piece.
     fn set(&mut self, polygon: Polygon<M>, width: f64) {
         (self.polygon, self.width, self.per_width) = (polygon, width, 1.0 / width);
-        self.derive();
-    }
-
-    fn derive(&mut self) {
         self.hodographs.set(&self.polygon);
         self.sizes = by_width(*self.hodographs.sizes(), self.per_width);
         self.size_lengths = self.sizes.each_ref().map(length);
