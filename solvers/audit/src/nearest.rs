@@ -6,8 +6,8 @@ use super::vectors::{distance, inner};
 /// Pieces that one step passes: where a piece has no direction steps are of any length.
 const MOST_PASSED: usize = 8;
 
-/// A place on the path.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A place on the path; those ahead of it are greater.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Place {
     pub piece: usize,
     /// Local parameter in mm.

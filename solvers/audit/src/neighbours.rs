@@ -50,20 +50,6 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         }
     }
 
-    /// The greatest distance of points from one straight move, where that has them all within `enough`: no place of their convex
-    /// hull is farther from it.
-    pub fn straight_beside(
-        &self,
-        points: impl Iterator<Item = [f64; M]> + Clone,
-        enough: f64,
-    ) -> Option<f64> {
-        let mut straight = self.moves.iter().filter(|(_, programmed, _)| programmed.is_straight());
-        straight.find_map(|(_, programmed, _)| {
-            let away = |q: [f64; M]| Some(programmed.distance(&q, 0.0)).filter(|away| *away <= enough);
-            points.clone().try_fold(0.0, |most: f64, q| Some(most.max(away(q)?)))
-        })
-    }
-
     /// Where the distance found last is from.
     pub fn here(&self) -> Here {
         (self.nearest, self.moves.get(self.nearest).and_then(|(_, _, place)| *place))
@@ -122,20 +108,6 @@ mod tests {
         arc_angle: &[std::f64::consts::PI],
         ..Programmed::of_lines(&[0.0, 0.0], &[4.0, 0.0, 4.0, 4.0, 4.0, 0.0], &[1, 2, 3])
     };
-
-    #[test]
-    fn points_are_beside_a_straight_move_if_all_of_them_are_near_the_same_one() {
-        let mut near = Neighbours::<2>::default();
-        near.replace(&PROGRAM, 0..3);
-        let along = [[1.0, 0.0], [2.0, 0.3], [3.0, -0.5]];
-        assert_eq!(near.straight_beside(along.into_iter(), 0.6), Some(0.5));
-        assert_eq!(near.straight_beside(along.into_iter(), 0.4), None);
-        assert_eq!(near.straight_beside([[3.75, 1.0], [4.0, 2.0]].into_iter(), 0.3), Some(0.25));
-        // Around the corner each is near a move, and the chord between them is not.
-        assert_eq!(near.straight_beside([[2.0, 0.0], [4.0, 2.0]].into_iter(), 0.2), None);
-        assert_eq!(near.straight_beside([[2.0, 2.0]].into_iter(), 0.2), None, "an arc is not straight");
-        assert_eq!(near.straight_beside([[f64::NAN, 0.0]].into_iter(), 0.2), None);
-    }
 
     #[test]
     fn a_straight_move_is_its_chord_and_between_moves_and_on_arcs_nothing_is_known() {
