@@ -15,15 +15,18 @@ export function duration(seconds) {
   if (!Number.isFinite(seconds)) return "–";
   if (Math.abs(seconds) < 1) return `${shown(seconds * 1e3)} ms`;
   if (Math.abs(seconds) < 60) return `${seconds.toFixed(3)} s`;
-  const whole = Math.floor(seconds / 60);
-  const rest = `${(seconds - 60 * whole).toFixed(1)} s`;
+  // Rounded first: 119.97 s are 2 min 0.0 s.
+  const tenths = Math.round(10 * seconds);
+  const whole = Math.floor(tenths / 600);
+  const rest = `${((tenths - 600 * whole) / 10).toFixed(1)} s`;
   return whole < 60 ? `${whole} min ${rest}` : `${Math.floor(whole / 60)} h ${whole % 60} min ${rest}`;
 }
 
 /* A time [s] as a clock: 1:02.345. */
 export function clock(seconds) {
-  const minutes = Math.floor(seconds / 60);
-  return `${minutes}:${(seconds - 60 * minutes).toFixed(3).padStart(6, "0")}`;
+  const thousandths = Math.round(1e3 * seconds);
+  const minutes = Math.floor(thousandths / 6e4);
+  return `${minutes}:${((thousandths - 6e4 * minutes) / 1e3).toFixed(3).padStart(6, "0")}`;
 }
 
 /* The number in a text, or several with commas between them; null for an empty text. Other texts are returned as
