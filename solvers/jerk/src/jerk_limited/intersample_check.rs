@@ -344,7 +344,37 @@ mod tests {
     use super::super::profiles::{random, Winding};
     use super::super::window::Window;
     use super::*;
-    use crate::path_problem::{Effort, End, Problem};
+    use crate::path_problem::{Effort, End, PathPoint, Problem};
+
+    /// A line of this length in mm.
+    struct Line([f64; 2]);
+
+    impl Geometry<1> for Line {
+        fn knots(&self) -> &[f64] {
+            &self.0
+        }
+
+        fn at(&self, _: usize, _: f64) -> PathPoint<1> {
+            PathPoint { first: [1.0], second: [0.0], third: [0.0], speed_cap: f64::INFINITY }
+        }
+    }
+
+    #[test]
+    fn the_jerk_of_a_short_interval_on_a_long_path_has_the_rounding_of_its_length() {
+        // w = 1 + s² over 1 mm: the jerk √w w''/2 is √2 at the end, and changes by twice the error of the length.
+        let limits = Limits { velocity: [[1e9]; 2], acceleration: [[1e9]; 2], jerk: [1.0] };
+        let used = |length: f64| {
+            let (line, stations) = (Line([0.0, length]), [0.0, 1.0]);
+            let mut window = Window::new(&limits);
+            window.rows.sample(&line, &limits, &stations, &[0], &[1.0], |_| f64::INFINITY);
+            window.check.sample(&line, &stations, &[0], &window.rows);
+            window.check.utilisation(&window.rows, &[1.0, 0.0, 2.0, 2.0])[0][2]
+        };
+        for length in [1.0, 1e6, 1e9] {
+            let known = 2f64.sqrt() * (1.0 + 2.0 * ROUNDINGS * f64::EPSILON * length);
+            assert!((used(length) / known - 1.0).abs() < 1e-14, "{} of {known}", used(length));
+        }
+    }
 
     /// The greatest use by eight functions; each is alone in the others' place, too.
     fn peaks(functions: [&dyn Fn(f64) -> f64; LANES], per_most: [f64; 2]) -> [f64; LANES] {
