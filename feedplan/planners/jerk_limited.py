@@ -38,8 +38,8 @@ FINEST, COARSEST = 1e-5, 0.1
 # errors fall with their square.
 RESOLUTION, LEAST_RESOLUTION = 16.0, 6.0
 # Those of the first plan, and its gap of complementarity: it is some tenths of a percent slower than the
-# best in a fifth of the time.
-FIRST_RESOLUTION, FIRST_GAP = 3.0, 1e-2
+# best in a fifth to a third of the time.
+FIRST_RESOLUTION, FIRST_GAP = 3.0, 3e-4
 # How far a plan with a time limit is after its first plan, and before that of the other method, for the
 # progress shown.
 FIRST, OTHER = 0.2, 0.9
