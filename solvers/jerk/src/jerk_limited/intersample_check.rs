@@ -16,7 +16,7 @@ const SAMPLES: usize = STEPS * LAST + 1;
 /// Peaks are only sought where a sample uses more than this part of a limit.
 const NEAR: f64 = 0.97;
 
-/// Relative error of an interval's length, in units of the rounding of a length as long as the path: that of its phases.
+/// The error of an interval's length where a plan is stored as phases, in units of the rounding of the path's length.
 const ROUNDINGS: f64 = 4.0;
 
 /// The basis and its first two derivatives at each sample.
@@ -48,7 +48,7 @@ struct Block {
     at_stations: [Lanes; 2],
     /// Factor by which the limits of jerk are tighter.
     jerk_factor: Lanes,
-    /// The relative error of the lengths.
+    /// The relative error of the length of each interval.
     rounding: Lanes,
 }
 
@@ -127,8 +127,8 @@ impl IntersampleCheck {
         }
     }
 
-    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x; that of jerk with the
-    /// rounding of the lengths, which short intervals of long paths feel.
+    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x. That of jerk includes
+    /// the rounding of the interval's length, which counts on short intervals of long paths.
     ///
     /// Peaks are sought for each axis alone: the maximum over several axes is not smooth.
     pub fn utilisation(&self, rows: &Constraints, x: &[f64]) -> Vec<[f64; 3]> {
@@ -167,7 +167,7 @@ impl IntersampleCheck {
                     let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
                     uses[i] = (q3 * w + q2 * half * 3.0 + q1 * bend) * v * jerk;
                 }
-                // The jerk as it is at a length that is rounded: w'' changes by twice its error, w' by once.
+                // An error of the length changes w' by the same part of itself, and w'' by twice that part.
                 let mut terms = zero;
                 for i in [0, SAMPLES - 1] {
                     let ([_, half, bend, v], [q1, q2, _]) = (motion[i], q[i]);
