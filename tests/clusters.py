@@ -15,14 +15,20 @@ from typing import Any
 
 # A worker that gets a program of this name is killed, as if its memory ran out.
 DEADLY = "deadly.ngc"
+# A worker that gets a program of this name reads it until `LocalCluster.release`.
+HELD = "held.ngc"
+_RELEASED = "released"
 _PRELOAD = f"""
-import os, signal
+import os, signal, time
 from feedplan.jobs import cluster_task
 from feedplan.jobs.work import work_on
-def work_or_end(order, *arguments, **options):
+def work_or_end(order, program, folder, progress, **options):
     if order.name == {DEADLY!r}:
         os.kill(os.getpid(), signal.SIGKILL)
-    return work_on(order, *arguments, **options)
+    while order.name == {HELD!r} and not os.path.exists({_RELEASED!r}):
+        progress("read", 0.0)
+        time.sleep(0.05)
+    return work_on(order, program, folder, progress, **options)
 cluster_task.work_on = work_or_end
 """
 
@@ -93,6 +99,10 @@ class LocalCluster:
         own = ["--nthreads", "1", "--nworkers", "1", "--preload", str(self.folder / "preload.py")]
         own += ["--local-directory", str(self.folder)]
         self._workers.append(self._start("worker", self.url, *own, **variables))
+
+    def release(self) -> None:
+        """Lets the workers go on with programs that are held."""
+        (self.folder / _RELEASED).touch()
 
     def kill_a_worker(self) -> None:
         """Sends kill -9 to a worker that has work."""

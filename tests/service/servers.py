@@ -26,7 +26,7 @@ ENDED = ("done", "failed", "cancelled")
 
 
 def long_part(seed: int = 0) -> bytes:
-    """A program whose plan by `LONG` takes many seconds."""
+    """A program whose plan by `LONG` takes some seconds."""
     rows = [
         f"X{k % 97 + 0.37 * (k % 5) + 1e-3 * seed:.3f} Y{k * 7 % 89 + 0.1 * (k % 3):.3f}" for k in range(4000)
     ]

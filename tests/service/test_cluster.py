@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.batch.batches import content, wait_for
-from tests.clusters import DEADLY, LocalCluster
+from tests.clusters import DEADLY, HELD, LocalCluster
 from tests.clusters import running as cluster_running
 from tests.service.servers import LONG, PART, Server, events_of, long_part, running
 
@@ -75,33 +75,37 @@ def test_jobs_are_cancelled_and_deleted_while_they_run(planner: Server, cluster:
 def test_a_job_outlives_its_worker_and_a_server_its_end(
     cluster: LocalCluster, tmp_path: Path, server: Server
 ) -> None:
+    def read(job: str) -> None:
+        """Waits until a worker reads the program of the job."""
+        wait_for(lambda: own.get(f"/v1/jobs/{job}").json["stage"] == "read")
+
     own = Server(tmp_path, *cluster.options)
     medium = b"\n".join(long_part().splitlines()[:1000]) + b"\nM2\n"
-    fields = {"method": "jerk-limited", "options": '{"accuracy": 0.05}'}
-    job = own.submit(medium, **fields).json["id"]
-    wait_for(lambda: own.get(f"/v1/jobs/{job}").json["stage"] == "plan")
+    fields = {"file": HELD, "method": "jerk-limited", "options": '{"accuracy": 0.05}'}
+    first, second = (own.submit(medium + b"(%d)\n" % k, **fields).json["id"] for k in range(2))
+    read(first)
     cluster.kill_a_worker()
-    done = own.wait(job)
-    assert done["state"] == "done", done["problem"]
-    states = [data["state"] for _, kind, data in events_of(own, job) if kind == "state"]
-    assert states == ["queued", "running", "done"]
     # No job is lost when the scheduler is started again, or the server is killed.
     cluster.wait_for(2)
-    first, second = (own.submit(medium + b"(%d)\n" % k, **fields).json["id"] for k in range(2))
-    wait_for(lambda: own.get(f"/v1/jobs/{first}").json["stage"] == "plan")
+    read(second)
     cluster.kill_scheduler()
-    wait_for(lambda: own.get(f"/v1/jobs/{first}").json["state"] == "queued")
+    for job in (first, second):
+        wait_for(lambda job=job: own.get(f"/v1/jobs/{job}").json["state"] == "queued")
     cluster.start_scheduler()
     for _ in range(2):  # the workers have ended with the scheduler
         cluster.start_worker()
-    wait_for(lambda: own.get(f"/v1/jobs/{second}").json["stage"] == "plan")
+    read(second)
     own.process.kill()
     own.process.communicate()
     own.start()
+    read(first)
+    cluster.release()
     results = [own.wait(job)["result"] for job in (first, second)]
+    states = [data["state"] for _, kind, data in events_of(own, first) if kind == "state"]
     assert own.end() == ""
     here = server.planned(medium + b"(0)\n", **fields)["result"]
     assert json.dumps(results[0]) == json.dumps(results[1]) == json.dumps(here)
+    assert states == ["queued", "running", "queued", "running", "queued", "running", "done"]
 
 
 def test_a_service_beyond_this_computer_needs_tls(tmp_path: Path) -> None:
