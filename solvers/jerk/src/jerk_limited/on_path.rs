@@ -33,8 +33,8 @@ const BELOW: f64 = 0.9999;
 const ROUNDS: usize = 4;
 /// The error of the grid counts as a part of the time of the whole subrun, and falls with the square of the resolution
 /// r. Where the planned stretches are the part p of the length, their resolution is r/√(1 + FINER (1/p − 1)), and at
-/// least `LEAST`: the error grows by about `FINER` over that of a subrun that is planned as a whole.
-const FINER: f64 = 0.05;
+/// least `LEAST`: the error is at most about p + FINER (1 − p) of that of a subrun that is planned as a whole.
+const FINER: f64 = 0.3;
 const LEAST: f64 = 6.0;
 /// A stretch shorter than this part of its path has lengths of few digits.
 const FEW_DIGITS: f64 = 1e-7;
