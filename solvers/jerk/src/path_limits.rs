@@ -27,7 +27,7 @@ mod shape;
 
 use crate::s_curve::Limits;
 use feedplan_planner::problem::{greater, Both, Fault};
-pub use shape::{bounded, sampled, Curve, Shape};
+pub use shape::{bounded, bounded_until, sampled, Curve, Shape};
 
 /// Golden-section steps: the bracket shrinks to 1e-5 of itself, where the minimum is flat.
 const STEPS: usize = 24;

@@ -10,7 +10,7 @@ use feedplan_planner::problem::Problem;
 const QUADRATURE: f64 = 1e-12;
 /// … and of the quintic half-way; the halves that are kept are 64 times as accurate. Near a sharp turn panels are as
 /// short as the turn, and the third derivatives need digits of that length.
-const QUINTIC: f64 = 1e-9;
+const QUINTIC: f64 = 1e-7;
 /// Greatest error of a quintic that is right half-way, over that of its rate half-way: by (t − ½)(t(1 − t))³.
 const ODD: f64 = 0.12;
 /// Panels shorter than this part of their piece are not halved.

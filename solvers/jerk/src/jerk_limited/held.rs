@@ -11,14 +11,16 @@ use rayon::prelude::*;
 
 use super::speed_envelope::{Change, Slopes, ROUNDING};
 use crate::arc_length_path::{path_point, piece, ArcLengthPath, Junction};
-use crate::path_limits::{bounded, Curve, Shape};
+use crate::path_limits::{bounded_until, Curve, Shape};
 use crate::path_problem::{End, Geometry, Limits, PathPoint, PathPoints, SpeedCap};
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;
 
-/// Bounds that are computed closely exceed the derivatives by about this part.
+/// Bounds that are computed closely exceed the derivatives by about this part, …
 const ACCURACY: f64 = 0.2;
+/// … except where looser ones leave this part of acceleration and jerk for changes of speed.
+const EASY: f64 = 0.6;
 /// A stretch that is planned goes on at the held feed for this many lengths over which r doubles at its greatest slope:
 /// the optimum may slow down to gain acceleration before the feed rises, and the first plan is smoothed over as much.
 const MARGIN: f64 = 1.5;
@@ -233,14 +235,16 @@ fn look<const M: usize>(
             Some(direction) => Some(Shape::of(&direction, &[0.0; M], &[0.0; M])),
             None => rough(&own),
         };
-        if let Some(look) = rough.filter(|shape| is_easy(shape)).and_then(|shape| held(&shape)) {
+        let leaves_enough = |look: &Look| look.easy || look.ease >= EASY;
+        if let Some(look) = rough.and_then(|shape| held(&shape)).filter(leaves_enough) {
             return look;
         }
         let is_held =
             |point: &PathPoint<M>| held(&Shape::of(&point.first, &point.second, &point.third)).is_some();
         if path.direction(part).is_none() && points().iter().all(is_held) {
             let curve = Curve { joints: own.control, tip: None, weight: own.weights };
-            if let Some(look) = held(&bounded(&curve, ACCURACY)) {
+            let enough = |shape: &Shape<M>| held(shape).is_some_and(|look| leaves_enough(&look));
+            if let Some(look) = held(&bounded_until(&curve, ACCURACY, enough)) {
                 return look;
             }
         }
@@ -382,6 +386,7 @@ fn to_knot(knots: &[f64], s: f64, distance: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::arc_length_path::Part;
+    use crate::path_limits::bounded;
     use proptest::prelude::*;
 
     const LIMITS: Limits<2> =
