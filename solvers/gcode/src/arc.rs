@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::beside::{distance, minus, Point2};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::tolerance::{
     HALF_CHORD, RADIUS_SLACK, SAME_ANGLE, SAME_POINT, SPIRAL_INCH, SPIRAL_MM, SPIRAL_MOST, SPIRAL_RELATIVE,
 };
@@ -50,17 +50,17 @@ pub fn arc(start: Point2, end: Point2, form: Form, clockwise: bool, turns: u32) 
 fn check_radii(start: Point2, end: Point2, centre: Point2, inches: bool) -> Outcome<()> {
     let (first, last) = (distance(start, centre), distance(end, centre));
     if first < RADIUS_SLACK || last < RADIUS_SLACK {
-        return fault(format!(
+        return fault!(
             "the arc has no radius ({first:.4} mm at its start, {last:.4} mm at its end): check I, J, K and the plane"
-        ));
+        );
     }
     let spread = (first - last).abs();
     let allowed = if inches { SPIRAL_INCH } else { SPIRAL_MM };
     if spread > SPIRAL_MOST * allowed || (spread > allowed && spread > SPIRAL_RELATIVE * first.max(last)) {
-        return fault(format!(
+        return fault!(
             "the radius of the arc is {first:.4} mm at its start and {last:.4} mm at its end, more than {allowed:.3} mm \
              apart: check I, J, K, the plane and G90.1/G91.1, or post more decimals"
-        ));
+        );
     }
     Ok(())
 }
@@ -71,13 +71,13 @@ fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcom
     let length = distance(start, end);
     let half = 0.5 * length;
     if half <= f64::EPSILON * start[0].abs().max(start[1].abs()).max(1.0) {
-        return fault("an arc with R ends where it starts, so its centre is anywhere: program full circles with I, J, K");
+        return fault!("an arc with R ends where it starts, so its centre is anywhere: program full circles with I, J, K");
     }
     if half - radius.abs() > RADIUS_SLACK || radius == 0.0 {
-        return fault(format!(
+        return fault!(
             "the radius {:.4} mm of the arc is too small to reach its end {length:.4} mm away: check R",
             radius.abs()
-        ));
+        );
     }
     // A radius that exceeds half the chord by no more than the rounding of coordinates is half the chord: the square root
     // would turn that rounding into a visible height.

@@ -1,7 +1,7 @@
 //! The functions and operators of RS-274/NGC, on numbers. Angles are in degrees.
 
-use super::fault::{fault, Outcome};
-use super::number::spaces;
+use super::fault::Outcome;
+use super::number::{behind_word, spaces};
 use super::tolerance::EQUAL;
 
 /// What the name of a function stands for.
@@ -33,10 +33,8 @@ const FUNCTIONS: [(&str, Function); 14] = [
 /// The function whose name and bracket start at `at`, its name, and the place of the bracket.
 pub fn function_at(source: &[u8], at: usize) -> Option<(Function, &'static str, usize)> {
     FUNCTIONS.iter().find_map(|&(name, function)| {
-        let text = source.get(at..at + name.len())?;
-        let bracket = spaces(source, at + name.len());
-        (text.eq_ignore_ascii_case(name.as_bytes()) && source.get(bracket) == Some(&b'['))
-            .then_some((function, name, bracket))
+        let bracket = spaces(source, behind_word(source, at, name)?);
+        (source.get(bracket) == Some(&b'[')).then_some((function, name, bracket))
     })
 }
 
@@ -70,12 +68,9 @@ static OPERATORS: [Operator; 15] = [
     operator("XOR", 1, |a, b| truth((a != 0.0) != (b != 0.0))),
 ];
 
-/// The operator that a text begins with.
-pub fn operator_of(text: &[u8]) -> Option<&'static Operator> {
-    OPERATORS.iter().find(|operator| {
-        let name = operator.name.as_bytes();
-        text.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name))
-    })
+/// The operator at `at`.
+pub fn operator_at(source: &[u8], at: usize) -> Option<&'static Operator> {
+    OPERATORS.iter().find(|operator| behind_word(source, at, operator.name).is_some())
 }
 
 impl Operator {
@@ -90,7 +85,7 @@ pub fn finite(value: f64, formula: impl Fn() -> String) -> Outcome<f64> {
     if value.is_finite() {
         return Ok(value);
     }
-    fault(format!("{} has no finite value: check the parameters", formula()))
+    fault!("{} has no finite value: check the parameters", formula())
 }
 
 fn truth(value: bool) -> f64 {

@@ -3,7 +3,7 @@
 //! A G code is a number of tenths (G5.1 is 51). Two codes of one group exclude each other in a block. The groups are those
 //! of RS-274/NGC; a code in no group is not read.
 
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::number::integer;
 
 /// Bit of a letter in `Block::words`.
@@ -242,7 +242,7 @@ impl Block {
         let Some(value) = self.get(letter) else { return Ok(None) };
         match integer(value) {
             Some(number) if number >= least && number <= i64::from(u32::MAX) => Ok(Some(number as u32)),
-            _ => fault(format!("word {} is no {what}: give an integer from {least}", self.word(letter))),
+            _ => fault!("word {} is no {what}: give an integer from {least}", self.word(letter)),
         }
     }
 

@@ -11,7 +11,7 @@ use super::beside::{crossing, direction, distance, minus, sweep_between, wrapped
 use super::block::{g_name, Block};
 use super::compensation::{Compensation, Last, Phase};
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::moves::Kind;
 use super::tolerance::{ENTRY_BEND, NO_CORNER, WHOLE_TURNS};
@@ -64,25 +64,25 @@ impl Interpreter<'_> {
         }
         let name = g_name(code);
         if self.compensation.as_ref().is_some_and(|on| on.phase != Phase::Leaving) {
-            return fault(format!("{name} stands where the compensation is on already: give G40 before"));
+            return fault!("{name} stands where the compensation is on already: give G40 before");
         }
         let normal = self.state.normal;
         if normal == 0 {
-            return fault(format!("{name} is read in the planes G17 and G18: post the compensated path"));
+            return fault!("{name} is read in the planes G17 and G18: post the compensated path");
         }
         let (diameter, orientation) = match (code % 10, block.get(b'D')) {
             (1, Some(diameter)) => {
                 (diameter * self.state.unit(), block.count(b'L', 0, "side of a lathe tool")?.unwrap_or(0))
             }
-            (1, None) => return fault(format!("{name} has no diameter: give it as D")),
+            (1, None) => return fault!("{name} has no diameter: give it as D"),
             _ => self.tip_of_tool(block, &name)?,
         };
         let orientation = orientation as usize;
         if orientation >= ORIGINS.len() || (normal == 2 && ORIGINS[orientation] != [0.0; 2]) {
-            return fault(format!(
+            return fault!(
                 "{name} in the plane G{} takes a tool of the side {orientation}: lathe tools have 1 to 9 and work in G18",
                 19 - normal
-            ));
+            );
         }
         let left = if code < 420 { 1.0 } else { -1.0 };
         // A negative diameter stands for a tool smaller than the one which the path is made for.
@@ -121,9 +121,9 @@ impl Interpreter<'_> {
         let letter = if block.has(b'D') { b'D' } else { b'H' };
         let number = block.count(letter, 0, "tool number")?;
         if self.tools.is_none() {
-            return fault(format!(
+            return fault!(
                 "{name} takes a diameter from the tool table: give one (--tool-table), or G41.1 and G42.1 with D"
-            ));
+            );
         }
         let tool = match number {
             Some(number @ 1..) => self.needed_tool(number)?,
@@ -136,7 +136,7 @@ impl Interpreter<'_> {
     pub(super) fn check_beside(&self, what: &str) -> Outcome<()> {
         match &self.compensation {
             Some(on) if on.phase != Phase::Leaving => {
-                fault(format!("{what} stands where {} is on: give G40 before", g_name(on.code)))
+                fault!("{what} stands where {} is on: give G40 before", g_name(on.code))
             }
             _ => Ok(()),
         }
@@ -158,11 +158,11 @@ impl Interpreter<'_> {
         let way = minus(end, from);
         let length = way[0].hypot(way[1]);
         if entering && length <= on.radius {
-            return fault(format!(
+            return fault!(
                 "the first move after {} is {length:.4} mm long and the tool's radius is {:.4} mm: begin farther away",
                 g_name(on.code),
                 on.radius
-            ));
+            );
         }
         if length == 0.0 {
             on.put(&mut beside, here);
@@ -202,7 +202,7 @@ impl Interpreter<'_> {
     ) -> Outcome<()> {
         let Some(mut on) = self.compensation.take() else { return Ok(()) };
         if on.phase == Phase::Leaving {
-            return fault("the first move after G40 is an arc: give a straight move before");
+            return fault!("the first move after G40 is an arc: give a straight move before");
         }
         let (control, line) = (self.state.control, self.line);
         let turn = angle.signum();
@@ -210,10 +210,10 @@ impl Interpreter<'_> {
         let end = on.flat(target);
         let nominal = distance(end, centre);
         if inside && nominal <= on.radius {
-            return fault(format!(
+            return fault!(
                 "the radius {nominal:.4} mm of the arc is not larger than the tool's, {:.4} mm: take a smaller tool",
                 on.radius
-            ));
+            );
         }
         let outward = if inside { -on.radius } else { on.radius };
         let out = [(end[0] - centre[0]) / nominal, (end[1] - centre[1]) / nominal];
@@ -269,19 +269,19 @@ impl Interpreter<'_> {
         out: Point2,
     ) -> Outcome<Point2> {
         if distance(here, end) <= on.radius {
-            return fault(format!(
+            return fault!(
                 "the arc after {} is not longer than the tool's radius {:.4} mm: begin farther away",
                 g_name(on.code),
                 on.radius
-            ));
+            );
         }
         let chord = minus(here, new_end);
         let along = -(chord[0] * out[0] + chord[1] * out[1]);
         if along.abs() < ENTRY_BEND * chord[0].hypot(chord[1]) {
-            return fault(format!(
+            return fault!(
                 "the arc after {} has no centre that brings the tool beside its end: begin with a line",
                 g_name(on.code)
-            ));
+            );
         }
         let radius = 0.5 * (chord[0] * chord[0] + chord[1] * chord[1]) / along;
         Ok([new_end[0] - radius * out[0], new_end[1] - radius * out[1]])
@@ -381,9 +381,9 @@ impl Interpreter<'_> {
 
 #[cold]
 fn no_room<T>(on: &Compensation) -> Outcome<T> {
-    fault(format!(
+    fault!(
         "the tool of radius {:.4} mm does not fit into the corner before this move: take a smaller one, or remove {}",
         on.radius,
         g_name(on.code)
-    ))
+    )
 }

@@ -3,7 +3,7 @@
 
 use super::block::{Block, AXES};
 use super::coordinates::Point;
-use super::fault::{fault, fault_in, Outcome};
+use super::fault::Outcome;
 use super::interpreter::{Corner, Interpreter};
 use super::moves::{Arc, Kind};
 use super::tolerance::ON_ONE_LINE;
@@ -14,10 +14,7 @@ impl Interpreter<'_> {
         let Some((letter, value)) = block.corner else { return Ok(()) };
         let size = value * self.state.unit();
         if !(size > 0.0 && size < f64::INFINITY) {
-            return fault(format!(
-                "word ,{}{value} is no size of a corner: give a positive one",
-                letter as char
-            ));
+            return fault!("word ,{}{value} is no size of a corner: give a positive one", letter as char);
         }
         self.check_beside(&format!(",{}", letter as char))?;
         match self.moves.len().checked_sub(1).filter(|_| self.moves.position != *start) {
@@ -25,7 +22,7 @@ impl Interpreter<'_> {
                 self.corner = Some(Corner { letter, size, row, line: self.line, start: *start, feed });
                 Ok(())
             }
-            None => fault(format!("word ,{}{value} stands behind no move: give its place", letter as char)),
+            None => fault!("word ,{}{value} stands behind no move: give its place", letter as char),
         }
     }
 
@@ -33,12 +30,10 @@ impl Interpreter<'_> {
     pub(super) fn check_corner(&self) -> Outcome<()> {
         match &self.corner {
             None => Ok(()),
-            Some(corner) => fault_in(
+            Some(corner) => fault_in!(
                 corner.line,
-                format!(
-                    "the corner ,{} of this line is followed by no straight move G1 in the plane: put it elsewhere",
-                    corner.letter as char
-                ),
+                "the corner ,{} of this line is followed by no straight move G1 in the plane: put it elsewhere",
+                corner.letter as char
             ),
         }
     }
@@ -65,16 +60,16 @@ impl Interpreter<'_> {
             (before[0] * after[1] - before[1] * after[0], before[0] * after[0] + before[1] * after[1]);
         let turn = sine.atan2(cosine);
         if sine.abs() < ON_ONE_LINE && (cosine > 0.0 || corner.letter == b'R') {
-            return fault_in(corner.line, "the moves at this corner lie on one line: remove ,C and ,R");
+            return fault_in!(corner.line, "the moves at this corner lie on one line: remove ,C and ,R");
         }
         let cut = if corner.letter == b'C' { corner.size } else { corner.size * (0.5 * turn).tan().abs() };
         if cut > lengths[0] || cut > lengths[1] {
-            return fault_in(
+            return fault_in!(
                 corner.line,
-                format!(
-                    "the corner ,{} takes {cut:.4} mm of moves that are {:.4} and {:.4} mm long: make it smaller",
-                    corner.letter as char, lengths[0], lengths[1]
-                ),
+                "the corner ,{} takes {cut:.4} mm of moves that are {:.4} and {:.4} mm long: make it smaller",
+                corner.letter as char,
+                lengths[0],
+                lengths[1]
             );
         }
         let (mut first, mut second) = (middle, middle);

@@ -5,7 +5,7 @@
 
 use super::block::{g_name, Block, AXES};
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::{Interpreter, Topic};
 use super::modal::FeedMode;
 use super::moves::{Control, Kind, Mode, Stop};
@@ -32,25 +32,19 @@ impl Interpreter<'_> {
     /// Drills at the axis words of the block, L times.
     pub(super) fn cycle(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         if self.state.feed_mode == FeedMode::Inverse {
-            return fault(format!(
-                "{} does not work with inverse time (G93): give G94 and F",
-                g_name(motion)
-            ));
+            return fault!("{} does not work with inverse time (G93): give G94 and F", g_name(motion));
         }
         let feed = self.feed()?.linear;
         if let Some(letter) = AXES[3..].iter().find(|&&letter| block.has(letter)) {
-            return fault(format!(
+            return fault!(
                 "word {} stands in the cycle {}: cycles move X, Y and Z only",
                 block.word(*letter),
                 g_name(motion)
-            ));
+            );
         }
         let repeats = block.count(b'L', 1, "number of repetitions")?.unwrap_or(1);
         if repeats > MOST_REPEATS {
-            return fault(format!(
-                "word {} is more than {MOST_REPEATS} repetitions: check L",
-                block.word(b'L')
-            ));
+            return fault!("word {} is more than {MOST_REPEATS} repetitions: check L", block.word(b'L'));
         }
         self.check_beside(&g_name(motion))?;
         let hole = self.hole(block, motion)?;
@@ -126,12 +120,12 @@ impl Interpreter<'_> {
                 Some(value) => *kept = value,
                 None if again => {}
                 None => {
-                    return fault(format!(
+                    return fault!(
                         "the cycle {} has no {}: give R (retract height) and {} (bottom)",
                         g_name(motion),
                         letter as char,
                         AXES[normal] as char
-                    ))
+                    )
                 }
             }
         }
@@ -151,12 +145,12 @@ impl Interpreter<'_> {
         };
         let [retract, bottom] = own.map(|height| height * unit + zero);
         if bottom > retract {
-            return fault(format!(
+            return fault!(
                 "the cycle {} has its bottom {:.4} mm above its retract height R: check R and {}",
                 g_name(motion),
                 bottom - retract,
                 AXES[normal] as char
-            ));
+            );
         }
         let clearance = match block.get(b'D') {
             Some(value) if matches!(motion, 730 | 830) => value * unit,
@@ -164,17 +158,14 @@ impl Interpreter<'_> {
         };
         let dwell = match (sticky.dwell, motion) {
             (None, 820 | 860 | 890) => {
-                return fault(format!("the cycle {} has no dwell: give P in seconds", g_name(motion)))
+                return fault!("the cycle {} has no dwell: give P in seconds", g_name(motion))
             }
             (dwell, _) => dwell.unwrap_or(0.0),
         };
         let peck = match (sticky.peck, motion) {
             (Some(peck), 730 | 830) if peck > 0.0 => peck,
             (_, 730 | 830) => {
-                return fault(format!(
-                    "the cycle {} has no depth of one peck: give a positive Q",
-                    g_name(motion)
-                ))
+                return fault!("the cycle {} has no depth of one peck: give a positive Q", g_name(motion))
             }
             _ => f64::INFINITY,
         };
@@ -195,7 +186,7 @@ impl Interpreter<'_> {
         self.rapid(&place)?;
         let pecks = ((hole.own[0] - hole.own[1]) / hole.peck).ceil();
         if pecks > f64::from(MOST_REPEATS) {
-            return fault(format!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion)));
+            return fault!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion));
         }
         // Depths are added in the numbers of the program, so that rounding makes as many pecks as on a control.
         let (unit, zero) = (self.state.unit(), self.state.offsets.sum()[normal]);

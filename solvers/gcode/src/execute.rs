@@ -8,7 +8,7 @@
 
 use super::block::{bit, bits, g_name, Block, Group, MGroup, AXIS_WORDS};
 use super::coordinates::{CoordinateMode, Point};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::intent::{axis_words, check_use, is_cycle, motion_of, ARC_WORDS, FREE_WORDS};
 use super::interpreter::{Interpreter, Topic};
 use super::modal::{Feed, FeedMode};
@@ -65,7 +65,7 @@ impl Interpreter<'_> {
         let motion = motion.filter(|_| !self.switches_look_ahead(block, motion));
 
         if block.corner.is_some() && motion != Some(10) {
-            return fault("a corner ,C or ,R stands behind no straight move: give G1 and its place");
+            return fault!("a corner ,C or ,R stands behind no straight move: give G1 and its place");
         }
         self.set_feed_and_speed(block)?;
         self.switch(block)?;
@@ -157,7 +157,7 @@ impl Interpreter<'_> {
             let diameter = matches!(block.code(Group::Compensation), Some(411 | 421));
             for letter in *b"SHTD" {
                 if !(diameter && letter == b'D') && block.get(letter).is_some_and(|value| value < 0.0) {
-                    return fault(format!("word {} is negative: give a number from 0", block.word(letter)));
+                    return fault!("word {} is negative: give a number from 0", block.word(letter));
                 }
             }
         }
@@ -167,13 +167,10 @@ impl Interpreter<'_> {
     #[inline(always)]
     fn set_feed(&mut self, block: &Block, feed: f64) -> Outcome<()> {
         if feed < 0.0 {
-            return fault(format!("word {} is a negative feed: give a positive one", block.word(b'F')));
+            return fault!("word {} is a negative feed: give a positive one", block.word(b'F'));
         }
         if feed != 0.0 && !RATES.contains(&feed) {
-            return fault(format!(
-                "word {} is a feed that no machine has: check the number",
-                block.word(b'F')
-            ));
+            return fault!("word {} is a feed that no machine has: check the number", block.word(b'F'));
         }
         let inches = block.code(Group::Units).map_or(self.state.inches, |code| code == 200);
         let unit = if inches { MM_PER_INCH } else { 1.0 };
@@ -228,7 +225,7 @@ impl Interpreter<'_> {
     fn pause(&mut self, block: &Block, axes: u32) -> Outcome<()> {
         let letter = if block.has(b'P') { b'P' } else { b'X' };
         let Some(seconds) = block.get(letter).filter(|_| axes & bit(letter) == 0) else {
-            return fault("G4 has no time: give it seconds as P or X");
+            return fault!("G4 has no time: give it seconds as P or X");
         };
         self.dwell(block, letter, seconds)
     }
@@ -238,7 +235,7 @@ impl Interpreter<'_> {
         if !(0.0..=MOST_DWELL).contains(&seconds) {
             let word =
                 if block.has(letter) { block.word(letter) } else { format!("{}{seconds}", letter as char) };
-            return fault(format!("word {word} is no dwell time: give seconds from 0 to {MOST_DWELL}"));
+            return fault!("word {word} is no dwell time: give seconds from 0 to {MOST_DWELL}");
         }
         if seconds > LONG_DWELL {
             self.warn_once(Topic::LongDwell, || {

@@ -3,48 +3,33 @@
 //! Operators from the one that binds least: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Operators that bind alike
 //! are applied from left to right, powers too.
 
-use super::arithmetic::{finite, function_at, operator_of, Function};
-use super::fault::{fault, foreign, Outcome};
-use super::number::{decimal, integer, spaces};
+use super::arithmetic::{finite, function_at, operator_at, Function};
+use super::fault::Outcome;
+use super::interpreter::Interpreter;
+use super::number::{behind_word, decimal, integer, spaces};
 use super::parameters::{is_number, Name, READINGS};
 use super::tolerance::MAX_DEPTH;
-
-/// The values of parameters, those that the program sets and those that the machine reports. A value that only one
-/// machine or control can know is a fault.
-pub trait Values {
-    /// The value of a number; 0 where it has none, as in LinuxCNC.
-    fn number(&self, number: usize) -> Outcome<f64>;
-
-    /// True where a number has a value.
-    fn has_value(&self, number: usize) -> Outcome<bool>;
-
-    /// True where words with parameters without value are left out, as in Fanuc's macros.
-    fn in_macro(&self) -> bool;
-
-    /// The value of a name; None where there is no such name.
-    fn named(&self, name: &[u8]) -> Outcome<Option<f64>>;
-}
 
 /// Reads `#1 = value` from its `#` on: the parameter, its value (NaN for `#1 = #0`), and the place after it.
 ///
 /// The value may be a sum without brackets, as Fanuc writes it.
-pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Name, f64, usize)> {
+pub fn assignment(source: &[u8], at: usize, values: &Interpreter) -> Outcome<(Name, f64, usize)> {
     let mut formula = Formula { source, at, values, depth: 0 };
     let name = formula.name()?;
     if formula.peek() != b'=' {
-        return foreign(format!("{name} stands alone: write {name} = value, or a letter before it"));
+        return foreign!("{name} stands alone: write {name} = value, or a letter before it");
     }
     formula.at += 1;
     let value = if formula.nothing() { f64::NAN } else { formula.chain(1)? };
     if matches!(name, Name::Number(number) if READINGS.contains(&number)) {
-        return fault(format!("{name} is reported by the machine and cannot be set: use another parameter"));
+        return fault!("{name} is reported by the machine and cannot be set: use another parameter");
     }
     Ok((name, value, formula.at))
 }
 
 /// The value at `at` that is not a plain number (brackets, a parameter or a function, with or without a sign), and the
 /// place after it. None where none of these begins; NaN for a parameter without value in a macro.
-pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
+pub fn expression(source: &[u8], at: usize, values: &Interpreter) -> Outcome<Option<(f64, usize)>> {
     let mut formula = Formula { source, at, values, depth: 0 };
     let after_sign = match formula.peek() {
         b'+' | b'-' => spaces(source, formula.at + 1),
@@ -58,7 +43,7 @@ pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Opti
     if !starts {
         return Ok(None);
     }
-    if values.in_macro() && formula.peek() == b'#' {
+    if values.parameters.in_macro() && formula.peek() == b'#' {
         let start = formula.at;
         let has_value = !formula.nothing()
             && match formula.name()? {
@@ -74,8 +59,18 @@ pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Opti
     Ok(Some((value, formula.at)))
 }
 
+/// The number at `at`, plain or computed, and the place after it; None where there is none, or has no value.
+#[cold]
+pub fn number(source: &[u8], at: usize, values: &Interpreter) -> Outcome<Option<(f64, usize)>> {
+    let found = match decimal(source, at) {
+        None => expression(source, at, values)?,
+        plain => plain,
+    };
+    Ok(found.filter(|(value, _)| !value.is_nan()))
+}
+
 /// The value of the bracket at `at`, and the place after it; None where no bracket begins there.
-pub fn bracket(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
+pub fn bracket(source: &[u8], at: usize, values: &Interpreter) -> Outcome<Option<(f64, usize)>> {
     let mut formula = Formula { source, at, values, depth: 0 };
     if formula.peek() != b'[' {
         return Ok(None);
@@ -89,7 +84,7 @@ pub fn name_in_brackets(source: &[u8], at: usize) -> Outcome<(Vec<u8>, usize)> {
     let first = at + 1;
     let end = (first..source.len()).find(|&at| matches!(source[at], b'>' | b'\n' | b'\r'));
     let Some(end) = end.filter(|&end| source[end] == b'>') else {
-        return foreign(format!("the name {} has no closing >", excerpt(source, at)));
+        return foreign!("the name {} has no closing >", excerpt(source, at));
     };
     let letters = source[first..end].iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
     Ok((letters.map(u8::to_ascii_lowercase).collect(), end + 1))
@@ -98,7 +93,7 @@ pub fn name_in_brackets(source: &[u8], at: usize) -> Outcome<(Vec<u8>, usize)> {
 struct Formula<'a> {
     source: &'a [u8],
     at: usize,
-    values: &'a dyn Values,
+    values: &'a Interpreter<'a>,
     depth: usize,
 }
 
@@ -112,9 +107,9 @@ impl Formula<'_> {
     fn value(&mut self) -> Outcome<f64> {
         self.depth += 1;
         if self.depth > MAX_DEPTH {
-            return fault(format!(
+            return fault!(
                 "brackets and parameters are nested more than {MAX_DEPTH} deep: write the formula in steps"
-            ));
+            );
         }
         let value = match self.peek() {
             b'[' => self.bracket()?,
@@ -139,7 +134,7 @@ impl Formula<'_> {
                     self.at += 1;
                     -self.value()?
                 }
-                _ => return foreign(format!("a number is missing before {}", self.rest())),
+                _ => return foreign!("a number is missing before {}", self.rest()),
             },
         };
         self.depth -= 1;
@@ -148,26 +143,26 @@ impl Formula<'_> {
 
     fn look_up(&self, name: &Name) -> Outcome<f64> {
         let text = match name {
-            Name::Number(number) => return self.values.number(*number),
+            Name::Number(number) => return self.values.parameter(*number),
             Name::Text(text) => text,
         };
         match self.values.named(text)? {
             Some(value) => Ok(value),
-            None => fault(format!(
+            None => fault!(
                 "parameter {name} is used and the program has not set it: set it before, such as {name} = 1"
-            )),
+            ),
         }
     }
 
     /// From `[` to its `]`.
     fn bracket(&mut self) -> Outcome<f64> {
         if self.peek() != b'[' {
-            return foreign(format!("a bracket [ is missing before {}", self.rest()));
+            return foreign!("a bracket [ is missing before {}", self.rest());
         }
         self.at += 1;
         let value = self.chain(1)?;
         if self.peek() != b']' {
-            return foreign(format!("an operator or a bracket ] is missing before {}", self.rest()));
+            return foreign!("an operator or a bracket ] is missing before {}", self.rest());
         }
         self.at += 1;
         Ok(value)
@@ -178,8 +173,7 @@ impl Formula<'_> {
         let mut left = self.value()?;
         loop {
             self.peek();
-            let rest = &self.source[self.at.min(self.source.len())..];
-            match operator_of(rest).filter(|operator| operator.binding >= least) {
+            match operator_at(self.source, self.at).filter(|operator| operator.binding >= least) {
                 Some(operator) => {
                     self.at += operator.name.len();
                     let right = self.chain(operator.binding + 1)?;
@@ -192,7 +186,7 @@ impl Formula<'_> {
 
     fn function(&mut self) -> Outcome<f64> {
         let Some((function, name, bracket)) = function_at(self.source, self.at) else {
-            return foreign(format!("{} is neither a number nor a function", self.rest()));
+            return foreign!("{} is neither a number nor a function", self.rest());
         };
         self.at = bracket;
         match function {
@@ -204,7 +198,7 @@ impl Formula<'_> {
             Function::Atan => {
                 let y = self.bracket()?;
                 if self.peek() != b'/' {
-                    return foreign("ATAN takes two brackets: write ATAN[y]/[x]");
+                    return foreign!("ATAN takes two brackets: write ATAN[y]/[x]");
                 }
                 self.at += 1;
                 Ok(y.atan2(self.bracket()?).to_degrees())
@@ -216,11 +210,11 @@ impl Formula<'_> {
     fn exists(&mut self) -> Outcome<f64> {
         self.at += 1;
         if self.peek() != b'#' {
-            return foreign("EXISTS takes a parameter: write EXISTS[#<name>]");
+            return foreign!("EXISTS takes a parameter: write EXISTS[#<name>]");
         }
         let name = self.name()?;
         if self.peek() != b']' {
-            return foreign("EXISTS takes one parameter: write EXISTS[#<name>]");
+            return foreign!("EXISTS takes one parameter: write EXISTS[#<name>]");
         }
         self.at += 1;
         Ok(match name {
@@ -234,12 +228,11 @@ impl Formula<'_> {
         let Name::Number(number) = name else { return Ok(None) };
         self.peek();
         let start = self.at;
-        let word = self.source.get(start..start + 2).unwrap_or_default();
-        let equal = word.eq_ignore_ascii_case(b"EQ");
-        if equal || word.eq_ignore_ascii_case(b"NE") {
-            self.at += 2;
+        let equal = behind_word(self.source, start, "EQ");
+        if let Some(end) = equal.or_else(|| behind_word(self.source, start, "NE")) {
+            self.at = end;
             if self.nothing() {
-                return Ok(Some(f64::from(self.values.has_value(*number)? != equal)));
+                return Ok(Some(f64::from(self.values.has_value(*number)? == equal.is_none())));
             }
         }
         self.at = start;
@@ -269,9 +262,7 @@ impl Formula<'_> {
         let number = self.value()?;
         match integer(number) {
             Some(index) if is_number(index) => Ok(Name::Number(index as usize)),
-            _ => fault(format!(
-                "#{number} is no parameter: parameters are #1 to #5602, #7001 to #8980 or #<name>"
-            )),
+            _ => fault!("#{number} is no parameter: parameters are #1 to #5602, #7001 to #8980 or #<name>"),
         }
     }
 
@@ -298,32 +289,14 @@ pub fn excerpt(source: &[u8], at: usize) -> String {
 mod tests {
     use super::*;
 
-    use crate::parameters::Parameters;
-
-    impl Values for Parameters {
-        fn number(&self, number: usize) -> Outcome<f64> {
-            Ok(Parameters::number(self, number))
-        }
-
-        fn has_value(&self, number: usize) -> Outcome<bool> {
-            Ok(self.is_set(number))
-        }
-
-        fn in_macro(&self) -> bool {
-            Parameters::in_macro(self)
-        }
-
-        fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
-            Ok(Parameters::named(self, name))
-        }
-    }
+    use crate::options::Options;
 
     fn value(text: &str) -> Result<f64, String> {
-        value_with(&Parameters::default(), text)
+        value_with(&Interpreter::new(&Options::default(), 0), text)
     }
 
-    fn value_with(parameters: &Parameters, text: &str) -> Result<f64, String> {
-        match expression(text.as_bytes(), 0, parameters) {
+    fn value_with(values: &Interpreter, text: &str) -> Result<f64, String> {
+        match expression(text.as_bytes(), 0, values) {
             Ok(Some((value, end))) if end == text.len() => Ok(value),
             Ok(found) => Err(format!("{found:?}")),
             Err(fault) => Err(fault.message),
@@ -375,27 +348,29 @@ mod tests {
 
     #[test]
     fn parameters_have_numbers_and_names() {
-        let mut parameters = Parameters::default();
+        let options = Options::default();
+        let mut values = Interpreter::new(&options, 0);
         for text in ["#1=2.5", "#<Tool Width> = [#1 * 2]", "#2=#1", "#3=2"] {
-            let (name, value, end) = assignment(text.as_bytes(), 0, &parameters).unwrap();
+            let (name, value, end) = assignment(text.as_bytes(), 0, &values).unwrap();
             assert_eq!(end, text.len());
-            parameters.set(&name, value);
+            values.parameters.set(&name, value);
         }
-        assert_eq!(value_with(&parameters, "#<toolwidth>"), Ok(5.0));
-        assert_eq!(value_with(&parameters, "##3"), Ok(2.5));
-        assert_eq!(value_with(&parameters, "#[1 + 1]"), Ok(2.5));
-        assert_eq!(value_with(&parameters, "exists[#<toolwidth>]"), Ok(1.0));
-        assert_eq!(value_with(&parameters, "exists[#<other>]"), Ok(0.0));
-        assert_eq!(value_with(&parameters, "#7"), Ok(0.0));
+        assert_eq!(value_with(&values, "#<toolwidth>"), Ok(5.0));
+        assert_eq!(value_with(&values, "##3"), Ok(2.5));
+        assert_eq!(value_with(&values, "#[1 + 1]"), Ok(2.5));
+        assert_eq!(value_with(&values, "exists[#<toolwidth>]"), Ok(1.0));
+        assert_eq!(value_with(&values, "exists[#<other>]"), Ok(0.0));
+        assert_eq!(value_with(&values, "#7"), Ok(0.0));
     }
 
     #[test]
     fn parameters_without_value_are_nothing() {
-        let mut parameters = Parameters::default();
+        let options = Options::default();
+        let mut values = Interpreter::new(&options, 0);
         for text in ["#1=0", "#2=#1+2*3", "#3=4", "#3=#0"] {
-            let (name, value, end) = assignment(text.as_bytes(), 0, &parameters).unwrap();
+            let (name, value, end) = assignment(text.as_bytes(), 0, &values).unwrap();
             assert_eq!(end, text.len());
-            parameters.set(&name, value);
+            values.parameters.set(&name, value);
         }
         for (text, expected) in [
             ("[#1 EQ #0]", 0.0),
@@ -404,7 +379,7 @@ mod tests {
             ("[#9 NE #0 OR #2 EQ 6]", 1.0),
             ("[#1 EQ #4]", 1.0),
         ] {
-            assert_eq!(value_with(&parameters, text), Ok(expected), "{text}");
+            assert_eq!(value_with(&values, text), Ok(expected), "{text}");
         }
     }
 
@@ -439,7 +414,7 @@ mod tests {
 
     #[test]
     fn what_the_machine_tells_is_not_set() {
-        let fault = assignment(b"#5420=10", 0, &Parameters::default()).unwrap_err();
+        let fault = assignment(b"#5420=10", 0, &Interpreter::new(&Options::default(), 0)).unwrap_err();
         assert!(fault.message.contains("#5420"), "{}", fault.message);
     }
 }

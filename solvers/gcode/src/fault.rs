@@ -1,5 +1,7 @@
 //! The reason why a program cannot be read: one sentence without its line, which the reader adds.
 
+use std::fmt::Arguments;
+
 /// A sentence for the user.
 #[derive(Debug)]
 pub struct Fault {
@@ -13,20 +15,24 @@ pub struct Fault {
 /// A result whose error is boxed, so that the results of hot functions fit into a register.
 pub type Outcome<T> = Result<T, Box<Fault>>;
 
-/// A program that is understood and cannot be followed.
-#[cold]
-pub fn fault<T>(message: impl Into<String>) -> Outcome<T> {
-    Err(Box::new(Fault { message: message.into(), foreign: false, line: None }))
+/// The error of a message as `format!` takes it: a program that is understood and cannot be followed.
+macro_rules! fault {
+    ($($message:tt)+) => { $crate::fault::Fault::error(None, false, format_args!($($message)+)) };
 }
 
-/// A text that is not understood.
-#[cold]
-pub fn foreign<T>(message: impl Into<String>) -> Outcome<T> {
-    Err(Box::new(Fault { message: message.into(), foreign: true, line: None }))
+/// The error of a text that is not understood.
+macro_rules! foreign {
+    ($($message:tt)+) => { $crate::fault::Fault::error(None, true, format_args!($($message)+)) };
 }
 
-/// A program that cannot be followed because of another line than the one that is read.
-#[cold]
-pub fn fault_in<T>(line: u32, message: impl Into<String>) -> Outcome<T> {
-    Err(Box::new(Fault { message: message.into(), foreign: false, line: Some(line) }))
+/// The error of a program that cannot be followed because of another line than the one that is read.
+macro_rules! fault_in {
+    ($line:expr, $($message:tt)+) => { $crate::fault::Fault::error(Some($line), false, format_args!($($message)+)) };
+}
+
+impl Fault {
+    #[cold]
+    pub fn error<T>(line: Option<u32>, foreign: bool, message: Arguments) -> Outcome<T> {
+        Err(Box::new(Self { message: message.to_string(), foreign, line }))
+    }
 }

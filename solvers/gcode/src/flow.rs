@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use super::expression::{excerpt, name_in_brackets};
-use super::fault::{fault, fault_in, Outcome};
+use super::fault::Outcome;
 use super::number::{decimal, integer, spaces};
 use super::statement::{
     after_line, end_of_line, keyword, loop_label, number_label, statement, Kind, Label, KEYWORDS,
@@ -204,7 +204,7 @@ impl Flow {
         let step = &self.steps[i];
         let label = step.label.as_deref().map(String::from_utf8_lossy).unwrap_or_default();
         let name = KEYWORDS.iter().find(|(_, kind)| *kind == step.kind).map_or("", |(name, _)| name);
-        fault_in(step.line, format!("word o<{label}> {} {why}", name.to_lowercase()))
+        fault_in!(step.line, "word o<{label}> {} {why}", name.to_lowercase())
     }
 }
 
@@ -300,10 +300,9 @@ pub fn check_rest(source: &[u8], at: usize) -> Outcome<()> {
     let at = behind_comments(source, at);
     match source.get(at) {
         None | Some(b'\n' | b'\r' | b';' | b'(' | 0x1a) => Ok(()),
-        _ => fault(format!(
-            "{} is not understood behind an O word: put it in a line of its own",
-            excerpt(source, at)
-        )),
+        _ => {
+            fault!("{} is not understood behind an O word: put it in a line of its own", excerpt(source, at))
+        }
     }
 }
 

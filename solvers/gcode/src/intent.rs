@@ -1,7 +1,7 @@
 //! The motion that a block asks for, by its code or by its words, and the check that each of its words has a use.
 
 use super::block::{bit, bits, g_name, Block, Group, MGroup, AXES, AXIS_WORDS};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 
 /// Words that need no code in their block. D names a tool, which G41 and G42 use.
 pub const FREE_WORDS: u32 = bits(b"FSTD");
@@ -48,16 +48,16 @@ fn motion_beside_others(
         (Some(code @ (0 | 10 | 800)), Some(280..=284 | 300 | 301)) | (Some(code @ 800), Some(_)) => {
             Ok(Some(code))
         }
-        (Some(code), Some(other)) => fault(format!(
+        (Some(code), Some(other)) => fault!(
             "words {} and {} both take axis words: put them in two blocks",
             g_name(other),
             g_name(code)
-        )),
+        ),
         (Some(800), None) if axes != 0 => {
-            fault("axis words stand beside G80, which ends motion: give G0 or G1 instead")
+            fault!("axis words stand beside G80, which ends motion: give G0 or G1 instead")
         }
         (Some(code), None) if is_cycle(code) && axes == 0 => {
-            fault(format!("word {} has no axis words: give the place of the hole", g_name(code)))
+            fault!("word {} has no axis words: give the place of the hole", g_name(code))
         }
         (Some(code), None) => Ok(Some(code)),
         (None, Some(_)) if once.is_some() || axes != 0 => Ok(None),
@@ -66,12 +66,35 @@ fn motion_beside_others(
         (None, _) if axes != 0 && modal == 800 => {
             let word = AXES.into_iter().find(|&letter| block.has(letter)).map(|letter| block.word(letter));
             let word = word.unwrap_or_else(|| block.polar_word());
-            fault(format!("word {word} has no motion code in force: give G0 or G1 before it"))
+            fault!("word {word} has no motion code in force: give G0 or G1 before it")
         }
         (None, _) if axes != 0 => Ok(Some(modal)),
         (None, _) if block.words & bits(b"IJK") != 0 && matches!(modal, 20 | 30) => Ok(Some(modal)),
         (None, _) if block.words & bits(b"IJK") != 0 && vector && modal != 800 => Ok(Some(modal)),
         (None, _) => Ok(None),
+    }
+}
+
+/// The words that a G code takes, besides axis words.
+fn words_of(code: u16) -> u32 {
+    match code {
+        20 | 30 => ARC_WORDS,
+        330 | 331 => bits(b"K"),
+        40 => bits(b"PX"),
+        50 | 51 => bits(b"IJPQ"),
+        52 => bits(b"PL"),
+        62 => bits(b"PKRQ"),
+        100 => bits(b"PLRQIJ"),
+        411 | 421 => bits(b"L"),
+        // Older controls of Fanuc have one number for lengths and radii, also beside G41 and G42.
+        410 | 420 | 430 | 432 | 434 | 435 | 490 => bits(b"H"),
+        541 | 1540 => bits(b"P"),
+        640 => bits(b"PQ"),
+        680 => bits(b"R"),
+        730 | 830 => bits(b"RLQP"),
+        740 | 810 | 820 | 840 | 850 | 860 | 890 => bits(b"RLP"),
+        760 => bits(b"PIJKRQHELD"),
+        _ => 0,
     }
 }
 
@@ -85,41 +108,11 @@ pub fn check_use(
     directed: bool,
 ) -> Outcome<()> {
     let mut used = FREE_WORDS | axes | if directed { bits(b"IJK") } else { 0 };
-    used |= match motion {
-        Some(20 | 30) => ARC_WORDS,
-        Some(730 | 830) => bits(b"RLQP"),
-        Some(820 | 740 | 840 | 860 | 890) => bits(b"RLP"),
-        Some(810 | 850) => bits(b"RLP"),
-        Some(330 | 331) => bits(b"K"),
-        Some(760) => bits(b"PIJKRQHELD"),
-        Some(50 | 51) => bits(b"IJPQ"),
-        Some(52) => bits(b"PL"),
-        Some(62) => bits(b"PKRQ"),
-        _ => 0,
-    };
-    used |= match block.code(Group::Once) {
-        Some(40) => bits(b"PX"),
-        Some(100) => bits(b"PLRQIJ"),
-        _ => 0,
-    };
-    if block.code(Group::Control) == Some(640) {
-        used |= bits(b"PQ");
+    let groups =
+        [Group::Once, Group::Control, Group::Turn, Group::System, Group::ToolLength, Group::Compensation];
+    for code in groups.map(|group| block.code(group)).into_iter().chain([motion]).flatten() {
+        used |= words_of(code);
     }
-    if block.code(Group::Turn) == Some(680) {
-        used |= bit(b'R');
-    }
-    if matches!(block.code(Group::System), Some(541 | 1540)) {
-        used |= bit(b'P');
-    }
-    if matches!(block.code(Group::ToolLength), Some(430 | 432 | 434 | 435 | 490)) {
-        used |= bit(b'H');
-    }
-    used |= match block.code(Group::Compensation) {
-        Some(411 | 421) => bit(b'L'),
-        // Older controls of Fanuc have one number for lengths and radii.
-        Some(410 | 420) => bit(b'H'),
-        _ => 0,
-    };
     if block.m_code(MGroup::User).is_some()
         || block.m_code(MGroup::Spindle) == Some(19)
         || !block.others().is_empty()
@@ -146,7 +139,7 @@ pub fn check_use(
         (b'K', Some(motion)) if is_cycle(motion) => "repetitions are counted by L",
         _ => "no code of the block uses it; remove it",
     };
-    fault(format!("word {} has no meaning here: {remedy}", block.word(letter)))
+    fault!("word {} has no meaning here: {remedy}", block.word(letter))
 }
 
 /// Refuses combinations of words that controls refuse.
@@ -154,26 +147,26 @@ fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome
     if let Some(code) = block.code(Group::System).filter(|code| matches!(code, 541 | 1540)) {
         let alone = matches!(motion, None | Some(0 | 10 | 800)) && !block.calls();
         if !alone || matches!(block.code(Group::Once), Some(40 | 100)) {
-            return fault(format!("{} takes the P of its block: put it in a block of its own", g_name(code)));
+            return fault!("{} takes the P of its block: put it in a block of its own", g_name(code));
         }
     }
     match (block.code(Group::Once), motion) {
-        (Some(40), Some(20 | 30)) => fault("G4 and an arc both use P: put them in two blocks"),
+        (Some(40), Some(20 | 30)) => fault!("G4 and an arc both use P: put them in two blocks"),
         (Some(530), Some(0 | 10)) if block.is_polar() => {
-            fault("G53 takes machine coordinates and no polar words: give X and Y")
+            fault!("G53 takes machine coordinates and no polar words: give X and Y")
         }
         (Some(530), Some(0 | 10)) => {
             let absolute = block.code(Group::Distance).map_or(absolute, |code| code == 900);
             if absolute {
                 return Ok(());
             }
-            fault("G53 takes machine coordinates and G91 is in force: give G90 in its block")
+            fault!("G53 takes machine coordinates and G91 is in force: give G90 in its block")
         }
         (Some(530), _) => {
-            fault("G53 goes with straight moves only: give G0 or G1 and axis words in its block")
+            fault!("G53 goes with straight moves only: give G0 or G1 and axis words in its block")
         }
         (Some(520 | 920), _) if block.words & (AXIS_WORDS | bit(b'E')) == 0 => {
-            fault("G52 and G92 need the axes they set: give axis words")
+            fault!("G52 and G92 need the axes they set: give axis words")
         }
         _ => Ok(()),
     }

@@ -3,7 +3,7 @@
 use super::block::{bit, rotary, Block, AXES, AXIS_OF_LETTER, AXIS_WORDS};
 use super::compensation::Compensation;
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::modal::{Feed, FeedMode, State};
 use super::moves::Moves;
 use super::nurbs::Nurbs;
@@ -157,10 +157,10 @@ impl<'a> Interpreter<'a> {
                 let letter = letter as char;
                 let others =
                     self.options.machines_with.as_ref().map(|names| names(letter)).unwrap_or_default();
-                return fault(format!(
+                return fault!(
                     "word {letter} moves an axis that the machine does not have: use a machine with {letter}{others}, \
                      or post without it"
-                ));
+                );
             }
             self.moves.add_axis(axis);
         }
@@ -196,9 +196,9 @@ impl<'a> Interpreter<'a> {
 #[cold]
 fn too_far<T>(axis: usize, value: f64) -> Outcome<T> {
     let (unit, farthest) = if rotary(axis) { ("degrees", FARTHEST_TURN) } else { ("mm", FARTHEST) };
-    fault(format!(
+    fault!(
         "{} would go to {value} {unit}, more than {farthest} {unit} from the machine's zero: check the number, the units \
          and the offsets",
         AXES[axis] as char,
-    ))
+    )
 }

@@ -13,6 +13,10 @@
 //!    tool's radius; `tip` converts between joints and the tool's tip.
 //! 6. `moves` holds the moves, `events` what happens between them; `moves/columns` gives both as columns.
 
+// Its macros are for the modules below.
+#[macro_use]
+mod fault;
+
 mod arc;
 mod arithmetic;
 mod beside;
@@ -26,7 +30,6 @@ mod dialect;
 mod events;
 mod execute;
 mod expression;
-mod fault;
 mod flow;
 mod intent;
 mod interpreter;

@@ -1,10 +1,10 @@
 //! Fanuc's macros: calls by G65, whose arguments are letters, and the statements IF, WHILE, GOTO and END.
 
 use super::block::{g_name, Block, Group, MGroup};
-use super::expression::{bracket, expression};
-use super::fault::{fault, Outcome};
+use super::expression::{bracket, number};
+use super::fault::Outcome;
 use super::flow::{Flow, Step};
-use super::number::{decimal, integer, spaces};
+use super::number::{behind_word, integer, spaces};
 use super::run::{Exit, Frame, Runner};
 use super::words::Lexer;
 
@@ -22,21 +22,20 @@ impl Runner<'_> {
         frame: &mut Frame,
     ) -> Outcome<()> {
         let Some((value, end)) = bracket(source, step.arguments, &self.interpreter)? else {
-            return fault("IF has no [condition]: give one in brackets");
+            return fault!("IF has no [condition]: give one in brackets");
         };
         let at = spaces(source, end);
-        let word = source.get(at..at + 4).unwrap_or_default();
-        if word.eq_ignore_ascii_case(b"GOTO") {
+        if let Some(at) = behind_word(source, at, "GOTO") {
             if value != 0.0 {
-                self.go_to(lexer, source, flow, at + 4, frame)?;
+                self.go_to(lexer, source, flow, at, frame)?;
             }
-        } else if word.eq_ignore_ascii_case(b"THEN") {
+        } else if let Some(at) = behind_word(source, at, "THEN") {
             // The rest of the line is a block.
             if value != 0.0 {
-                lexer.jump(at + 4, step.line - 1);
+                lexer.jump(at, step.line - 1);
             }
         } else {
-            return fault("IF says neither GOTO nor THEN behind its condition: give one of them");
+            return fault!("IF says neither GOTO nor THEN behind its condition: give one of them");
         }
         Ok(())
     }
@@ -50,15 +49,12 @@ impl Runner<'_> {
         at: usize,
         frame: &mut Frame,
     ) -> Outcome<()> {
-        let number = match decimal(source, at) {
-            Some((value, _)) => Some(value),
-            None => expression(source, spaces(source, at), &self.interpreter)?.map(|(value, _)| value),
-        };
-        let Some(number) = number.and_then(integer) else {
-            return fault("GOTO has no whole number: give that of a line, such as GOTO 10");
+        let number = number(source, at, &self.interpreter)?;
+        let Some(number) = number.and_then(|(value, _)| integer(value)) else {
+            return fault!("GOTO has no whole number: give that of a line, such as GOTO 10");
         };
         let Some((at, line)) = flow.numbered(source, number, lexer.at) else {
-            return fault(format!("GOTO {number} goes to line N{number}, which the program does not have"));
+            return fault!("GOTO {number} goes to line N{number}, which the program does not have");
         };
         frame
             .repeats
@@ -79,11 +75,11 @@ impl Runner<'_> {
             return match (block.has(b'P'), number) {
                 (false, _) => Ok(Exit::Return(None)),
                 (true, Some(number)) => Ok(Exit::Back(number)),
-                (true, None) => fault(format!("word {} is no number of a line: check P", block.word(b'P'))),
+                (true, None) => fault!("word {} is no number of a line: check P", block.word(b'P')),
             };
         }
         let Some(number) = number else {
-            return fault(format!("{name} calls no subprogram: give its number as P"));
+            return fault!("{name} calls no subprogram: give its number as P");
         };
         let times = block.count(b'L', 0, "number of calls")?.unwrap_or(1);
         Ok(Exit::Fanuc { number, local: name == "M97", times, arguments })
@@ -93,7 +89,7 @@ impl Runner<'_> {
 /// The arguments of G65 as values of #1 to #26; NaN for a missing one.
 fn arguments_of(block: &Block) -> Outcome<Vec<f64>> {
     if !block.is_alone(Group::Macro) {
-        return fault("G65 stands beside other codes: put it in a block of its own");
+        return fault!("G65 stands beside other codes: put it in a block of its own");
     }
     let value = |letter: u8| if letter == b' ' { None } else { block.get(letter) };
     Ok(ARGUMENTS.iter().map(|&letter| value(letter).unwrap_or(f64::NAN)).collect())

@@ -1,7 +1,7 @@
 //! Sets modes by their codes, and saves and restores them by M70 to M73.
 
 use super::block::{Block, Group, AXIS_WORDS};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::modal::State;
 use super::moves::{Control, Mode};
@@ -29,10 +29,7 @@ impl Interpreter<'_> {
                 for (letter, place) in [(b'P', &mut control.blend), (b'Q', &mut control.fit)] {
                     if let Some(value) = block.get(letter) {
                         if !(0.0..=FARTHEST).contains(&value) {
-                            return fault(format!(
-                                "word {} is no tolerance: give one from 0",
-                                block.word(letter)
-                            ));
+                            return fault!("word {} is no tolerance: give one from 0", block.word(letter));
                         }
                         *place = value * state.unit();
                     }

@@ -3,7 +3,7 @@
 use super::arc::{arc, arc_length, Form};
 use super::block::{bits, Block, AXES, AXIS_WORDS};
 use super::coordinates::{CoordinateMode, Point};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::modal::{Feed, FeedMode};
 use super::moves::{only_turns, straight_length, Arc, Kind};
@@ -77,12 +77,12 @@ impl Interpreter<'_> {
     #[inline(always)]
     pub(super) fn feed(&self) -> Outcome<Feed> {
         let Some(feed) = self.state.feed else {
-            return fault(
+            return fault!(
                 "a feed move has no feed: give F before or in this block, or a feed for such moves (--feed)",
             );
         };
         if feed.angular == 0.0 {
-            return fault("a feed move has the feed F0: give a positive F before or in this block");
+            return fault!("a feed move has the feed F0: give a positive F before or in this block");
         }
         if self.state.feed_mode == FeedMode::PerTurn {
             return self.feed_per_turn(feed);
@@ -97,7 +97,9 @@ impl Interpreter<'_> {
                 let turns = speed / 60.0;
                 Ok(Feed { linear: feed.linear * turns, angular: feed.angular * turns })
             }
-            None => fault("the feed is per turn (G95) and the spindle speed is not known: give S and M3 before, or use G94"),
+            None => fault!(
+                "the feed is per turn (G95) and the spindle speed is not known: give S and M3 before, or use G94"
+            ),
         }
     }
 
@@ -105,9 +107,9 @@ impl Interpreter<'_> {
     fn inverse_feed(&self, block: &Block, length: f64) -> Outcome<f64> {
         match block.get(b'F') {
             Some(rate) if rate > 0.0 => Ok(length * rate / 60.0),
-            Some(_) => fault(format!("word {} is no inverse time: give a positive F", block.word(b'F'))),
+            Some(_) => fault!("word {} is no inverse time: give a positive F", block.word(b'F')),
             None => {
-                fault("a feed move with inverse time (G93) has no F of its own: give F in each such block")
+                fault!("a feed move with inverse time (G93) has no F of its own: give F in each such block")
             }
         }
     }
@@ -120,14 +122,14 @@ impl Interpreter<'_> {
         self.check_corner()?;
         let position = self.position();
         if self.state.offsets.rotation != 0.0 && normal != 2 {
-            return fault(
+            return fault!(
                 "an arc in G18 or G19 stands in work coordinates that are turned about Z: post lines",
             );
         }
         let form = self.arc_form(block, &position, u, v)?;
         let turns = block.count(b'P', 1, "number of turns")?.unwrap_or(1);
         if turns > MOST_TURNS {
-            return fault(format!("word {} is more than {MOST_TURNS} turns: check P", block.word(b'P')));
+            return fault!("word {} is more than {MOST_TURNS} turns: check P", block.word(b'P'));
         }
         let (start, end) = ([position[u], position[v]], [target[u], target[v]]);
         let (centre, angle) = arc(start, end, form, clockwise, turns)?;
@@ -153,36 +155,38 @@ impl Interpreter<'_> {
         let plane = 19 - self.state.normal;
         if let Some(radius) = block.get(b'R') {
             if block.words & bits(b"IJK") != 0 {
-                return fault("an arc has both R and a centre: give R, or I, J, K");
+                return fault!("an arc has both R and a centre: give R, or I, J, K");
             }
             if !block.has(AXES[u]) && !block.has(AXES[v]) {
-                return fault(format!(
+                return fault!(
                     "an arc with R has no end in the plane G{plane}: give {} or {}",
-                    AXES[u] as char, AXES[v] as char
-                ));
+                    AXES[u] as char,
+                    AXES[v] as char
+                );
             }
             if radius.abs() > FARTHEST_CENTRE {
-                return fault(format!("word {} is more than {FARTHEST_CENTRE:e}: check R", block.word(b'R')));
+                return fault!("word {} is more than {FARTHEST_CENTRE:e}: check R", block.word(b'R'));
             }
             return Ok(Form::Radius(radius * unit));
         }
         let normal = CENTRE[self.state.normal];
         if block.has(normal) {
-            return fault(format!(
+            return fault!(
                 "word {} is no centre in the plane G{plane}: give {} and {}, or another plane",
                 block.word(normal),
                 CENTRE[u] as char,
                 CENTRE[v] as char
-            ));
+            );
         }
         let words = [CENTRE[u], CENTRE[v]].map(|letter| block.get(letter).map(|value| value * unit));
         let missing = words.iter().filter(|word| word.is_none()).count();
         if missing == 2 || (missing == 1 && self.state.absolute_centres) {
             let both = if self.state.absolute_centres { "both " } else { "" };
-            return fault(format!(
+            return fault!(
                 "an arc in the plane G{plane} has no centre: give {both}{} and {}, or R",
-                CENTRE[u] as char, CENTRE[v] as char
-            ));
+                CENTRE[u] as char,
+                CENTRE[v] as char
+            );
         }
         let offsets = &self.state.offsets;
         let words = words.map(|word| word.unwrap_or(0.0));
@@ -199,9 +203,7 @@ impl Interpreter<'_> {
             [centre[u], centre[v]]
         };
         if !centre.iter().all(|value| value.abs() <= FARTHEST_CENTRE) {
-            return fault(format!(
-                "the centre of an arc is more than {FARTHEST_CENTRE:e} mm away: check I, J, K"
-            ));
+            return fault!("the centre of an arc is more than {FARTHEST_CENTRE:e} mm away: check I, J, K");
         }
         Ok(Form::Centre { centre, inches: self.state.inches })
     }

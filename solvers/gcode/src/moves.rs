@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use super::block::rotary;
 use super::coordinates::{CoordinateMode, Direction, Point, UPRIGHT};
 use super::events::Events;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::tolerance::{NO_MOTION, WHOLE_TURNS};
 use feedplan_geometry::spline::CompositeCurve;
 
@@ -212,10 +212,10 @@ impl Moves {
             return Ok(());
         }
         if self.splines.len() + curve.len() > self.limit {
-            return fault(format!(
+            return fault!(
                 "the splines of the program have more than {} pieces: split it, or raise max_moves",
                 self.limit
-            ));
+            );
         }
         self.spline_rows.push((self.kind.len(), self.splines.len()));
         for (i, &width) in curve.width.iter().enumerate() {
@@ -284,10 +284,7 @@ impl Moves {
     #[inline(always)]
     fn row(&mut self, kind: Kind, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
         if self.kind.len() >= self.limit {
-            return fault(format!(
-                "the program has more than {} moves: split it, or raise max_moves",
-                self.limit
-            ));
+            return fault!("the program has more than {} moves: split it, or raise max_moves", self.limit);
         }
         if self.control.last().is_none_or(|(_, last)| !last.same(control)) {
             self.control.push((self.kind.len(), *control));

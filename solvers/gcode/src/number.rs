@@ -55,6 +55,12 @@ pub fn spaces(source: &[u8], mut at: usize) -> usize {
     at
 }
 
+/// The place after a word that stands at `at` in capital or small letters; None where another text does.
+pub fn behind_word(source: &[u8], at: usize, word: &str) -> Option<usize> {
+    let text = source.get(at..at + word.len())?;
+    text.eq_ignore_ascii_case(word.as_bytes()).then_some(at + word.len())
+}
+
 /// Reads digits into the mantissa and counts them; a mantissa that overflows is not used.
 #[inline(always)]
 fn digits(source: &[u8], at: &mut usize, mantissa: &mut u64) -> usize {

@@ -2,7 +2,7 @@
 
 use super::block::{g_name, Block};
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::modal::Feed;
 use super::moves::only_turns;
 use feedplan_geometry::spline::extract::extract;
@@ -36,10 +36,10 @@ impl Nurbs {
     pub fn curve(&self) -> Outcome<CompositeCurve<9>> {
         let (k, n, line) = (self.order, self.points.len(), self.line);
         if n < k {
-            return fault(format!(
+            return fault!(
                 "the spline G5.2 of line {line} has {n} control points and its order is {k}: give at least so many, or \
                  a lower L"
-            ));
+            );
         }
         let knots = if self.code == 52 {
             // Clamped and uniform: the first and the last knot k times.
@@ -48,10 +48,10 @@ impl Nurbs {
             let knots = &self.knots;
             let clamped = |part: &[f64]| part.windows(2).all(|pair| pair[0] == pair[1]);
             if !clamped(&knots[..k]) || !clamped(&knots[n..]) {
-                return fault(format!(
+                return fault!(
                     "the spline G6.2 of line {line} does not begin and end with {k} equal knots, so it does not reach \
                      its end points: repeat them"
-                ));
+                );
             }
             knots.clone()
         };
@@ -62,7 +62,7 @@ impl Nurbs {
         let mut curve = match curve {
             Ok(curve) => curve,
             Err(error) => {
-                return fault(format!("the spline {} of line {line}: {error}", g_name(self.code)));
+                return fault!("the spline {} of line {line}: {error}", g_name(self.code));
             }
         };
         // Both ends are the control points, without rounding.
@@ -85,11 +85,11 @@ impl Nurbs {
 /// Refuses an order above that of the greatest degree; `letter` is its word.
 pub fn check_order(block: &Block, letter: u8, order: usize) -> Outcome<()> {
     if order > MAX_DEGREE + 1 {
-        return fault(format!(
+        return fault!(
             "word {} is an order beyond {}: post the spline at a lower one",
             block.word(letter),
             MAX_DEGREE + 1
-        ));
+        );
     }
     Ok(())
 }

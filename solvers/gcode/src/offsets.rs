@@ -2,7 +2,7 @@
 
 use super::block::{bits, g_name, Block, Group, AXES, AXIS_WORDS};
 use super::coordinates::{CoordinateMode, Point};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::{Interpreter, Topic};
 use super::modal::turn;
 use super::options::Tool;
@@ -16,11 +16,11 @@ impl Interpreter<'_> {
         match block.get(b'L') {
             Some(level) if [1.0, 10.0, 11.0].contains(&level) => self.set_tool_data(block, level),
             Some(level) if [2.0, 20.0].contains(&level) => self.set_work_offset(block, level == 20.0),
-            Some(_) => fault(format!(
+            Some(_) => fault!(
                 "G10 {} is not read: G10 sets work offsets by L2 and L20 and tools by L1, L10 and L11",
                 block.word(b'L')
-            )),
-            None => fault(
+            ),
+            None => fault!(
                 "G10 does not say what it sets: give L2 or L20 for work offsets, L1, L10 or L11 for tools",
             ),
         }
@@ -30,7 +30,7 @@ impl Interpreter<'_> {
         let system = match block.count(b'P', 0, "work offset")? {
             Some(0) => self.state.offsets.system,
             Some(number @ 1..=9) => number as usize - 1,
-            _ => return fault("G10 needs P0 to P9: P0 is the offset in force, P1 is G54, P9 is G59.3"),
+            _ => return fault!("G10 needs P0 to P9: P0 is the offset in force, P1 is G54, P9 is G59.3"),
         };
         let first = first_of_system(system);
         let mut work = self.parameters.row(first);
@@ -76,7 +76,7 @@ impl Interpreter<'_> {
 
     fn set_tool_data(&mut self, block: &Block, level: f64) -> Outcome<()> {
         let Some(number) = block.count(b'P', 1, "tool number")? else {
-            return fault("G10 sets no tool: give its number as P");
+            return fault!("G10 sets no tool: give its number as P");
         };
         let mut tool = self.tool_of(number).unwrap_or(Tool {
             number,
@@ -154,11 +154,11 @@ impl Interpreter<'_> {
         match block.code(Group::ToolLength) {
             Some(code @ (434 | 435)) => return self.program_tip(block, code),
             Some(432) if self.state.coordinate_mode != CoordinateMode::Joints => {
-                return fault("G43.2 adds to a tool length and G43.4 is in force: cancel it by G49 before");
+                return fault!("G43.2 adds to a tool length and G43.4 is in force: cancel it by G49 before");
             }
             Some(code @ (430 | 432)) if block.words & AXIS_WORDS == 0 || code == 430 => {
                 if code == 432 && !block.has(b'H') {
-                    return fault("G43.2 adds nothing: give it H or axis words");
+                    return fault!("G43.2 adds nothing: give it H or axis words");
                 }
                 let length = self.length_of_tool(block)?;
                 for axis in 0..9 {
@@ -168,10 +168,10 @@ impl Interpreter<'_> {
             }
             Some(code @ (431 | 432)) => {
                 if block.has(b'H') {
-                    return fault(format!("{} has both H and axis words: give one of them", g_name(code)));
+                    return fault!("{} has both H and axis words: give one of them", g_name(code));
                 }
                 if block.words & AXIS_WORDS == 0 {
-                    return fault("G43.1 sets nothing: give it axis words");
+                    return fault!("G43.1 sets nothing: give it axis words");
                 }
                 let mut tool = self.state.offsets.tool;
                 self.axis_values(block, |axis, value| {
@@ -199,11 +199,11 @@ impl Interpreter<'_> {
             (false, _) => self.state.tool_length,
         };
         if let Some(axis) = [0, 1].into_iter().chain(3..9).find(|&axis| tool[axis] != 0.0) {
-            return fault(format!(
+            return fault!(
                 "{} works with a tool length in Z and {} has one too: give G43.1 Z alone before",
                 g_name(code),
                 AXES[axis] as char
-            ));
+            );
         }
         *tool = [0.0; 9];
         if length.is_nan() {
@@ -226,10 +226,10 @@ impl Interpreter<'_> {
             Some(code @ (541 | 1540)) => match block.count(b'P', 1, "further work offset")? {
                 Some(number) if number <= MOST_FURTHER => Some(number as usize + 8),
                 _ => {
-                    return fault(format!(
+                    return fault!(
                         "{} does not name its work offset: give P1 to P{MOST_FURTHER}",
                         g_name(code)
-                    ))
+                    )
                 }
             },
             Some(code @ 591..=593) => Some(usize::from(code - 591) + 6),

@@ -6,7 +6,7 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::tolerance::MAX_CALLS;
 
 /// The number of parameters that each call has of its own.
@@ -170,9 +170,9 @@ impl Parameters {
     /// Opens a call with its arguments.
     pub fn enter(&mut self, arguments: &[f64], scope: Scope) -> Outcome<()> {
         if self.callers.len() >= MAX_CALLS {
-            return fault(format!(
+            return fault!(
                 "subroutines call each other more than {MAX_CALLS} deep: end the recursion, or write it as a loop"
-            ));
+            );
         }
         let numbers = std::array::from_fn(|k| self.numbers[1 + k]);
         let names = std::mem::take(&mut self.names);

@@ -1,8 +1,7 @@
 //! The parameters that report the machine's position, tool and modes; and the assignment of parameters.
 
 use super::block::{rotary, AXES};
-use super::expression::Values;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::modal::{FeedMode, State};
 use super::parameters::{Name, READINGS};
@@ -17,8 +16,9 @@ const POSITION: std::ops::RangeInclusive<usize> = 5420..=5428;
 const ALARM: usize = 3000;
 const CONTROL: std::ops::Range<usize> = 1000..5161;
 
-impl Values for Interpreter<'_> {
-    fn number(&self, number: usize) -> Outcome<f64> {
+impl Interpreter<'_> {
+    /// The value of a number; 0 where it has none, as in LinuxCNC. A value that only one control can know is a fault.
+    pub(super) fn parameter(&self, number: usize) -> Outcome<f64> {
         if !READINGS.contains(&number) {
             self.check_known(number)?;
             return Ok(self.parameters.number(number));
@@ -32,40 +32,33 @@ impl Values for Interpreter<'_> {
         })
     }
 
-    fn has_value(&self, number: usize) -> Outcome<bool> {
+    /// True where a number has a value.
+    pub(super) fn has_value(&self, number: usize) -> Outcome<bool> {
         self.check_known(number)?;
         Ok(READINGS.contains(&number) || self.parameters.is_set(number))
     }
 
-    fn in_macro(&self) -> bool {
-        self.parameters.in_macro()
-    }
-
-    fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
+    /// The value of a name; None where there is no such name.
+    pub(super) fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
         if let Some(value) = self.parameters.named(name) {
             return Ok(Some(value));
         }
         if name.starts_with(b"_ini[") || name.starts_with(b"_hal[") {
-            return fault(format!(
+            return fault!(
                 "#<{}> is a value of one machine's configuration, which is not known here: set a parameter instead",
                 String::from_utf8_lossy(name)
-            ));
+            );
         }
-        Ok(match name.strip_prefix(b"_") {
-            Some(name) => self.reading(name),
-            None => None,
-        })
+        Ok(name.strip_prefix(b"_").and_then(|name| self.reading(name)))
     }
-}
 
-impl Interpreter<'_> {
     /// Refuses a number by which a macro reads the state of its control, unless the program has set it.
     #[inline(always)]
     fn check_known(&self, number: usize) -> Outcome<()> {
         if self.parameters.in_macro() && CONTROL.contains(&number) && !self.parameters.is_set(number) {
-            return fault(format!(
+            return fault!(
                 "#{number} is a value of one control, which is not known here: set it before, or post the moves"
-            ));
+            );
         }
         Ok(())
     }
@@ -153,7 +146,7 @@ impl Interpreter<'_> {
     pub fn assign(&mut self, assigned: &mut Vec<(Name, f64)>) -> Outcome<()> {
         for (name, value) in assigned.drain(..) {
             if name == Name::Number(ALARM) && self.parameters.in_macro() {
-                return fault(format!("the macro raises the alarm {value}: check the arguments of its G65"));
+                return fault!("the macro raises the alarm {value}: check the arguments of its G65");
             }
             self.parameters.set(&name, value);
         }

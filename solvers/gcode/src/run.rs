@@ -6,7 +6,7 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 
 use super::block::Block;
-use super::fault::{fault, Fault, Outcome};
+use super::fault::{Fault, Outcome};
 use super::flow::Flow;
 use super::interpreter::Interpreter;
 use super::options::Options;
@@ -144,7 +144,7 @@ impl<'a> Runner<'a> {
             match exit? {
                 Exit::End(word) if main || word.is_some() => break Some(self.ending(&lexer, word)),
                 Exit::End(_) => {
-                    return fault("the subprogram does not end with M99 or endsub: it may be truncated")
+                    return fault!("the subprogram does not end with M99 or endsub: it may be truncated")
                 }
                 Exit::Call { label, arguments } => self.call(&label, &arguments)?,
                 Exit::Fanuc { number, local, times, arguments } => {
@@ -211,7 +211,7 @@ impl<'a> Runner<'a> {
                 Some(Line::Flow(at)) => {
                     let flow = text.flow(self.options.block_delete)?;
                     let Some(step) = flow.at(at) else {
-                        return fault("an O word has no number and no <name>: give one");
+                        return fault!("an O word has no number and no <name>: give one");
                     };
                     if let Some(exit) = self.step(lexer, &text.bytes, flow, step, frame)? {
                         return Ok(exit);
@@ -235,11 +235,11 @@ impl<'a> Runner<'a> {
         (self.seen)(more as usize);
         match self.left.checked_sub(u64::from(REPORTED)) {
             Some(left) => self.left = left,
-            None => return fault(format!(
+            None => return fault!(
                 "the loops and calls of the program run more lines than {} moves take: check their conditions, or raise \
                  max_moves",
                 self.options.max_moves
-            )),
+            ),
         }
         Ok(())
     }
@@ -327,21 +327,21 @@ impl<'a> Runner<'a> {
         let name = String::from_utf8_lossy(label).into_owned();
         let found = match &self.options.subprograms {
             Some(files) if name.bytes().all(|byte| !matches!(byte, b'/' | b'\\' | b'\0')) => {
-                files(&name).or_else(fault)?
+                files(&name).or_else(|message| fault!("{message}"))?
             }
             _ => None,
         };
         let Some((file, bytes)) = found else {
-            return fault(format!(
+            return fault!(
                 "the subprogram {name} is neither in the program nor in a file {name}.ngc beside it: give its folder \
                  (--subprograms), or put it into the program"
-            ));
+            );
         };
         self.texts.push(Text::new(file.clone(), Cow::Owned(bytes)));
         match self.sub_in(self.texts.len() - 1, label) {
             Ok(Some(place)) => Ok(place),
             Ok(None) => {
-                fault(format!("the file {file} has no subprogram {name}: name it O<{name}> sub there"))
+                fault!("the file {file} has no subprogram {name}: name it O<{name}> sub there")
             }
             Err(error) => Err(Box::new(Fault { message: format!("in {file}: {}", error.message), ..*error })),
         }
@@ -358,7 +358,7 @@ impl<'a> Runner<'a> {
         let text = &self.texts[here];
         match text.flow(self.options.block_delete)?.numbered(&text.bytes, number, from) {
             Some((at, line)) => Ok((here, at, line)),
-            None => fault(format!("{what} line N{number}, which the program does not have")),
+            None => fault!("{what} line N{number}, which the program does not have"),
         }
     }
 

@@ -3,7 +3,7 @@
 
 use super::block::{bit, bits, g_name, Block, Group, AXES, AXIS_WORDS};
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::{Interpreter, Topic};
 use super::modal::{Feed, FeedMode};
 use super::nurbs::{check_order, Nurbs};
@@ -18,7 +18,7 @@ impl Interpreter<'_> {
     /// A block of G5, G5.1, G5.2, G5.3 or G6.2 that begins a spline.
     pub(super) fn spline(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         if motion == 53 {
-            return fault("word G5.3 ends a NURBS that no G5.2 began: remove it");
+            return fault!("word G5.3 ends a NURBS that no G5.2 began: remove it");
         }
         self.check_beside(&g_name(motion))?;
         self.check_corner()?;
@@ -26,10 +26,7 @@ impl Interpreter<'_> {
             self.check_plane(block, motion)?;
         }
         if self.state.feed_mode == FeedMode::Inverse {
-            return fault(format!(
-                "{} does not work with inverse time (G93): give G94 and F",
-                g_name(motion)
-            ));
+            return fault!("{} does not work with inverse time (G93): give G94 and F", g_name(motion));
         }
         let feed = self.feed()?;
         match motion {
@@ -43,13 +40,13 @@ impl Interpreter<'_> {
     fn check_plane(&self, block: &Block, motion: u16) -> Outcome<()> {
         let name = g_name(motion);
         if self.state.normal != 2 {
-            return fault(format!("{name} works in the plane G17 only: give G17, or post lines"));
+            return fault!("{name} works in the plane G17 only: give G17, or post lines");
         }
         match AXES.iter().find(|&&letter| block.has(letter) && !b"XY".contains(&letter)) {
-            Some(&letter) => fault(format!(
+            Some(&letter) => fault!(
                 "word {} stands in {name}, which moves X and Y only: put it in a block before",
                 block.word(letter)
-            )),
+            ),
             None => Ok(()),
         }
     }
@@ -61,10 +58,10 @@ impl Interpreter<'_> {
         let first = match (self.offset(block, *b"IJ")?, self.mirror) {
             (Some(first), _) => first,
             (None, Some((row, mirror))) if row == self.moves.len() => mirror,
-            _ => return fault("the first G5 of a series has no I and J: give both"),
+            _ => return fault!("the first G5 of a series has no I and J: give both"),
         };
         let Some(second) = self.offset(block, *b"PQ")? else {
-            return fault("G5 has no P and Q: give both");
+            return fault!("G5 has no P and Q: give both");
         };
         let end = self.target(block, false)?;
         self.bezier(&[start, beside(&start, first), beside(&end, second), end], feed)?;
@@ -75,13 +72,13 @@ impl Interpreter<'_> {
     /// A quadratic Bézier curve: I J is the vector from its start to the inner control point; a missing one is 0.
     fn quadratic(&mut self, block: &Block, feed: Feed) -> Outcome<()> {
         if let Some(letter) = b"PQ".iter().find(|&&letter| block.has(letter)) {
-            return fault(format!(
+            return fault!(
                 "word {} has no meaning here: G5.1 takes X, Y, I and J; remove it",
                 block.word(*letter)
-            ));
+            );
         }
         if block.words & bits(b"IJ") == 0 {
-            return fault("G5.1 has no control point: give I and J");
+            return fault!("G5.1 has no control point: give I and J");
         }
         let unit = self.state.unit();
         let offset = [b'I', b'J'].map(|letter| block.get(letter).unwrap_or(0.0) * unit);
@@ -98,11 +95,7 @@ impl Interpreter<'_> {
             [None, None] => Ok(None),
             [first, _] => {
                 let [given, missing] = if first.is_some() { letters } else { [letters[1], letters[0]] };
-                fault(format!(
-                    "word {} of G5 stands without {}: give both",
-                    block.word(given),
-                    missing as char
-                ))
+                fault!("word {} of G5 stands without {}: give both", block.word(given), missing as char)
             }
         }
     }
@@ -128,11 +121,11 @@ impl Interpreter<'_> {
         if code == 62 {
             let point = self.control_point(block, start)?;
             if let Some(axis) = (0..9).find(|&axis| (point[axis] - start[axis]).abs() > SAME_PLACE) {
-                return fault(format!(
+                return fault!(
                     "the first control point of G6.2 has {} {} off from where the tool is: move there before",
                     AXES[axis] as char,
                     point[axis] - start[axis],
-                ));
+                );
             }
             nurbs.points.push(start);
             nurbs.weights.push(block.get(b'R').unwrap_or(1.0));
@@ -185,10 +178,10 @@ impl Interpreter<'_> {
         self.check_plane(block, 52)?;
         let has = b"XYP".map(|letter| block.has(letter));
         if let Some(missing) = has.iter().position(|has| !has) {
-            return fault(format!(
+            return fault!(
                 "a control point of G5.2 has no {}: give X, Y and the weight P",
                 b"XYP"[missing] as char
-            ));
+            );
         }
         let point = self.target(block, false)?;
         nurbs.points.push(point);
@@ -199,7 +192,7 @@ impl Interpreter<'_> {
     /// A block of G6.2 after the first: a control point with a knot, or one of the last knots; true for the last block.
     fn add_knot(&mut self, nurbs: &mut Nurbs, block: &Block) -> Outcome<bool> {
         let Some(knot) = block.get(b'K') else {
-            return fault(format!("a block of the spline G6.2 of line {} has no knot: give K", nurbs.line));
+            return fault!("a block of the spline G6.2 of line {} has no knot: give K", nurbs.line);
         };
         // A first knot that is missing equals the second.
         if nurbs.knots.len() == 1 && nurbs.knots[0].is_nan() {
@@ -208,25 +201,25 @@ impl Interpreter<'_> {
         let alone = nurbs.knots.len() > nurbs.points.len();
         if block.words & AXIS_WORDS != 0 {
             if alone {
-                return fault(format!(
+                return fault!(
                     "a control point stands after the last knots of the spline G6.2 of line {}: put it before, or \
                      give G6.2 for another spline",
                     nurbs.line
-                ));
+                );
             }
             let last = nurbs.points[nurbs.points.len() - 1];
             nurbs.points.push(self.control_point(block, last)?);
             nurbs.weights.push(block.get(b'R').unwrap_or(1.0));
         } else if block.has(b'R') {
-            return fault(format!("word {} weighs no control point: give axis words", block.word(b'R')));
+            return fault!("word {} weighs no control point: give axis words", block.word(b'R'));
         } else if nurbs.points.len() < nurbs.order {
-            return fault(format!(
+            return fault!(
                 "the spline G6.2 of line {} has {} control points and its order is {}: give at least so many, or a \
                  lower P",
                 nurbs.line,
                 nurbs.points.len(),
                 nurbs.order
-            ));
+            );
         }
         nurbs.knots.push(knot);
         Ok(nurbs.knots.len() == nurbs.points.len() + nurbs.order)
@@ -255,11 +248,11 @@ impl Interpreter<'_> {
     pub fn check_end(&self) -> Outcome<()> {
         match &self.open {
             None => self.check_corner(),
-            Some(nurbs) => fault(format!(
+            Some(nurbs) => fault!(
                 "the program ends inside the spline {} of line {}: it may be truncated",
                 g_name(nurbs.code),
                 nurbs.line
-            )),
+            ),
         }
     }
 
@@ -293,9 +286,9 @@ fn interrupted(block: &Block, nurbs: &Nurbs, motion: Option<u16>, own: u32) -> O
         (None, Some(letter)) => format!("word {}", block.word(letter)),
         (None, None) => "this block".into(),
     };
-    fault(format!(
+    fault!(
         "{what} stands inside the spline {name} of line {line}, which takes {takes} until {end}: end it before"
-    ))
+    )
 }
 
 /// A point moved in X and Y.

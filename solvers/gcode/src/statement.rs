@@ -1,6 +1,6 @@
 //! Reads the keywords and labels of a line of program flow: those of O words, and the statements of Fanuc's macros.
 
-use super::number::{decimal, integer, spaces};
+use super::number::{behind_word, decimal, integer, spaces};
 
 /// The kind of a line of program flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,12 +59,7 @@ pub fn number_label(value: f64) -> Option<Vec<u8>> {
 /// The keyword at a place, and the place after it.
 pub fn keyword(source: &[u8], at: usize) -> Option<(Kind, usize)> {
     let at = spaces(source, at);
-    let rest = source.get(at..)?;
-    KEYWORDS.iter().find_map(|(name, kind)| {
-        rest.get(..name.len())
-            .is_some_and(|text| text.eq_ignore_ascii_case(name.as_bytes()))
-            .then_some((*kind, at + name.len()))
-    })
+    KEYWORDS.iter().find_map(|(name, kind)| Some((*kind, behind_word(source, at, name)?)))
 }
 
 /// The place of the line end at or after a place.
@@ -80,14 +75,9 @@ pub fn after_line(source: &[u8], end: usize) -> usize {
 
 /// The statement whose first letter is at a place: its kind, its label, and the place of its arguments.
 pub fn statement(source: &[u8], at: usize) -> Option<(Kind, Label, usize)> {
-    let rest = source.get(at..)?;
-    let begins = |word: &str| {
-        rest.get(..word.len())
-            .is_some_and(|text| text.eq_ignore_ascii_case(word.as_bytes()))
-            .then(|| spaces(source, at + word.len()))
-    };
+    let begins = |word| behind_word(source, at, word).map(|end| spaces(source, end));
     let open = |place: &usize| source.get(*place) == Some(&b'[');
-    match rest.first()? {
+    match source.get(at)? {
         b'I' | b'i' => begins("IF").filter(open).map(|place| (Kind::When, None, place)),
         b'G' | b'g' => begins("GOTO").map(|place| (Kind::GoTo, None, place)),
         b'W' | b'w' => {
@@ -104,11 +94,7 @@ pub fn statement(source: &[u8], at: usize) -> Option<(Kind, Label, usize)> {
 
 /// The label of `DO 1` at a place, and the place after it.
 pub fn loop_label(source: &[u8], at: usize) -> Option<(Label, usize)> {
-    let at = spaces(source, at);
-    let (number, end) = source
-        .get(at..at + 2)
-        .filter(|text| text.eq_ignore_ascii_case(b"DO"))
-        .and_then(|_| decimal(source, at + 2))?;
+    let (number, end) = decimal(source, behind_word(source, spaces(source, at), "DO")?)?;
     Some((Some(number_label(number)?), end))
 }
 

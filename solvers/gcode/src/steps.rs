@@ -1,7 +1,7 @@
 //! Runs a line of program flow: conditions, loops, calls and returns.
 
 use super::expression::{bracket, expression};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::flow::{behind_comments, check_rest, Flow, Step};
 use super::number::integer;
 use super::parameters::LOCALS;
@@ -32,7 +32,7 @@ impl Runner<'_> {
             Kind::EndSub | Kind::Return => {
                 let value = self.value(source, step)?;
                 if self.frames.is_empty() {
-                    return fault("return stands outside of subroutines: remove it");
+                    return fault!("return stands outside of subroutines: remove it");
                 }
                 return Ok(Some(Exit::Return(value)));
             }
@@ -80,7 +80,7 @@ impl Runner<'_> {
             Kind::When => self.when(lexer, source, flow, step, frame)?,
             Kind::GoTo => self.go_to(lexer, source, flow, step.arguments, frame)?,
             Kind::EndIf | Kind::Do | Kind::DoWhile | Kind::While => {}
-            Kind::Number => return fault("an O number stands where the program goes on: end it before"),
+            Kind::Number => return fault!("an O number stands where the program goes on: end it before"),
         }
         Ok(None)
     }
@@ -96,7 +96,7 @@ impl Runner<'_> {
     fn needed(&self, source: &[u8], step: &Step) -> Outcome<f64> {
         match self.value(source, step)? {
             Some(value) => Ok(value),
-            None => fault("an O word has no [condition]: give one in brackets"),
+            None => fault!("an O word has no [condition]: give one in brackets"),
         }
     }
 
@@ -110,22 +110,18 @@ impl Runner<'_> {
         let label = match &step.label {
             Some(label) => label.clone(),
             None => {
-                let value = expression(source, step.at + 1, &self.interpreter)?.map(|(value, _)| value);
-                match value.and_then(number_label) {
-                    Some(label) => label,
-                    None => {
-                        return fault("the label of a call is no whole number from 0: check the parameters")
-                    }
-                }
+                let value = expression(source, step.at + 1, &self.interpreter)?;
+                let Some(label) = value.and_then(|(value, _)| number_label(value)) else {
+                    return fault!("the label of a call is no whole number from 0: check the parameters");
+                };
+                label
             }
         };
         let mut arguments = Vec::new();
         let mut at = step.arguments;
         while let Some((value, end)) = bracket(source, at, &self.interpreter)? {
             if arguments.len() == LOCALS {
-                return fault(format!(
-                    "a call has more than {LOCALS} arguments: set parameters from #31 on instead"
-                ));
+                return fault!("a call has more than {LOCALS} arguments: set parameters from #31 on instead");
             }
             arguments.push(value);
             at = behind_comments(source, end);

@@ -2,7 +2,7 @@
 
 use super::block::Block;
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::moves::{Kind, Stop};
 use super::tolerance::{MOST_PASSES, RATES};
@@ -30,7 +30,7 @@ impl Interpreter<'_> {
         match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
             Some(speed) => Ok(pitch * speed / 60.0),
             None => {
-                fault(format!("{code} follows the spindle and its speed is not known: give S and M3 before"))
+                fault!("{code} follows the spindle and its speed is not known: give S and M3 before")
             }
         }
     }
@@ -38,7 +38,7 @@ impl Interpreter<'_> {
     fn pitch(&self, block: &Block, letter: u8, code: &str) -> Outcome<f64> {
         match block.get(letter) {
             Some(pitch) if pitch > 0.0 => Ok(pitch * self.state.unit()),
-            _ => fault(format!("{code} has no pitch: give a positive {}", letter as char)),
+            _ => fault!("{code} has no pitch: give a positive {}", letter as char),
         }
     }
 
@@ -63,20 +63,17 @@ impl Interpreter<'_> {
     pub(super) fn thread(&mut self, block: &Block) -> Outcome<()> {
         self.check_beside("G76")?;
         if let Some(letter) = b"XYABCUVW".iter().find(|&&letter| block.has(letter)) {
-            return fault(format!(
-                "word {} stands in G76, which goes along Z: remove it",
-                block.word(*letter)
-            ));
+            return fault!("word {} stands in G76, which goes along Z: remove it", block.word(*letter));
         }
         let pitch = self.pitch(block, b'P', "G76")?;
         let feed = self.feed_of_pitch(pitch, "G76")?;
         let unit = self.state.unit() * if self.state.diameters { 0.5 } else { 1.0 };
         let word = |letter: u8| block.get(letter).map(|value| value * unit);
         let [Some(peak), Some(first), Some(height)] = [word(b'I'), word(b'J'), word(b'K')] else {
-            return fault("G76 takes I, J and K (thread peak, first depth, full depth): give all three");
+            return fault!("G76 takes I, J and K (thread peak, first depth, full depth): give all three");
         };
         if peak == 0.0 || first <= 0.0 || height <= first {
-            return fault("G76 takes an I that is not 0, and a K above J, which is above 0: check them");
+            return fault!("G76 takes an I that is not 0, and a K above J, which is above 0: check them");
         }
         let springs = block.count(b'H', 0, "number of spring passes")?.unwrap_or(0);
         let tapers = block.count(b'L', 0, "choice of tapers")?.unwrap_or(0);
@@ -107,11 +104,11 @@ impl Interpreter<'_> {
             passes += 1;
             depth = peak.abs() + first * f64::from(passes).powf(1.0 / degression);
             if passes > MOST_PASSES {
-                return fault(format!("G76 takes more than {MOST_PASSES} passes: check J, K and R"));
+                return fault!("G76 takes more than {MOST_PASSES} passes: check J, K and R");
             }
         }
         if springs > MOST_PASSES {
-            return fault(format!("word {} is more than {MOST_PASSES} passes: check H", block.word(b'H')));
+            return fault!("word {} is more than {MOST_PASSES} passes: check H", block.word(b'H'));
         }
         for _ in 0..=springs {
             self.pass(&thread, thread.end_depth)?;

@@ -3,7 +3,7 @@
 
 use super::block::{bits, g_name, Block, Group};
 use super::coordinates::{CoordinateMode, Direction, Place};
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::intent::is_cycle;
 use super::interpreter::Interpreter;
 use super::modal::State;
@@ -17,7 +17,7 @@ impl Interpreter<'_> {
             return Ok(());
         }
         let Some(control) = self.options.tip_control.as_deref() else {
-            return fault(
+            return fault!(
                 "G43.4 and G43.5 program the tool's tip, which takes a machine with rotary axes: name the \
                  machine, or post joint positions",
             );
@@ -32,7 +32,7 @@ impl Interpreter<'_> {
             };
             Ok((joints, control.place(mode, length, &joints)?))
         });
-        let (joints, (start, direction)) = converted.or_else(fault)?;
+        let (joints, (start, direction)) = converted.or_else(|message| fault!("{message}"))?;
         self.check_reach(&start)?;
         self.moves.change(mode, length, start, direction);
         (self.state.coordinate_mode, self.state.tool_length, self.state.entry) = (mode, length, joints);
@@ -49,37 +49,34 @@ impl Interpreter<'_> {
         };
         let name = g_name(code);
         if let Some(other) = block.code(Group::Once).filter(|code| matches!(code, 280 | 300 | 530)) {
-            return fault(format!(
+            return fault!(
                 "{} goes to machine positions and {name} is in force: cancel it by G49 before",
                 g_name(other)
-            ));
+            );
         }
         let Some(motion) = motion else { return Ok(()) };
         if is_cycle(motion) {
-            return fault(format!(
+            return fault!(
                 "{} goes along Z and {name} is in force: cancel it by G49 before, or post single moves",
                 g_name(motion)
-            ));
+            );
         }
         if code == 434 {
             return Ok(());
         }
         if matches!(motion, 50..=62) {
-            return fault(format!(
-                "{} is not read under G43.5: post rotary words (G43.4) or lines",
-                g_name(motion)
-            ));
+            return fault!("{} is not read under G43.5: post rotary words (G43.4) or lines", g_name(motion));
         }
         if matches!(motion, 20 | 30) && block.words & bits(b"IJK") != 0 {
-            return fault(
+            return fault!(
                 "under G43.5 I, J, K are the tool's direction and no centre: give R, or post lines",
             );
         }
         match (b'A'..=b'C').find(|&letter| block.has(letter)) {
-            Some(letter) => fault(format!(
+            Some(letter) => fault!(
                 "word {} is an angle and G43.5 takes the tool's direction: give I, J, K, or use G43.4",
                 block.word(letter)
-            )),
+            ),
             None => Ok(()),
         }
     }
@@ -92,12 +89,12 @@ impl Interpreter<'_> {
         let words = [b'I', b'J', b'K'].map(|letter| block.get(letter).unwrap_or(0.0));
         let size = words.iter().fold(0.0, |size: f64, word| size.hypot(*word));
         if !DIRECTION_LENGTH.contains(&size) {
-            return fault("I, J, K give the tool no direction: give a vector such as K1");
+            return fault!("I, J, K give the tool no direction: give a vector such as K1");
         }
         let direction = words.map(|word| word / size);
         let between = std::array::from_fn::<f64, 3, _>(|k| direction[k] + self.moves.direction[k]);
         if between.iter().all(|value| value.abs() < OPPOSITE) {
-            return fault("the tool turns over by 180 degrees, and I, J, K do not say which way: give a direction between");
+            return fault!("the tool turns over by 180 degrees, and I, J, K do not say which way: give a direction between");
         }
         Ok(direction)
     }

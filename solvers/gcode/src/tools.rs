@@ -1,7 +1,7 @@
 //! The tool table of a program: the entry of a tool number, and what T, M6 and M61 take from it.
 
 use super::block::Block;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::options::Tool;
 
@@ -17,7 +17,7 @@ impl Interpreter<'_> {
             (None, _) => Ok(None),
             (Some(_), Some(tool)) => Ok(Some(tool)),
             (Some(_), None) => {
-                fault(format!("the tool table has no tool {number}: add it there, or call another tool"))
+                fault!("the tool table has no tool {number}: add it there, or call another tool")
             }
         }
     }
@@ -39,7 +39,7 @@ impl Interpreter<'_> {
             }
             Some(_) => match block.count(b'Q', 0, "tool number")? {
                 Some(number) => Some(number),
-                None => return fault("M61 names no tool: give its number as Q"),
+                None => return fault!("M61 names no tool: give its number as Q"),
             },
             None => return Ok(()),
         };

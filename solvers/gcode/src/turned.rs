@@ -2,7 +2,7 @@
 
 use super::block::{bits, g_name, Block, Group, AXIS_WORDS};
 use super::coordinates::Point;
-use super::fault::{fault, Outcome};
+use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::modal::turn;
 
@@ -30,7 +30,7 @@ impl Interpreter<'_> {
         } else if self.state.polar {
             let (u, v) = self.state.plane();
             if !absolute && (named[u] || named[v]) {
-                return fault("G16 and G91 stand together: give polar coordinates in G90");
+                return fault!("G16 and G91 stand together: give polar coordinates in G90");
             }
             let (radius, angle) = (before[u].hypot(before[v]), before[v].atan2(before[u]));
             let radius = if named[u] { end[u] } else { radius };
@@ -55,11 +55,11 @@ impl Interpreter<'_> {
     /// `@` and `^`: radius and angle about the program's zero; with G91 they are added to those of `before`.
     fn polar_words(&self, block: &Block, absolute: bool, before: &Point, end: &mut Point) -> Outcome<()> {
         if block.has(b'X') || block.has(b'Y') {
-            return fault("polar words @ and ^ stand beside X or Y: give one of both");
+            return fault!("polar words @ and ^ stand beside X or Y: give one of both");
         }
         let (mut radius, mut angle) = (before[0].hypot(before[1]), before[1].atan2(before[0]));
         if radius == 0.0 && !(absolute && block.angle.is_some()) {
-            return fault("the place before is the origin, which has no angle: give @ and ^ in G90");
+            return fault!("the place before is the origin, which has no angle: give @ and ^ in G90");
         }
         if let Some(word) = block.radius {
             radius = word * self.state.unit() + if absolute { 0.0 } else { radius };
@@ -74,16 +74,18 @@ impl Interpreter<'_> {
     /// G68: rotates the program's coordinates by R about X and Y, or about the position of the tool.
     pub(super) fn begin_turn(&mut self, block: &Block) -> Outcome<()> {
         if self.state.normal != 2 {
-            return fault("G68 is read in the plane G17: give G17, or post the coordinates as they are cut");
+            return fault!("G68 is read in the plane G17: give G17, or post the coordinates as they are cut");
         }
         if !self.state.absolute {
-            return fault("G68 stands in G91, where controls differ in what it means: give G90 in its block");
+            return fault!(
+                "G68 stands in G91, where controls differ in what it means: give G90 in its block"
+            );
         }
         let Some(angle) = block.get(b'R') else {
-            return fault("G68 has no angle: give it as R in degrees");
+            return fault!("G68 has no angle: give it as R in degrees");
         };
         if block.words & AXIS_WORDS & !bits(b"XY") != 0 {
-            return fault("G68 turns about Z: give X and Y of its centre alone");
+            return fault!("G68 turns about Z: give X and Y of its centre alone");
         }
         self.end_turn();
         let mut centre = self.state.offsets.to_program(&self.position());
@@ -119,7 +121,7 @@ impl Interpreter<'_> {
         let once = block.code(Group::Once).filter(|code| matches!(code, 100 | 520 | 920));
         match once.or(block.code(Group::Shift)).or(block.code(Group::System)) {
             Some(code) => {
-                fault(format!("{} stands where G68 turns the coordinates: give G69 before", g_name(code)))
+                fault!("{} stands where G68 turns the coordinates: give G69 before", g_name(code))
             }
             None => Ok(()),
         }

@@ -5,9 +5,10 @@
 
 use super::block::{g_name, g_remedy, m_group, Block, MGroup};
 use super::events::{COMMENT, MESSAGE};
-use super::expression::{assignment, excerpt, expression, Values};
-use super::fault::{fault, foreign, Outcome};
-use super::number::{decimal, spaces};
+use super::expression::{assignment, excerpt, expression, number};
+use super::fault::Outcome;
+use super::interpreter::Interpreter;
+use super::number::{behind_word, decimal, spaces};
 use super::parameters::Name;
 use super::statement::{after_line, end_of_line, keyword, statement};
 
@@ -93,7 +94,7 @@ impl<'a> Lexer<'a> {
 
     /// Reads the next line into `block`; None at the end of the source.
     #[inline]
-    pub fn next_line(&mut self, block: &mut Block, values: &dyn Values) -> Outcome<Option<Line>> {
+    pub fn next_line(&mut self, block: &mut Block, values: &Interpreter) -> Outcome<Option<Line>> {
         if self.at >= self.source.len() {
             return Ok(None);
         }
@@ -192,12 +193,16 @@ impl<'a> Lexer<'a> {
                     return Ok(Some(Line::Percent));
                 }
                 b'@' | b'^' if polar_word(byte, block) => {
-                    let Some((value, end)) = self.number(at + 1, values)? else { return self.stray(at) };
+                    let Some((value, end)) = number(self.source, at + 1, values)? else {
+                        return self.stray(at);
+                    };
                     block.set_polar(byte, value);
                     (at, first) = (end, false);
                 }
                 b',' if block.corner.is_none() && matches!(self.byte(at + 1) & 0xdf, b'C' | b'R') => {
-                    let Some((value, end)) = self.number(at + 2, values)? else { return self.stray(at) };
+                    let Some((value, end)) = number(self.source, at + 2, values)? else {
+                        return self.stray(at);
+                    };
                     block.corner = Some((self.byte(at + 1) & 0xdf, value));
                     (at, first) = (end, false);
                 }
@@ -250,11 +255,11 @@ impl<'a> Lexer<'a> {
         match block.set_code(code) {
             Ok(()) => Ok(()),
             Err(None) => self.unknown_word(at, end, g_remedy(code)),
-            Err(Some(other)) => fault(format!(
+            Err(Some(other)) => fault!(
                 "words {} and {} belong to one modal group and exclude each other: put them in two blocks",
                 g_name(other),
                 g_name(code)
-            )),
+            ),
         }
     }
 
@@ -265,24 +270,21 @@ impl<'a> Lexer<'a> {
         }
         match block.set_m_code(code, m_group(code)) {
             Ok(()) => Ok(()),
-            Err(other) => fault(format!(
+            Err(other) => fault!(
                 "words M{other} and M{code} belong to one modal group and exclude each other: put them in two blocks"
-            )),
+            ),
         }
     }
 
     fn number_word(&self, value: f64, at: usize, end: usize, first: bool) -> Outcome<()> {
         if !first {
-            return fault(format!(
+            return fault!(
                 "word {} is not the first of its block: put the block number first",
                 self.text(at, end)
-            ));
+            );
         }
         if value < 0.0 {
-            return fault(format!(
-                "word {} is no block number: numbers are not negative",
-                self.text(at, end)
-            ));
+            return fault!("word {} is no block number: numbers are not negative", self.text(at, end));
         }
         Ok(())
     }
@@ -291,10 +293,10 @@ impl<'a> Lexer<'a> {
     #[cold]
     fn program_number(&self, at: usize, end: usize, first: bool) -> Outcome<()> {
         if self.begun || !first {
-            return fault(format!(
+            return fault!(
                 "word {} opens a second program: end the one before with M2, M30 or M99, or give each its own file",
                 self.text(at, end)
-            ));
+            );
         }
         Ok(())
     }
@@ -303,10 +305,10 @@ impl<'a> Lexer<'a> {
     #[cold]
     fn flow(&mut self, at: usize, first: bool) -> Outcome<Option<Line>> {
         if !first {
-            return fault(format!(
+            return fault!(
                 "word {} is not the first of its block: put program flow in lines of its own",
                 excerpt(self.source, at)
-            ));
+            );
         }
         self.begun = true;
         Ok(Some(Line::Flow(at)))
@@ -314,7 +316,7 @@ impl<'a> Lexer<'a> {
 
     /// The value of a word without a plain number.
     #[cold]
-    fn value(&self, at: usize, values: &dyn Values) -> Outcome<(f64, usize)> {
+    fn value(&self, at: usize, values: &Interpreter) -> Outcome<(f64, usize)> {
         if let Some(value) = expression(self.source, at + 1, values)? {
             return Ok(value);
         }
@@ -325,30 +327,20 @@ impl<'a> Lexer<'a> {
         }
         let letter = rest[0] as char;
         if spaces(self.source, at + 1) >= self.source.len() {
-            return fault(format!("word {letter} has no number: the file ends here and may be truncated"));
+            return fault!("word {letter} has no number: the file ends here and may be truncated");
         }
-        foreign(format!("word {letter} has no number: write one after the letter"))
+        foreign!("word {letter} has no number: write one after the letter")
     }
 
     #[cold]
     fn unknown_word<T>(&self, at: usize, end: usize, remedy: Option<&str>) -> Outcome<T> {
         let word = self.text(at, end);
         match remedy {
-            Some(remedy) => fault(format!("word {word} is not read: {remedy}")),
-            None => foreign(format!(
+            Some(remedy) => fault!("word {word} is not read: {remedy}"),
+            None => foreign!(
                 "word {word} is not understood: remove it, or post the program for LinuxCNC (RS-274/NGC)"
-            )),
+            ),
         }
-    }
-
-    /// A number at `at`, plain or computed.
-    #[cold]
-    fn number(&self, at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
-        let found = match decimal(self.source, at) {
-            Some(number) => Some(number),
-            None => expression(self.source, at, values)?,
-        };
-        Ok(found.filter(|(value, _)| !value.is_nan()))
     }
 
     /// True where the E at `at` follows a digit; the word of an extruder follows a blank.
@@ -358,19 +350,19 @@ impl<'a> Lexer<'a> {
 
     #[cold]
     fn exponent<T>(&self, at: usize, end: usize) -> Outcome<T> {
-        foreign(format!(
+        foreign!(
             "word {} is not understood: numbers have no exponents, and an extruder's word stands behind a blank",
             self.text(at, end)
-        ))
+        )
     }
 
     #[cold]
     fn twice<T>(&self, at: usize, end: usize) -> Outcome<T> {
         let letter = self.source[at].to_ascii_uppercase() as char;
-        fault(format!(
+        fault!(
             "word {} is the second {letter} of its block: put it in a block of its own",
             self.text(at, end)
-        ))
+        )
     }
 
     /// Refuses a character that begins no word.
@@ -386,7 +378,7 @@ impl<'a> Lexer<'a> {
             b'%' => "% begins its line",
             _ => "remove it",
         };
-        foreign(format!("{} is not understood: {remedy}", excerpt(self.source, at)))
+        foreign!("{} is not understood: {remedy}", excerpt(self.source, at))
     }
 
     /// The place after the comment that begins at `at`.
@@ -395,14 +387,11 @@ impl<'a> Lexer<'a> {
         let end = rest.iter().position(|byte| matches!(byte, b'(' | b')' | b'\n' | b'\r'));
         match end.map(|end| (rest[end], at + 2 + end)) {
             Some((b')', end)) => Ok(end),
-            Some((b'(', _)) => fault(format!(
+            Some((b'(', _)) => fault!(
                 "comment {} has another ( inside: write one comment after the other",
                 excerpt(self.source, at)
-            )),
-            _ => fault(format!(
-                "comment {} is not closed: end it with ) in its line",
-                excerpt(self.source, at)
-            )),
+            ),
+            _ => fault!("comment {} is not closed: end it with ) in its line", excerpt(self.source, at)),
         }
     }
 
@@ -427,16 +416,13 @@ fn polar_word(byte: u8, block: &Block) -> bool {
 }
 
 /// The words that begin a comment which is a message, in LinuxCNC.
-const MESSAGES: [&[u8]; 4] = [b"MSG", b"DEBUG", b"PRINT", b"LOG"];
+const MESSAGES: [&str; 4] = ["MSG", "DEBUG", "PRINT", "LOG"];
 
 /// The text of a comment that is a message.
 fn message(comment: &[u8]) -> Option<String> {
-    let rest = &comment[spaces(comment, 0)..];
-    let name = MESSAGES.iter().find(|name| {
-        rest.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name))
-            && rest.get(spaces(rest, name.len())) == Some(&b',')
-    })?;
-    Some(text_of(&rest[spaces(rest, name.len()) + 1..]))
+    let end = MESSAGES.iter().find_map(|name| behind_word(comment, spaces(comment, 0), name))?;
+    let text = comment[spaces(comment, end)..].strip_prefix(b",")?;
+    Some(text_of(text))
 }
 
 fn text_of(bytes: &[u8]) -> String {
