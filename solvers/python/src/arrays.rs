@@ -1,21 +1,34 @@
 //! Conversion of NumPy arrays to and from the types of kernels; lengths are checked here.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+/// Arrays of one, two and three dimensions that Python passes.
+pub type Column<'py, T = f64> = PyReadonlyArray1<'py, T>;
+pub type Table<'py, T = f64> = PyReadonlyArray2<'py, T>;
+pub type Cube<'py, T = f64> = PyReadonlyArray3<'py, T>;
+
+/// ValueError with a sentence, where something does not hold.
+pub fn require(good: bool, sentence: &'static str) -> PyResult<()> {
+    good.then_some(()).ok_or_else(|| PyValueError::new_err(sentence))
+}
+
 /// Offsets; a negative one becomes the greatest number, which no kernel accepts.
-pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
+pub fn indices(array: &Column<'_, i64>) -> Vec<usize> {
     array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
 }
 
 /// Rows of an (n, m) array as rows of M ≥ m axes, those beyond m at 0.
-pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
+pub fn rows<const M: usize>(array: &Table) -> PyResult<Vec<[f64; M]>> {
     rows_with(array, 0.0)
 }
 
 /// The same with `rest` for the axes beyond m.
-pub fn rows_with<const M: usize>(array: &PyReadonlyArray2<f64>, rest: f64) -> PyResult<Vec<[f64; M]>> {
+pub fn rows_with<const M: usize>(array: &Table, rest: f64) -> PyResult<Vec<[f64; M]>> {
     let flat = array.as_slice().map_err(|_| contiguous())?;
     let axes = array.shape()[1];
     Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
@@ -27,7 +40,7 @@ pub fn padded_rows<const M: usize>(flat: &[f64], axes: usize) -> Vec<[f64; M]> {
 }
 
 /// An (m,) array as one row of M ≥ m axes, those beyond m at `rest`.
-pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult<[f64; M]> {
+pub fn row<const M: usize>(array: &Column, rest: f64) -> PyResult<[f64; M]> {
     let flat = array.as_slice().map_err(|_| contiguous())?;
     if flat.len() > M {
         return Err(PyValueError::new_err(format!("{} values where {M} axes are", flat.len())));

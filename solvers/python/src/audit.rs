@@ -1,9 +1,9 @@
 //! The audit of plans: the package's own types in, findings out.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
+use super::arrays::{padded, require, Column, Table};
 use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::memory;
@@ -17,6 +17,8 @@ use feedplan_audit::kernels::PlanKernels;
 use feedplan_audit::moves::Programmed;
 use feedplan_audit::phases::Phases;
 use feedplan_audit::{Check, Limits, Sided, Tally, FEEDS};
+
+const OF_PATH: &str = "the arrays of the path differ in length";
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
@@ -39,14 +41,6 @@ pub fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
     (found, tally.samples)
 }
 
-pub fn require(good: bool, what: &str) -> PyResult<()> {
-    if good {
-        Ok(())
-    } else {
-        Err(PyValueError::new_err(format!("the arrays of the {what} differ in length")))
-    }
-}
-
 fn pieces(curve: &Curve) -> Pieces<'_> {
     let (control, stride) = curve.coordinates();
     Pieces {
@@ -63,22 +57,22 @@ fn pieces(curve: &Curve) -> Pieces<'_> {
 #[derive(FromPyObject)]
 struct PathArrays<'py> {
     curve: Of<Curve>,
-    line: PyReadonlyArray1<'py, i32>,
+    line: Column<'py, i32>,
     #[pyo3(attribute("move"))]
-    moves: PyReadonlyArray2<'py, i64>,
-    tolerance: PyReadonlyArray1<'py, f64>,
-    runs: PyReadonlyArray1<'py, i64>,
-    new_words: PyReadonlyArray1<'py, bool>,
+    moves: Table<'py, i64>,
+    tolerance: Column<'py>,
+    runs: Column<'py, i64>,
+    new_words: Column<'py, bool>,
     start_dwell: f64,
-    dwell: PyReadonlyArray1<'py, f64>,
+    dwell: Column<'py>,
 }
 
 /// `feedplan.constraints.problem.Problem`; its other limits come in `LimitArrays`.
 #[derive(FromPyObject)]
 pub struct ProblemArrays<'py> {
     path: PathArrays<'py>,
-    feed_share: Option<PyReadonlyArray2<'py, f64>>,
-    junction_speed: PyReadonlyArray1<'py, f64>,
+    feed_share: Option<Table<'py>>,
+    junction_speed: Column<'py>,
 }
 
 impl ProblemArrays<'_> {
@@ -92,9 +86,9 @@ impl ProblemArrays<'_> {
     }
 
     /// `feed` are the greatest speeds of each piece.
-    pub fn followed<'a>(&'a self, feed: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Followed<'a>> {
+    pub fn followed<'a>(&'a self, feed: &'a Table<'_>) -> PyResult<Followed<'a>> {
         let followed = Followed { feed: feed.as_slice()?, ..self.unlimited()? };
-        require(followed.feed.len() == FEEDS * followed.len(), "path")?;
+        require(followed.feed.len() == FEEDS * followed.len(), OF_PATH)?;
         Ok(followed)
     }
 
@@ -127,7 +121,7 @@ impl ProblemArrays<'_> {
             && self.junction_speed.as_slice()?.len() == pieces + 1
             && ordered
             && spanned;
-        require(good, "path")?;
+        require(good, OF_PATH)?;
         Ok(followed)
     }
 }
@@ -155,7 +149,7 @@ pub fn phases<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyRes
 /// The moves of a program on a path in so many axes.
 pub fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
     let none = Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] };
-    require(moves.axes() == axes, "program")?;
+    require(moves.axes() == axes, "the arrays of the program differ in length")?;
     Ok(Programmed {
         axes,
         start: &moves.start,
@@ -208,24 +202,24 @@ impl LimitArrays {
             && self.feed_axes.iter().all(|row| row.len() == axes)
             && most.into_iter().chain(least).chain(jumps).all(|row| row.len() == axes)
             && self.travel.len() == axes;
-        require(good, "limits")?;
-        fn padded<const M: usize>(values: &[f64]) -> [f64; M] {
-            std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
+        require(good, "the arrays of the limits differ in length")?;
+        fn at_rest<const M: usize>(values: &[f64]) -> [f64; M] {
+            padded(values, 0.0)
         }
         fn sided<const M: usize>(most: &[f64], least: &[f64]) -> Sided<M> {
-            Sided { positive: padded(most), negative: padded(least).map(|value: f64| -value) }
+            Sided { positive: at_rest(most), negative: at_rest(least).map(|value: f64| -value) }
         }
         let anywhere = [f64::NEG_INFINITY, f64::INFINITY];
         Ok(Limits {
             axes,
             velocity: sided(&self.max_velocity, &self.min_velocity),
             acceleration: sided(&self.max_acceleration, &self.min_acceleration),
-            jerk: padded(&self.max_jerk),
+            jerk: at_rest(&self.max_jerk),
             judges_jerk: self.judges_jerk,
-            jump: padded(&self.max_velocity_jump),
-            jump_beyond: padded(&self.jump_beyond),
+            jump: at_rest(&self.max_velocity_jump),
+            jump_beyond: at_rest(&self.jump_beyond),
             travel: std::array::from_fn(|k| self.travel.get(k).copied().unwrap_or(anywhere)),
-            feed_axes: std::array::from_fn(|feed| padded(&self.feed_axes[feed])),
+            feed_axes: std::array::from_fn(|feed| at_rest(&self.feed_axes[feed])),
             chord_tolerance: self.chord_tolerance,
             period: self.period,
             end_speeds: self.end_speeds,
@@ -240,7 +234,7 @@ pub fn audit_plan(
     py: Python<'_>,
     problem: ProblemArrays<'_>,
     limits: LimitArrays,
-    feed: PyReadonlyArray2<'_, f64>,
+    feed: Table<'_>,
     profile: Option<Of<Profile>>,
     program: Option<Of<Moves>>,
     progress: Option<Bound<'_, PyAny>>,

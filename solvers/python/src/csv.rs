@@ -1,10 +1,10 @@
 //! Setpoints as comma-separated text, for Python.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use super::arrays::{require, Column, Table};
 use super::work::run;
 use feedplan_setpoints::csv;
 
@@ -12,13 +12,11 @@ use feedplan_setpoints::csv;
 #[pyfunction]
 pub fn csv_rows<'py>(
     py: Python<'py>,
-    values: PyReadonlyArray2<'py, f64>,
-    last: PyReadonlyArray1<'py, i32>,
+    values: Table<'py>,
+    last: Column<'py, i32>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let [count, width] = [values.shape()[0], values.shape()[1]];
-    if count != last.len() || width == 0 {
-        return Err(PyValueError::new_err("every row needs values and one integer"));
-    }
+    require(count == last.len() && width > 0, "every row needs values and one integer")?;
     let (values, last) = (values.as_slice()?, last.as_slice()?);
     let text = run(py, None, |_| csv::rows(values, width, last))?;
     Ok(PyBytes::new(py, &text))

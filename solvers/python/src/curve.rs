@@ -3,17 +3,15 @@
 use std::sync::Arc;
 
 use numpy::ndarray::{s, ArrayView2};
-use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
 
-use super::arrays::rows;
+use super::arrays::{rows, Column, Table};
 use super::axes::with_padded_axes;
-use super::native::InAxes;
+use super::native::{with_object, InAxes};
 use super::views::view;
 use super::work::run;
 use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
@@ -32,13 +30,10 @@ const LEAST_WIDTH: f64 = 1e-60;
 
 /// Where the values and derivatives of some places are written, then their pieces and parameters.
 type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
-type Array1<'py> = PyReadonlyArray1<'py, f64>;
-type Array2<'py> = PyReadonlyArray2<'py, f64>;
 
 /// Bézier pieces joined end to end.
 #[pyclass(frozen, module = "feedplan._solvers")]
 pub struct Curve {
-    axes: usize,
     /// `Arc<CompositeCurve>`.
     pieces: InAxes,
 }
@@ -46,15 +41,7 @@ pub struct Curve {
 /// Calls a generic kernel for the pieces of a curve, which have M axes.
 macro_rules! with_pieces {
     ($curve:expr, $m:ident, $pieces:ident, $call:expr) => {
-        with_padded_axes!(
-            $curve.axes,
-            $m,
-            {
-                let $pieces = $curve.padded::<$m>().expect("pieces in the axes of the curve");
-                $call
-            },
-            |count| unreachable!("a curve in {count} axes")
-        )
+        with_object!($curve.pieces, $m, $pieces: Arc<CompositeCurve<$m>>, $call)
     };
 }
 
@@ -62,7 +49,7 @@ fn input_error(error: SplineError) -> PyErr {
     InputError::new_err(error.to_string())
 }
 
-pub fn weights_of(weights: Option<&Array1>) -> PyResult<Vec<f64>> {
+pub fn weights_of(weights: Option<&Column>) -> PyResult<Vec<f64>> {
     weights.map_or(Ok(vec![]), |weights| Ok(weights.as_slice()?.to_vec()))
 }
 
@@ -105,18 +92,18 @@ impl Curve {
                 pieces.width[i]
             )));
         }
-        Ok(Self { axes, pieces: InAxes::new(Arc::new(pieces)) })
+        Ok(Self { pieces: InAxes::new(axes, Arc::new(pieces)) })
     }
 
     pub fn axes(&self) -> usize {
-        self.axes
+        self.pieces.axes
     }
 
     /// The pieces in M axes, as `with_padded_axes` counts them.
     pub fn padded<const M: usize>(&self) -> PyResult<&Arc<CompositeCurve<M>>> {
-        self.pieces
-            .get()
-            .map_err(|_| PyValueError::new_err(format!("a curve in {} axes where {M} are meant", self.axes)))
+        self.pieces.get().map_err(|_| {
+            PyValueError::new_err(format!("a curve in {} axes where {M} are meant", self.axes()))
+        })
     }
 
     pub fn piece_offsets(&self) -> &[usize] {
@@ -140,14 +127,14 @@ impl Curve {
     fn table(&self) -> ArrayView2<'_, f64> {
         let (flat, stride) = self.coordinates();
         let rows = ArrayView2::from_shape((flat.len() / stride, stride), flat).expect("whole rows");
-        rows.slice_move(s![.., ..self.axes])
+        rows.slice_move(s![.., ..self.axes()])
     }
 }
 
 fn spline<const M: usize>(
-    control: &Array2,
-    weights: Option<&Array1>,
-    knots: &Array1,
+    control: &Table,
+    weights: Option<&Column>,
+    knots: &Column,
     degree: usize,
     periodic: bool,
 ) -> PyResult<Spline<M>> {
@@ -161,10 +148,10 @@ impl Curve {
     /// From the arrays of `feedplan.curves.composite.CompositeCurve`.
     #[new]
     fn new(
-        control_points: Array2<'_>,
-        weights: Option<Array1<'_>>,
-        offsets: PyReadonlyArray1<'_, i64>,
-        width: Array1<'_>,
+        control_points: Table<'_>,
+        weights: Option<Column<'_>>,
+        offsets: Column<'_, i64>,
+        width: Column<'_>,
     ) -> PyResult<Self> {
         let axes = control_points.shape()[1];
         let weights = weights_of(weights.as_ref())?;
@@ -180,9 +167,9 @@ impl Curve {
     #[staticmethod]
     fn of_spline(
         py: Python<'_>,
-        control_points: Array2<'_>,
-        weights: Option<Array1<'_>>,
-        knots: Array1<'_>,
+        control_points: Table<'_>,
+        weights: Option<Column<'_>>,
+        knots: Column<'_>,
         degree: usize,
         periodic: bool,
     ) -> PyResult<Self> {
@@ -212,11 +199,11 @@ impl Curve {
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
-        piece: PyReadonlyArray1<'py, u32>,
-        u: Array1<'py>,
+        piece: Column<'py, u32>,
+        u: Column<'py>,
         order: usize,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let (axes, piece, u) = (self.axes, piece.as_slice()?, u.as_slice()?);
+        let (axes, piece, u) = (self.axes(), piece.as_slice()?, u.as_slice()?);
         check_places(self.widths(), piece, u)?;
         let order = order.min(3);
         let mut values = vec![0.0; (order + 1) * u.len() * axes];
@@ -260,12 +247,12 @@ impl Curve {
             for piece in pieces.pieces() {
                 elevate(&piece, degree.min(MAX_DEGREE).saturating_sub(piece.degree()), &mut raised);
             }
-            Self::checked(raised, self.axes)
+            Self::checked(raised, self.axes())
         })
     }
 
     /// The curve with pieces cut at places, which are in the order of the curve.
-    fn split(&self, piece: PyReadonlyArray1<'_, u32>, u: Array1<'_>) -> PyResult<Self> {
+    fn split(&self, piece: Column<'_, u32>, u: Column<'_>) -> PyResult<Self> {
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(self.widths(), piece, u)?;
         with_pieces!(self, M, pieces, {
@@ -278,7 +265,7 @@ impl Curve {
                 }
                 split(&whole, &u[first..next], &mut parts);
             }
-            Self::checked(parts, self.axes)
+            Self::checked(parts, self.axes())
         })
     }
 
@@ -289,27 +276,25 @@ impl Curve {
             for i in (0..pieces.len()).rev() {
                 reverse(&pieces.piece(i), &mut reversed);
             }
-            Self::checked(reversed, self.axes)
+            Self::checked(reversed, self.axes())
         })
     }
 
     /// The curve as lines and as curved pieces without a cusp inside; the first and the last piece of the old curve
     /// that each one follows (n, 2), and whether it rests at its start and at its end (n, 2).
-    #[allow(clippy::type_complexity)]
-    fn regular<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Self, Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<bool>>)> {
+    fn regular<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         with_pieces!(self, M, pieces, {
             let whole = 0..pieces.len();
             let made = run(py, None, |watch| regular(pieces, std::slice::from_ref(&whole), watch))?;
             let source = made.source.iter().flatten().map(|&source| source as i64);
             let shape = [made.source.len(), 2];
-            Ok((
-                Self::checked(made.curve, self.axes)?,
+            let rests = made.rests.iter().flatten().copied();
+            (
+                Self::checked(made.curve, self.axes())?,
                 PyArray1::from_iter(py, source).reshape(shape)?,
-                PyArray1::from_iter(py, made.rests.iter().flatten().copied()).reshape(shape)?,
-            ))
+                PyArray1::from_iter(py, rests).reshape(shape)?,
+            )
+                .into_pyobject(py)
         })
     }
 }

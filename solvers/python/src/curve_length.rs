@@ -1,19 +1,20 @@
 //! `CurveLength`: the lengths along a `Curve`.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
+use super::arrays::Column;
 use super::axes::with_padded_axes;
 use super::curve::{check_places, Curve};
 use super::memory;
-use super::native::InAxes;
+use super::native::{with_object, InAxes};
 use super::work::run;
 use feedplan_geometry::spline::length::{CurveLength as Kernel, Measured};
 
 /// The lengths along a curve.
 #[pyclass(frozen, module = "feedplan._solvers")]
 pub struct CurveLength {
-    axes: usize,
     /// `Kernel`.
     lengths: InAxes,
     width: Vec<f64>,
@@ -27,56 +28,51 @@ impl CurveLength {
         let (axes, width) = (curve.axes(), curve.widths().to_vec());
         with_padded_axes!(axes, M, {
             let pieces = curve.padded::<M>()?;
-            let lengths = InAxes::new(run(py, None, |watch| pieces.lengths(accuracy, watch))?);
+            let lengths = run(py, None, |watch| pieces.lengths(accuracy, watch))?;
             py.detach(memory::give_back);
-            Ok(Self { axes, lengths, width })
+            Ok(Self { lengths: InAxes::new(axes, lengths), width })
         })
     }
 
     /// Length of the curve in mm.
     #[getter]
-    fn total(&self) -> PyResult<f64> {
-        with_padded_axes!(self.axes, M, Ok(self.lengths.get::<Kernel<M>>()?.total()))
+    fn total(&self) -> f64 {
+        with_object!(self.lengths, M, kernel: Kernel<M>, kernel.total())
     }
 
     /// Upper bound of the error of a length on the curve in mm.
     #[getter]
-    fn error(&self) -> PyResult<f64> {
-        with_padded_axes!(self.axes, M, Ok(self.lengths.get::<Kernel<M>>()?.error()))
+    fn error(&self) -> f64 {
+        with_object!(self.lengths, M, kernel: Kernel<M>, kernel.error())
     }
 
     /// Lengths (m,) from the start of the curve to m places.
     fn lengths<'py>(
         &self,
         py: Python<'py>,
-        piece: PyReadonlyArray1<'py, u32>,
-        u: PyReadonlyArray1<'py, f64>,
+        piece: Column<'py, u32>,
+        u: Column<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(&self.width, piece, u)?;
-        let found = with_padded_axes!(self.axes, M, {
-            let kernel = self.lengths.get::<Kernel<M>>()?;
-            run(py, None, |_| kernel.lengths(piece, u))
-        })?;
-        Ok(PyArray1::from_vec(py, found))
+        let found =
+            with_object!(self.lengths, M, kernel: Kernel<M>, run(py, None, |_| kernel.lengths(piece, u)));
+        Ok(PyArray1::from_vec(py, found?))
     }
 
     /// Pieces and parameters at m lengths.
-    #[allow(clippy::type_complexity)]
     fn locate<'py>(
         &self,
         py: Python<'py>,
-        lengths: PyReadonlyArray1<'py, f64>,
+        lengths: Column<'py>,
         tolerance: f64,
-    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<Bound<'py, PyTuple>> {
         let wanted = lengths.as_slice()?;
-        let found = with_padded_axes!(self.axes, M, {
-            let kernel = self.lengths.get::<Kernel<M>>()?;
+        let found = with_object!(self.lengths, M, kernel: Kernel<M>, {
             run(py, None, |_| kernel.locate_all(wanted, tolerance))
         })?;
-        Ok((
-            PyArray1::from_iter(py, found.iter().map(|&(piece, _)| piece as u32)),
-            PyArray1::from_iter(py, found.iter().map(|&(_, u)| u)),
-        ))
+        let (pieces, places): (Vec<_>, Vec<_>) =
+            found.into_iter().map(|(piece, u)| (piece as u32, u)).unzip();
+        (PyArray1::from_vec(py, pieces), PyArray1::from_vec(py, places)).into_pyobject(py)
     }
 }

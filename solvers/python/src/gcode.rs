@@ -1,10 +1,10 @@
 //! `read_gcode`: the bytes of a program to the fields of `Program`.
 
-use numpy::{PyArray1, PyReadonlyArray2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use super::arrays::{padded, rows};
+use super::arrays::{padded, rows, Table};
 use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::moves::Moves;
@@ -83,7 +83,7 @@ fn names_of(names: &Py<PyAny>, letter: char) -> String {
 /// `feedplan.program.gcode.Options`.
 #[derive(FromPyObject)]
 pub struct PyOptions<'py> {
-    places: PyReadonlyArray2<'py, f64>,
+    places: Table<'py>,
     machine_axes: String,
     machines_with: Option<Py<PyAny>>,
     tip_control: Option<Py<PyAny>>,

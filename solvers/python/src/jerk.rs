@@ -3,10 +3,11 @@
 
 use std::time::{Duration, Instant};
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-use super::arrays::{indices, row, rows, to_array2};
+use super::arrays::{indices, row, rows, to_array2, Column, Table};
 use super::axes::with_padded_axes;
 use super::memory;
 use super::native::Of;
@@ -23,25 +24,22 @@ fn deadline(time_limit: Option<f64>) -> Option<Instant> {
     Instant::now().checked_add(limit)
 }
 
-/// The profile; whether a time limit stopped the planner; how far it takes the time of each part that it planned to be
-/// above the least, in s; a lower bound in s of the time of each run, NaN without proof.
-type Planned<'py> = (Profile, bool, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
-
 /// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
-/// arcs.
+/// arcs. Returns the profile; whether a time limit stopped the planner; how far it takes the time of each part that it
+/// planned to be above the least, in s; a lower bound in s of the time of each run, NaN without proof.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, resolution, tolerance, proves, time_limit=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn plan_jerk_limited<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
-    jerk: PyReadonlyArray1<'py, f64>,
+    jerk: Column<'py>,
     resolution: f64,
     tolerance: f64,
     proves: bool,
     time_limit: Option<f64>,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<Planned<'py>> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let effort =
         Effort { resolution, tolerance, proves, deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.axes(), M, {
@@ -50,7 +48,7 @@ pub fn plan_jerk_limited<'py>(
         let [excess, bounds] = [&arcs.excess, &arcs.lower_bound].map(|part| PyArray1::from_slice(py, part));
         let stopped = arcs.stopped;
         py.detach(memory::give_back);
-        Ok((arcs.into(), stopped, excess, bounds))
+        (Profile::from(arcs), stopped, excess, bounds).into_pyobject(py)
     })
 }
 
@@ -61,7 +59,7 @@ pub fn plan_jerk_limited<'py>(
 pub fn plan_s_curve<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
-    jerk: PyReadonlyArray1<'py, f64>,
+    jerk: Column<'py>,
     cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
     time_limit: Option<f64>,
@@ -84,7 +82,7 @@ pub fn plan_s_curve<'py>(
 pub fn path_segments<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
-    jerk: PyReadonlyArray1<'py, f64>,
+    jerk: Column<'py>,
     cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
 ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
@@ -105,9 +103,9 @@ pub fn path_segments<'py>(
 pub fn profile_of_sections<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
-    jerk: PyReadonlyArray1<'py, f64>,
-    offsets: PyReadonlyArray1<'py, i64>,
-    sections: PyReadonlyArray2<'py, f64>,
+    jerk: Column<'py>,
+    offsets: Column<'py, i64>,
+    sections: Table<'py>,
 ) -> PyResult<Profile> {
     let sections: Vec<Section> = rows::<5>(&sections)?
         .into_iter()

@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
-use numpy::{PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::audit::{findings, phases, require, Findings, LimitArrays, ProblemArrays};
+use super::arrays::{require, Column};
+use super::audit::{findings, phases, Findings, LimitArrays, ProblemArrays};
 use super::axes::with_padded_axes;
 use super::kinematics::{operation_rows, ExpressionArrays};
 use super::native::Of;
@@ -47,7 +48,7 @@ impl WordArrays<'_> {
             && column.iter().flatten().all(|&column| column < axes)
             && outputs.len() == joints
             && recorded.turning.len() == joints;
-        require(good, "kinematics")?;
+        require(good, "the arrays of the kinematics differ in length")?;
         let formula = formula
             .ok_or_else(|| PyValueError::new_err("the operations of the kinematics are not in order"))?;
         Ok(Words {
@@ -64,8 +65,8 @@ impl WordArrays<'_> {
 #[derive(FromPyObject)]
 struct JointArrays<'py> {
     words: Vec<Bound<'py, PyAny>>,
-    feed: PyReadonlyArray1<'py, f64>,
-    way_scale: Option<PyReadonlyArray1<'py, f64>>,
+    feed: Column<'py>,
+    way_scale: Option<Column<'py>>,
     path: AxesOfPath,
 }
 
@@ -97,7 +98,7 @@ impl JointWords {
             && own.feed.len() == path.len()
             && axes.len() == path.axes
             && way_scale.len() == axes.len();
-        require(good, "problem")?;
+        require(good, "the arrays of the problem differ in length")?;
         let (mut words, mut words_of) = (Vec::new(), Vec::new());
         let mut known = HashMap::new();
         for object in &own.words {

@@ -1,12 +1,11 @@
 //! Joint motion from a recorded expression and pieces of a tip path.
 
-use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
+use super::arrays::{require, Column, Cube, Table};
 use super::work::run;
 use feedplan_kinematics::accuracy::{Accuracy, Motion, SpeedNodes, Square, Tolerance};
 use feedplan_kinematics::expression::Expression;
@@ -21,14 +20,14 @@ use feedplan_kinematics::tip::{Tips, MOST_POINTS};
 #[derive(FromPyObject)]
 pub struct ExpressionArrays<'py> {
     pub inputs: usize,
-    pub operations: PyReadonlyArray2<'py, i32>,
-    pub constants: PyReadonlyArray1<'py, f64>,
-    pub outputs: PyReadonlyArray1<'py, i32>,
+    pub operations: Table<'py, i32>,
+    pub constants: Column<'py>,
+    pub outputs: Column<'py, i32>,
     pub turning: Vec<bool>,
 }
 
 /// The rows of a flat list of operations.
-pub fn operation_rows<'a>(operations: &'a PyReadonlyArray2<'_, i32>) -> PyResult<&'a [[i32; 3]]> {
+pub fn operation_rows<'a>(operations: &'a Table<'_, i32>) -> PyResult<&'a [[i32; 3]]> {
     Ok(operations.as_slice()?.as_chunks().0)
 }
 
@@ -44,9 +43,9 @@ impl ExpressionArrays<'_> {
 /// `feedplan.machine.path_derivatives.TipPieces`.
 #[derive(FromPyObject)]
 pub struct TipArrays<'py> {
-    control_points: PyReadonlyArray3<'py, f64>,
-    width: PyReadonlyArray1<'py, f64>,
-    weights: Option<PyReadonlyArray2<'py, f64>>,
+    control_points: Cube<'py>,
+    width: Column<'py>,
+    weights: Option<Table<'py>>,
 }
 
 impl TipArrays<'_> {
@@ -55,7 +54,7 @@ impl TipArrays<'_> {
     }
 
     /// The same pieces with other coordinates.
-    fn tips_of<'a>(&'a self, control_points: &'a PyReadonlyArray3<'_, f64>) -> PyResult<Tips<'a>> {
+    fn tips_of<'a>(&'a self, control_points: &'a Cube<'_>) -> PyResult<Tips<'a>> {
         let &[count, points, axes] = control_points.shape() else { unreachable!("three dimensions") };
         let tips = Tips {
             axes,
@@ -65,9 +64,8 @@ impl TipArrays<'_> {
             width: self.width.as_slice()?,
         };
         let weighted = tips.weights.is_empty() || tips.weights.len() == count * points;
-        if tips.len() != count || !weighted || axes == 0 || !(1..=MOST_POINTS).contains(&points) {
-            return Err(PyValueError::new_err("the arrays of the tip's pieces do not belong together"));
-        }
+        let good = tips.len() == count && weighted && axes > 0 && (1..=MOST_POINTS).contains(&points);
+        require(good, "the arrays of the tip's pieces do not belong together")?;
         Ok(tips)
     }
 }
@@ -95,11 +93,7 @@ fn require_order(order: usize) -> PyResult<()> {
 }
 
 fn require_length(good: bool) -> PyResult<()> {
-    if good {
-        Ok(())
-    } else {
-        Err(PyValueError::new_err("the arrays differ in length"))
-    }
+    require(good, "the arrays differ in length")
 }
 
 fn cube<'py>(py: Python<'py>, flat: Vec<f64>, shape: [usize; 3]) -> PyResult<Bound<'py, PyArray3<f64>>> {
@@ -111,10 +105,7 @@ fn table<'py>(py: Python<'py>, flat: Vec<f64>, columns: usize) -> PyResult<Bound
     PyArray1::from_vec(py, flat).reshape([rows, columns])
 }
 
-fn parts_of<'a>(
-    parts: &'a Option<PyReadonlyArray2<'_, f64>>,
-    count: usize,
-) -> PyResult<Option<&'a [[f64; 2]]>> {
+fn parts_of<'a>(parts: &'a Option<Table<'_>>, count: usize) -> PyResult<Option<&'a [[f64; 2]]>> {
     let Some(parts) = parts else { return Ok(None) };
     let parts = parts.as_slice()?.as_chunks().0;
     require_length(parts.len() == count)?;
@@ -126,7 +117,7 @@ fn parts_of<'a>(
 pub fn joint_positions<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
-    tips: PyReadonlyArray2<'py, f64>,
+    tips: Table<'py>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let joints = expression.expression()?;
     require_length(tips.shape()[1] == joints.inputs())?;
@@ -141,7 +132,7 @@ pub fn joint_derivatives<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
-    fraction: PyReadonlyArray1<'py, f64>,
+    fraction: Column<'py>,
     order: usize,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (joints, pieces, fraction) = (expression.expression()?, tips.tips()?, fraction.as_slice()?);
@@ -152,8 +143,6 @@ pub fn joint_derivatives<'py>(
     cube(py, found, [fraction.len(), order + 1, joints.outputs()])
 }
 
-type Bounds<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>);
-
 /// Least and greatest q^(k)/k! (n, order + 1, joints) over pieces, or parts (n, 2) of them.
 #[pyfunction]
 #[pyo3(signature = (expression, tips, order, parts=None))]
@@ -162,84 +151,72 @@ pub fn joint_enclosures<'py>(
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
     order: usize,
-    parts: Option<PyReadonlyArray2<'py, f64>>,
-) -> PyResult<Bounds<'py>> {
+    parts: Option<Table<'py>>,
+) -> PyResult<Bound<'py, PyTuple>> {
     let (joints, pieces) = (expression.expression()?, tips.tips()?);
     let machine = machine(&joints, &expression, &pieces)?;
     require_order(order)?;
     let parts = parts_of(&parts, pieces.len())?;
     let found = run(py, None, |_| path_derivatives::enclosures(machine, pieces, parts, order))?;
     let shape = [pieces.len(), order + 1, joints.outputs()];
-    let ends: [fn(&Interval) -> f64; 2] = [|x| x.lo, |x| x.hi];
-    let [lo, hi] = ends.map(|end| cube(py, found.iter().map(end).collect(), shape));
-    Ok((lo?, hi?))
+    let [lo, hi] = ends(&found).map(|end| cube(py, end, shape));
+    (lo?, hi?).into_pyobject(py)
 }
 
-/// Parts: pieces (m,), fractions (m, 2), least and greatest positions (m, joints). Singular places: pieces and fractions.
-/// Overruns: piece, fraction, joint, value, limit.
-type JointPathArrays<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Vec<(usize, f64)>,
-    Vec<(usize, f64, usize, f64, f64)>,
-);
+/// The least and the greatest values.
+fn ends(of: &[Interval]) -> [Vec<f64>; 2] {
+    [of.iter().map(|x| x.lo).collect(), of.iter().map(|x| x.hi).collect()]
+}
 
 fn numbers<'py>(py: Python<'py>, values: Vec<usize>) -> Bound<'py, PyArray1<i64>> {
     PyArray1::from_iter(py, values.into_iter().map(|value| value as i64))
 }
 
-/// The joints along pieces joined end to end.
+/// The joints along pieces joined end to end. Parts: pieces (m,), fractions (m, 2), least and greatest positions
+/// (m, joints). Singular places: pieces and fractions. Overruns: piece, fraction, joint, value, limit.
 #[pyfunction]
 #[pyo3(signature = (expression, tips, travel=None, start=None))]
 pub fn joint_path<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
-    travel: Option<PyReadonlyArray2<'py, f64>>,
-    start: Option<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<JointPathArrays<'py>> {
+    travel: Option<Table<'py>>,
+    start: Option<Column<'py>>,
+) -> PyResult<Bound<'py, PyTuple>> {
     let (joints, pieces) = (expression.expression()?, tips.tips()?);
     let machine = machine(&joints, &expression, &pieces)?;
     let travel = parts_of(&travel, joints.outputs())?;
     let start = start.as_ref().map(|start| start.as_slice()).transpose()?;
     require_length(start.is_none_or(|start| start.len() == joints.outputs()))?;
     let path = run(py, None, |_| singularities::joint_path(machine, pieces, travel, start))?;
-    let ends: [fn(&Interval) -> f64; 2] = [|x| x.lo, |x| x.hi];
-    let [lo, hi] = ends.map(|end| table(py, path.range.iter().map(end).collect(), joints.outputs()));
+    let [lo, hi] = ends(&path.range).map(|end| table(py, end, joints.outputs()));
     let overrun = |o: Overrun| (o.piece, o.fraction, o.joint, o.value, o.limit);
-    Ok((
-        numbers(py, path.piece),
-        table(py, path.part.into_flattened(), 2)?,
-        lo?,
-        hi?,
-        path.singular,
-        path.overruns.into_iter().map(overrun).collect(),
-    ))
+    let overruns: Vec<_> = path.overruns.into_iter().map(overrun).collect();
+    let (pieces, parts) = (numbers(py, path.piece), table(py, path.part.into_flattened(), 2)?);
+    (pieces, parts, lo?, hi?, path.singular, overruns).into_pyobject(py)
 }
 
 /// `feedplan.machine.joint_interpolants.SquareOfSpeed`.
 #[derive(FromPyObject)]
 pub struct SquareArrays<'py> {
-    control_points: PyReadonlyArray3<'py, f64>,
+    control_points: Cube<'py>,
     turning: bool,
-    pieces: PyReadonlyArray1<'py, bool>,
+    pieces: Column<'py, bool>,
 }
 
 /// `feedplan.machine.joint_interpolants.Accuracy`.
 #[derive(FromPyObject)]
 pub struct AccuracyArrays<'py> {
-    acceleration: PyReadonlyArray1<'py, f64>,
-    least_velocity: PyReadonlyArray1<'py, f64>,
-    greatest_velocity: PyReadonlyArray1<'py, f64>,
-    feed: PyReadonlyArray1<'py, f64>,
-    linear: PyReadonlyArray3<'py, f64>,
-    moves: PyReadonlyArray1<'py, bool>,
+    acceleration: Column<'py>,
+    least_velocity: Column<'py>,
+    greatest_velocity: Column<'py>,
+    feed: Column<'py>,
+    linear: Cube<'py>,
+    moves: Column<'py, bool>,
     squares: Vec<SquareArrays<'py>>,
-    speed_nodes: PyReadonlyArray1<'py, f64>,
-    speed_between: PyReadonlyArray1<'py, f64>,
-    speed_interpolation: PyReadonlyArray2<'py, f64>,
+    speed_nodes: Column<'py>,
+    speed_between: Column<'py>,
+    speed_interpolation: Table<'py>,
     speed_share: f64,
 }
 
@@ -284,28 +261,21 @@ impl AccuracyArrays<'_> {
 /// The allowed error of each joint, or the accuracy that the limits of the machine require.
 #[derive(FromPyObject)]
 pub enum ToleranceArrays<'py> {
-    Given(PyReadonlyArray1<'py, f64>),
+    Given(Column<'py>),
     Limited(AccuracyArrays<'py>),
 }
 
-/// Parts: pieces (m,), fractions (m, 2), Bernstein coefficients (m, nodes + 1, joints) of q', errors (m, joints) of q''.
-type InterpolantArrays<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray3<f64>>,
-    Bound<'py, PyArray2<f64>>,
-);
-
-/// Polynomials that interpolate q' on parts of pieces.
+/// Polynomials that interpolate q' on parts of pieces. Parts: pieces (m,), fractions (m, 2), Bernstein coefficients
+/// (m, nodes + 1, joints) of q', errors (m, joints) of q''.
 #[pyfunction]
 pub fn joint_interpolants<'py>(
     py: Python<'py>,
     expression: ExpressionArrays<'py>,
     tips: TipArrays<'py>,
-    nodes: PyReadonlyArray1<'py, f64>,
-    to_bernstein: PyReadonlyArray2<'py, f64>,
+    nodes: Column<'py>,
+    to_bernstein: Table<'py>,
     tolerance: ToleranceArrays<'py>,
-) -> PyResult<InterpolantArrays<'py>> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let (joints, pieces) = (expression.expression()?, tips.tips()?);
     let machine = machine(&joints, &expression, &pieces)?;
     let nodes = Nodes { at: nodes.as_slice()?, to_bernstein: to_bernstein.as_slice()? };
@@ -323,10 +293,11 @@ pub fn joint_interpolants<'py>(
     };
     let found = run(py, None, |_| interpolants(machine, pieces, nodes, &tolerance))?;
     let parts = found.piece.len();
-    Ok((
+    (
         numbers(py, found.piece),
         table(py, found.part.into_flattened(), 2)?,
         cube(py, found.slope, [parts, count + 1, outputs])?,
         table(py, found.curvature_error, outputs)?,
-    ))
+    )
+        .into_pyobject(py)
 }

@@ -1,11 +1,10 @@
 //! `Moves`: the moves of a program, checked once and held as the path builder and the audit take them.
 
 use numpy::ndarray::ArrayView2;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::arrays::{require, Column, Table};
 use super::curve::Curve;
 use super::native::Of;
 use super::views::view;
@@ -29,8 +28,8 @@ macro_rules! moves {
         struct Columns<'py> {
             axes: Vec<String>,
             splines: Option<Of<Curve>>,
-            $($column: PyReadonlyArray1<'py, $type>,)+
-            $($table: PyReadonlyArray2<'py, f64>,)+
+            $($column: Column<'py, $type>,)+
+            $($table: Table<'py>,)+
         }
 
         impl Moves {
@@ -108,7 +107,8 @@ impl Moves {
             && self.spline_pieces.iter().all(|piece| (0..=pieces).contains(piece))
             && self.change_start.len() == axes * self.change_move.len()
             && [&self.arc_move, &self.spline_move, &self.change_move].into_iter().all(|moves| exist(moves));
-        good.then_some(self).ok_or_else(|| PyValueError::new_err("the columns of the program do not fit"))
+        require(good, "the columns of the program do not fit")?;
+        Ok(self)
     }
 }
 

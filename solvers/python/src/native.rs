@@ -37,15 +37,34 @@ impl<T: PyClass<Frozen = True> + Sync> Deref for Of<T> {
     }
 }
 
-/// An object in M axes, M being a number of `with_padded_axes`.
-pub struct InAxes(Box<dyn Any + Send + Sync>);
+/// An object in M axes, M being the number of `with_padded_axes` for `axes`.
+pub struct InAxes {
+    pub axes: usize,
+    object: Box<dyn Any + Send + Sync>,
+}
 
 impl InAxes {
-    pub fn new(of_axes: impl Any + Send + Sync) -> Self {
-        Self(Box::new(of_axes))
+    pub fn new(axes: usize, object: impl Any + Send + Sync) -> Self {
+        Self { axes, object: Box::new(object) }
     }
 
     pub fn get<T: Any>(&self) -> PyResult<&T> {
-        self.0.downcast_ref().ok_or_else(|| PyValueError::new_err("this has another number of axes"))
+        self.object.downcast_ref().ok_or_else(|| PyValueError::new_err("this has another number of axes"))
     }
 }
+
+/// Calls a generic kernel for what an `InAxes` holds.
+macro_rules! with_object {
+    ($of:expr, $m:ident, $object:ident: $type:ty, $call:expr) => {
+        super::axes::with_padded_axes!(
+            $of.axes,
+            $m,
+            {
+                let $object = $of.get::<$type>().expect("an object in its own axes");
+                $call
+            },
+            |count| unreachable!("an object in {count} axes")
+        )
+    };
+}
+pub(crate) use with_object;

@@ -1,11 +1,12 @@
 //! The path of a program for Python: `build_path` makes its columns from the native moves and the rules for them.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use rayon::prelude::*;
 
-use super::arrays::{indices, padded, padded_rows, row, rows, to_array2};
+use super::arrays::{indices, padded, padded_rows, require, row, rows, to_array2, Column, Table};
 use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::memory;
@@ -27,22 +28,19 @@ pyo3::import_exception!(feedplan.errors, ProgramError);
 /// The travel of an axis that the path does not have.
 const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-type Floats<'py> = PyReadonlyArray1<'py, f64>;
-type Rows<'py> = PyReadonlyArray2<'py, f64>;
-
 /// `feedplan.geometry.rules.Rules`.
 #[derive(FromPyObject)]
 pub struct Rules<'py> {
     name: String,
-    feed: Floats<'py>,
-    tolerance: Floats<'py>,
-    fit_tolerance: Floats<'py>,
-    halt: PyReadonlyArray1<'py, bool>,
-    joints: PyReadonlyArray1<'py, bool>,
+    feed: Column<'py>,
+    tolerance: Column<'py>,
+    fit_tolerance: Column<'py>,
+    halt: Column<'py, bool>,
+    joints: Column<'py, bool>,
     splines: Option<Of<Curve>>,
-    max_velocity: Floats<'py>,
-    max_acceleration: Floats<'py>,
-    travel: Rows<'py>,
+    max_velocity: Column<'py>,
+    max_acceleration: Column<'py>,
+    travel: Table<'py>,
     jump: bool,
     exact_tolerance: f64,
     max_chord: f64,
@@ -55,13 +53,13 @@ pub struct Rules<'py> {
 /// `feedplan.geometry.rules.Motion`.
 #[derive(FromPyObject)]
 pub struct MotionArrays<'py> {
-    run: PyReadonlyArray2<'py, i64>,
-    start: PyReadonlyArray1<'py, i64>,
-    place: Floats<'py>,
-    speed_sq: Floats<'py>,
-    second: Rows<'py>,
-    third: Rows<'py>,
-    max_jerk: Floats<'py>,
+    run: Table<'py, i64>,
+    start: Column<'py, i64>,
+    place: Column<'py>,
+    speed_sq: Column<'py>,
+    second: Table<'py>,
+    third: Table<'py>,
+    max_jerk: Column<'py>,
 }
 
 impl MotionArrays<'_> {
@@ -77,28 +75,10 @@ impl MotionArrays<'_> {
             && start.last() == Some(&place.len())
             && [speed_sq.len(), aim.len()] == [place.len(); 2];
         let max_jerk = row::<M>(&self.max_jerk, f64::INFINITY)?;
-        let motion = Motion { runs, start, place, speed_sq, aim, max_jerk };
-        good.then_some(motion)
-            .ok_or_else(|| PyValueError::new_err("the columns of the motion differ in length"))
+        require(good, "the columns of the motion differ in length")?;
+        Ok(Motion { runs, start, place, speed_sq, aim, max_jerk })
     }
 }
-
-/// The curve; feeds, first and last moves, tolerances and runs of the path.
-type Columns<'py> = (
-    Curve,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<i64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i64>>,
-);
-/// Points, splines and polynomials of the fit, the deviation; of a smooth path the mean distance of bends with its sign,
-/// and the greatest distances inside and outside.
-type Summary = (usize, usize, usize, f64, Option<[f64; 3]>);
-/// Move, axis and position of the first place outside the travel.
-type Place = (usize, usize, f64);
-/// Moves at whose end a smooth path turns back; first and last move (k, 2) of each place where its corners are rounded one
-/// by one.
-type NotSmooth<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<i64>>);
 
 impl Rules<'_> {
     fn require_lengths(&self, moves: &Moves) -> PyResult<()> {
@@ -107,7 +87,7 @@ impl Rules<'_> {
             columns.into_iter().chain([self.halt.len(), self.joints.len()]).all(|len| len == moves.len())
                 && self.travel.shape() == [moves.axes(), 2]
                 && self.splines.as_ref().is_none_or(|splines| splines.axes() == moves.axes());
-        good.then_some(()).ok_or_else(|| PyValueError::new_err("the rules do not fit the program"))
+        require(good, "the rules do not fit the program")
     }
 }
 
@@ -135,7 +115,7 @@ pub fn build_path<'py>(
     rules: Rules<'py>,
     motion: Option<MotionArrays<'py>>,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let moves = &*program;
     let (axes, arcs) = (moves.axes(), arcs(moves)?);
     rules.require_lengths(moves)?;
@@ -275,12 +255,18 @@ impl<const M: usize> PieceColumns<M> {
     }
 }
 
+/// 1. The curve; feeds, first and last moves, tolerances and runs of the path.
+/// 2. Points, splines and polynomials of the fit, the deviation; of a smooth path the mean distance of bends with its sign,
+///    and the greatest distances inside and outside.
+/// 3. Move, axis and position of the first place outside the travel.
+/// 4. Moves at whose end a smooth path turns back; first and last move (k, 2) of each place where its corners are rounded
+///    one by one.
 fn columns<'py, const M: usize>(
     py: Python<'py>,
     path: &BuiltPath<M>,
     pieces: PieceColumns<M>,
     axes: usize,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let columns = (
         Curve::checked(pieces.curve, axes)?,
         PyArray1::from_vec(py, pieces.feed),
@@ -290,12 +276,11 @@ fn columns<'py, const M: usize>(
     );
     let offsets = path.offsets.map(|offsets| [offsets.mean(), offsets.inside, offsets.outside]);
     let summary = (path.fit.chords, path.fit.splines, path.fit.polynomials, path.deviation, offsets);
-    let zones: Vec<i64> = path.not_smooth.corners.iter().flatten().map(|&i| i64::from(i)).collect();
-    let not_smooth = (
-        PyArray1::from_iter(py, path.not_smooth.reversals.iter().map(|&i| i64::from(i))),
-        PyArray1::from_vec(py, zones).reshape([path.not_smooth.corners.len(), 2]).expect("k × 2 values"),
-    );
-    Ok((columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), not_smooth))
+    let zones = path.not_smooth.corners.iter().map(|zone| zone.map(i64::from)).collect();
+    let reversals = path.not_smooth.reversals.iter().map(|&i| i64::from(i));
+    let not_smooth = (PyArray1::from_iter(py, reversals), to_array2(py, zones, 2));
+    let outside = path.outside.map(|place| (place.index, place.axis, place.position));
+    (columns, summary, outside, not_smooth).into_pyobject(py)
 }
 
 /// One column, `stride` values a piece in place of `initial`, written by all chunks at once.

@@ -1,10 +1,9 @@
 //! The exact planner, from a problem to a profile, and look-ahead over segments.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
+use numpy::PyArray1;
 use pyo3::prelude::*;
 
-use super::arrays::{indices, rows};
+use super::arrays::{indices, require, rows, Column, Table};
 use super::axes::with_padded_axes;
 use super::native::Of;
 use super::problem::Problem;
@@ -33,14 +32,12 @@ pub fn plan_bang_bang<'py>(
 pub fn feed_between<'py>(
     py: Python<'py>,
     problem: Of<Problem>,
-    piece: PyReadonlyArray1<'py, i64>,
-    u0: PyReadonlyArray1<'py, f64>,
-    u1: PyReadonlyArray1<'py, f64>,
+    piece: Column<'py, i64>,
+    u0: Column<'py>,
+    u1: Column<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (piece, u0, u1) = (indices(&piece), u0.as_slice()?, u1.as_slice()?);
-    if [u0.len(), u1.len()] != [piece.len(); 2] {
-        return Err(PyValueError::new_err("the arrays of the parts differ in length"));
-    }
+    require([u0.len(), u1.len()] == [piece.len(); 2], "the arrays of the parts differ in length")?;
     with_padded_axes!(problem.axes(), M, {
         let problem = problem.rows::<M>()?.problem();
         let speeds = run(py, None, |watch| {
@@ -59,19 +56,17 @@ pub fn feed_between<'py>(
 #[pyfunction]
 pub fn look_ahead<'py>(
     py: Python<'py>,
-    speed: PyReadonlyArray1<'py, f64>,
-    up: PyReadonlyArray2<'py, f64>,
-    down: PyReadonlyArray2<'py, f64>,
+    speed: Column<'py>,
+    up: Table<'py>,
+    down: Table<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let mut speed = speed.as_slice()?.to_vec();
     let change = |[gain, start, end]: [f64; 3]| Change { gain, hold: [start, end] };
-    let changes = |of: &PyReadonlyArray2<'py, f64>| -> PyResult<Vec<Change>> {
-        Ok(rows::<3>(of)?.into_iter().map(change).collect())
-    };
+    let changes =
+        |of: &Table<'py>| -> PyResult<Vec<Change>> { Ok(rows::<3>(of)?.into_iter().map(change).collect()) };
     let (up, down) = (changes(&up)?, changes(&down)?);
-    if speed.len() != up.len() + 1 || down.len() != up.len() {
-        return Err(PyValueError::new_err("the arrays of the segments differ in length"));
-    }
+    let good = speed.len() == up.len() + 1 && down.len() == up.len();
+    require(good, "the arrays of the segments differ in length")?;
     py.detach(|| Segments { up: &up, down: &down }.lower(&mut speed));
     Ok(PyArray1::from_vec(py, speed))
 }

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::arrays::{indices, row, rows_with};
+use super::arrays::{indices, row, rows_with, Column, Table};
 use super::axes::with_padded_axes;
 use super::curve::Curve;
 use super::native::{InAxes, Of};
@@ -25,17 +24,17 @@ pyo3::create_exception!(
 /// `feedplan.curves.speed_polynomial.SpeedPolynomial`.
 #[derive(FromPyObject)]
 struct SpeedArrays<'py> {
-    coefficients: PyReadonlyArray1<'py, f64>,
-    offsets: PyReadonlyArray1<'py, i64>,
+    coefficients: Column<'py>,
+    offsets: Column<'py, i64>,
 }
 
 /// `feedplan.geometry.path.Path`.
 #[derive(FromPyObject)]
 struct PathArrays<'py> {
-    runs: PyReadonlyArray1<'py, i64>,
-    line: PyReadonlyArray1<'py, i32>,
+    runs: Column<'py, i64>,
+    line: Column<'py, i32>,
     start_dwell: f64,
-    dwell: PyReadonlyArray1<'py, f64>,
+    dwell: Column<'py>,
 }
 
 /// `feedplan.constraints.problem.Problem`.
@@ -46,13 +45,13 @@ struct Arrays<'py> {
     tip_speed: Option<SpeedArrays<'py>>,
     way_speed: Option<SpeedArrays<'py>>,
     tip_curve: Option<Of<Curve>>,
-    feed_share: Option<PyReadonlyArray2<'py, f64>>,
-    feed: PyReadonlyArray1<'py, f64>,
-    junction_speed: PyReadonlyArray1<'py, f64>,
-    max_velocity: PyReadonlyArray1<'py, f64>,
-    max_acceleration: PyReadonlyArray1<'py, f64>,
-    min_velocity: PyReadonlyArray1<'py, f64>,
-    min_acceleration: PyReadonlyArray1<'py, f64>,
+    feed_share: Option<Table<'py>>,
+    feed: Column<'py>,
+    junction_speed: Column<'py>,
+    max_velocity: Column<'py>,
+    max_acceleration: Column<'py>,
+    min_velocity: Column<'py>,
+    min_acceleration: Column<'py>,
     chord_tolerance: f64,
     period: f64,
     start_speed: f64,
@@ -62,7 +61,6 @@ struct Arrays<'py> {
 /// A path with its limits.
 #[pyclass(frozen, module = "feedplan._solvers")]
 pub struct Problem {
-    axes: usize,
     /// `Rows`.
     rows: InAxes,
 }
@@ -82,7 +80,7 @@ pub struct Rows<const M: usize> {
 }
 
 /// Limits of the axes as sizes; 1 for axes at rest.
-fn both<const M: usize>(most: &PyReadonlyArray1<f64>, least: &PyReadonlyArray1<f64>) -> PyResult<Both<M>> {
+fn both<const M: usize>(most: &Column, least: &Column) -> PyResult<Both<M>> {
     Ok([row(most, 1.0)?, row::<M>(least, -1.0)?.map(|value| -value)])
 }
 
@@ -168,7 +166,7 @@ fn exception_of(fault: &Fault) -> PyErr {
 
 impl Problem {
     pub fn axes(&self) -> usize {
-        self.axes
+        self.rows.axes
     }
 
     /// Its rows in M axes, M being the number of `with_padded_axes`.
@@ -195,6 +193,6 @@ impl Problem {
     #[new]
     fn new(problem: Arrays<'_>) -> PyResult<Self> {
         let axes = problem.curve.axes();
-        with_padded_axes!(axes, M, Ok(Self { axes, rows: InAxes::new(Rows::<M>::new(&problem)?) }))
+        with_padded_axes!(axes, M, Ok(Self { rows: InAxes::new(axes, Rows::<M>::new(&problem)?) }))
     }
 }

@@ -3,10 +3,10 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::arrays::Column;
 use super::views::view;
 use feedplan_jerk::jerk_profile::JerkProfile;
 use feedplan_planner::phases::Phases;
@@ -26,8 +26,8 @@ macro_rules! profile {
 
         #[derive(FromPyObject)]
         struct Columns<'py> {
-            $($column: PyReadonlyArray1<'py, $type>,)+
-            $($other: PyReadonlyArray1<'py, $of>,)+
+            $($column: Column<'py, $type>,)+
+            $($other: Column<'py, $of>,)+
         }
 
         #[pymethods]

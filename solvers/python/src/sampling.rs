@@ -2,13 +2,14 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-use super::arrays::to_array2;
+use super::arrays::{to_array2, Column};
 use super::axes::with_padded_axes;
-use super::native::{InAxes, Of};
+use super::native::{with_object, InAxes, Of};
 use super::problem::Problem;
 use super::profile::Profile;
 use super::work::run;
@@ -19,38 +20,19 @@ use feedplan_setpoints::{Sampled, States};
 pyo3::import_exception!(feedplan.errors, InputError);
 
 /// t, position, velocity, acceleration, jerk, line, piece, u, worst rounds, worst length error.
-type ChunkArrays<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<i32>>,
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<f64>>,
-    u32,
-    f64,
-);
-
-fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> ChunkArrays<'_> {
-    (
-        PyArray1::from_vec(py, chunk.t),
-        to_array2(py, chunk.position, axes),
-        to_array2(py, chunk.velocity, axes),
-        to_array2(py, chunk.acceleration, axes),
-        to_array2(py, chunk.jerk, axes),
-        PyArray1::from_vec(py, chunk.line),
-        PyArray1::from_vec(py, chunk.piece),
-        PyArray1::from_vec(py, chunk.u),
-        chunk.effort.iterations,
-        chunk.effort.length_error,
-    )
+fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> PyResult<Bound<'_, PyTuple>> {
+    let [position, velocity, acceleration, jerk] =
+        [chunk.position, chunk.velocity, chunk.acceleration, chunk.jerk]
+            .map(|rows| to_array2(py, rows, axes));
+    let (line, piece) = (PyArray1::from_vec(py, chunk.line), PyArray1::from_vec(py, chunk.piece));
+    let [t, u] = [chunk.t, chunk.u].map(|column| PyArray1::from_vec(py, column));
+    let (rounds, error) = (chunk.effort.iterations, chunk.effort.length_error);
+    (t, position, velocity, acceleration, jerk, line, piece, u, rounds, error).into_pyobject(py)
 }
 
 /// A profile on its path, ready to be read at any setpoint.
 #[pyclass(name = "Sampler", module = "feedplan._solvers", frozen)]
 pub struct PySampler {
-    axes: usize,
     /// `Sampler`.
     sampler: InAxes,
     resume: Mutex<Option<Resume>>,
@@ -62,9 +44,9 @@ impl PySampler {
         &self,
         py: Python<'py>,
         work: impl FnOnce(&Sampler<M>, Watch) -> Chunk<M> + Send,
-    ) -> PyResult<ChunkArrays<'py>> {
+    ) -> PyResult<Bound<'py, PyTuple>> {
         let sampler = self.sampler.get()?;
-        Ok(arrays(py, run(py, None, |watch| work(sampler, watch))?, self.axes))
+        arrays(py, run(py, None, |watch| work(sampler, watch))?, self.sampler.axes)
     }
 }
 
@@ -88,29 +70,27 @@ impl PySampler {
             let path = &problem.rows::<M>()?.path;
             let sampler =
                 run(py, progress.as_ref(), |watch| path.sampled(&profile.phases, &runs, period, watch))?;
-            sampler.map(InAxes::new).map_err(InputError::new_err)
+            sampler.map(|sampler| InAxes::new(axes, sampler)).map_err(InputError::new_err)
         })?;
-        Ok(Self { axes, sampler, resume: Mutex::new(None) })
+        Ok(Self { sampler, resume: Mutex::new(None) })
     }
 
     /// Number of setpoints.
     #[getter]
-    fn count(&self) -> PyResult<usize> {
-        with_padded_axes!(self.axes, M, Ok(self.sampler.get::<Sampler<M>>()?.count()))
+    fn count(&self) -> usize {
+        with_object!(self.sampler, M, sampler: Sampler<M>, sampler.count())
     }
 
     /// Time of the last setpoint in seconds.
     #[getter]
-    fn duration(&self) -> PyResult<f64> {
-        with_padded_axes!(self.axes, M, Ok(self.sampler.get::<Sampler<M>>()?.duration()))
+    fn duration(&self) -> f64 {
+        with_object!(self.sampler, M, sampler: Sampler<M>, sampler.duration())
     }
 
     /// (runs, 3) when each starts on the plan's own clock, when on that of the setpoints, and its time in motion.
     #[getter]
-    fn runs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        with_padded_axes!(self.axes, M, {
-            Ok(to_array2(py, self.sampler.get::<Sampler<M>>()?.runs().collect(), 3))
-        })
+    fn runs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        with_object!(self.sampler, M, sampler: Sampler<M>, to_array2(py, sampler.runs().collect(), 3))
     }
 
     /// The setpoints from `start` up to `stop`.
@@ -120,8 +100,8 @@ impl PySampler {
         start: usize,
         stop: usize,
         newton: bool,
-    ) -> PyResult<ChunkArrays<'py>> {
-        let count = self.count()?;
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let count = self.count();
         if !(start < stop && stop <= count) {
             return Err(PyIndexError::new_err(format!("setpoints {start} to {stop} of {count}")));
         }
@@ -129,7 +109,7 @@ impl PySampler {
         // Locked with Python's lock alone: a child that is forked meanwhile does not find it locked.
         let state = || self.resume.lock().unwrap_or_else(PoisonError::into_inner);
         let mut next = *state();
-        let chunk = with_padded_axes!(self.axes, M, {
+        let chunk = with_padded_axes!(self.sampler.axes, M, {
             self.states::<M>(py, |sampler, watch| {
                 sampler.setpoints(start..stop, interpolator, &mut next, watch)
             })
@@ -139,10 +119,10 @@ impl PySampler {
     }
 
     /// The states at times of the plan's own clock.
-    fn at<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'_, f64>) -> PyResult<ChunkArrays<'py>> {
+    fn at<'py>(&self, py: Python<'py>, times: Column<'_>) -> PyResult<Bound<'py, PyTuple>> {
         let times = slice(&times)?;
         with_padded_axes!(
-            self.axes,
+            self.sampler.axes,
             M,
             self.states::<M>(py, |sampler, watch| sampler.states_at(times, watch))
         )
@@ -152,19 +132,19 @@ impl PySampler {
     fn along<'py>(
         &self,
         py: Python<'py>,
-        piece: PyReadonlyArray1<'_, u32>,
-        u: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<ChunkArrays<'py>> {
+        piece: Column<'_, u32>,
+        u: Column<'_>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
         let (piece, u) = (slice(&piece)?, slice(&u)?);
         if piece.len() != u.len() {
             return Err(PyValueError::new_err(format!("{} pieces and {} parameters", piece.len(), u.len())));
         }
-        with_padded_axes!(self.axes, M, {
+        with_padded_axes!(self.sampler.axes, M, {
             self.states::<M>(py, |sampler, watch| sampler.states_along(piece, u, watch))
         })
     }
 }
 
-fn slice<'a, T: numpy::Element>(array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
+fn slice<'a, T: numpy::Element>(array: &'a Column<'_, T>) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| PyValueError::new_err("arrays must be C-contiguous"))
 }

@@ -1,10 +1,10 @@
 //! The audit of setpoints, chunk by chunk: of axes of the path or of joints, with a plan or alone.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::audit::{findings, phases, programmed, require, Findings, LimitArrays, ProblemArrays};
+use super::arrays::{require, Column, Table};
+use super::audit::{findings, phases, programmed, Findings, LimitArrays, ProblemArrays};
 use super::axes::with_padded_axes;
 use super::joint_audit::JointWords;
 use super::moves::Moves;
@@ -64,7 +64,7 @@ impl Compared {
         work: impl FnOnce(&Plan, Watch) -> T + Send,
     ) -> PyResult<T> {
         let problem: ProblemArrays = self.problem.bind(py).extract()?;
-        let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
+        let feed: Table = self.feed.bind(py).extract()?;
         let path = problem.followed(&feed)?;
         let phases = self.profile.as_ref().map(|profile| phases(profile.get(), &problem)).transpose()?;
         let program =
@@ -124,11 +124,11 @@ impl SetpointAudit {
     fn push(
         &mut self,
         py: Python<'_>,
-        t: PyReadonlyArray1<'_, f64>,
-        position: PyReadonlyArray2<'_, f64>,
-        velocity: Option<PyReadonlyArray2<'_, f64>>,
-        acceleration: Option<PyReadonlyArray2<'_, f64>>,
-        line: Option<PyReadonlyArray1<'_, i32>>,
+        t: Column<'_>,
+        position: Table<'_>,
+        velocity: Option<Table<'_>>,
+        acceleration: Option<Table<'_>>,
+        line: Option<Column<'_, i32>>,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let chunk = Chunk {
@@ -143,7 +143,7 @@ impl SetpointAudit {
         let good = chunk.position.len() == rows
             && [chunk.velocity, chunk.acceleration].iter().flatten().all(|flat| flat.len() == rows)
             && chunk.line.is_none_or(|line| line.len() == chunk.t.len());
-        require(good, "setpoints")?;
+        require(good, "the arrays of the setpoints differ in length")?;
         // An audit that is interrupted is finished.
         let mut stream = self.stream.take().ok_or_else(finished)?;
         let (pushed, progress) = (&mut stream, progress.as_ref());
@@ -176,13 +176,14 @@ fn compare(
     (program, deviation): (Option<Of<Moves>>, f64),
 ) -> PyResult<Option<(Compared, usize)>> {
     let arrays: ProblemArrays = problem.extract()?;
-    let feeds: PyReadonlyArray2<f64> = feed.extract()?;
+    let feeds: Table = feed.extract()?;
     let path = arrays.followed(&feeds)?;
     let joints = match problem.getattr("joints")?.is_none() {
         true => None,
         false => Some(JointWords::new(&problem, axes)?),
     };
-    require(joints.is_some() || arrays.axes() == axes, "limits and the path")?;
+    let good = joints.is_some() || arrays.axes() == axes;
+    require(good, "the arrays of the limits and the path differ in length")?;
     if path.is_empty() {
         return Ok(None);
     }
