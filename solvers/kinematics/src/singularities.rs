@@ -5,6 +5,8 @@
 //! their ends. A part of 2⁻³⁰ of a piece on which this is not proven is a singular place: K is singular within that
 //! distance. A joint leaves its travel where its whole range on a part is outside.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::interval::Interval;
@@ -80,22 +82,19 @@ pub fn joint_path(
     path.begin_on_turn(machine, travel, start);
     if let Some(travel) = travel {
         // Rows of a piece follow each other.
-        let rows: Vec<&[usize]> = path.piece.chunk_by(|a, b| a == b).collect();
-        let mut first = 0;
-        let starts: Vec<usize> = rows
-            .iter()
-            .map(|rows| {
-                first += rows.len();
-                first - rows.len()
-            })
+        let rows: Vec<Range<usize>> = path
+            .piece
+            .chunk_by(|a, b| a == b)
+            .scan(0, |end, rows| Some(std::mem::replace(end, *end + rows.len())..*end))
             .collect();
-        let overruns = rows.par_iter().zip(starts).with_min_len(BLOCK).map_init(
+        let overruns = rows.into_par_iter().with_min_len(BLOCK).map_init(
             || (PartWork::new(machine, tips, ORDER), PointWork::new(machine, tips, 0)),
-            |(work, points), (rows, first)| {
-                let parts = (first..first + rows.len())
+            |(work, points), rows| {
+                let piece = path.piece[rows.start];
+                let parts = rows
                     .map(|i| Part { part: path.part[i], range: path.range[i * joints..][..joints].to_vec() })
                     .collect();
-                overruns(machine, work, points, rows[0], parts, travel)
+                overruns(machine, work, points, piece, parts, travel)
             },
         );
         path.overruns = overruns.flatten_iter().collect();

@@ -130,26 +130,17 @@ impl<const M: usize> Moves<'_, M> {
 
     /// The arc of move `i`.
     fn arc(&self, i: usize) -> Result<Arc<M>, MoveError> {
-        let row = self.arcs.partition_point(|(index, _)| *index < i);
-        match self.arcs.get(row) {
-            Some((index, ArcShape { plane, centre, sweep })) if *index == i => Ok(Arc {
-                start: self.origin(i),
-                end: self.target[i],
-                centre: *centre,
-                plane: *plane,
-                sweep: *sweep,
-            }),
-            _ => Err(MoveError { index: i, fault: MoveFault::Arc(ArcError::Sweep) }),
-        }
+        let row = self.arcs.binary_search_by_key(&i, |arc| arc.0);
+        let row = row.map_err(|_| MoveError { index: i, fault: MoveFault::Arc(ArcError::Sweep) })?;
+        let ArcShape { plane, centre, sweep } = self.arcs[row].1;
+        Ok(Arc { start: self.origin(i), end: self.target[i], centre, plane, sweep })
     }
 
     /// The pieces of spline move `i` that have a length, with widths whose sum is about the length of the spline.
     pub fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, MoveError> {
-        let row = self.spline_moves.partition_point(|(index, _)| *index < i);
-        let range = match self.spline_moves.get(row) {
-            Some((index, range)) if *index == i => range.clone(),
-            _ => return Err(MoveError { index: i, fault: MoveFault::Spline }),
-        };
+        let row = self.spline_moves.binary_search_by_key(&i, |spline| spline.0);
+        let row = row.map_err(|_| MoveError { index: i, fault: MoveFault::Spline })?;
+        let range = self.spline_moves[row].1.clone();
         let sum = |length: f64, width: f64, piece: usize| {
             let piece = self.splines.piece(piece);
             let polygon = piece.control.windows(2).map(|pair| norm(&sub(&pair[1], &pair[0]))).sum::<f64>();

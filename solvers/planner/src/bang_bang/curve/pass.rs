@@ -20,7 +20,7 @@ mod slide;
 
 use super::part::SubPiece;
 use super::window::{Ceiling, Window};
-use crate::bang_bang::tolerance::{NO_STEP, ON_CEILING, ON_LIMIT_CURVE, WEAK_TIE};
+use crate::bang_bang::tolerance::{AT_END, NO_STEP, ON_CEILING, ON_LIMIT_CURVE, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -360,6 +360,30 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
     fn at_turn(&self, j: usize) -> Option<f64> {
         let slope = self.window.g[j].reverse().first_slope();
         (slope != 0.0).then(|| self.sub.limits.down[j] / (slope.abs() * self.window.weight.last().powi(2)))
+    }
+}
+
+/// The earliest end of a phase that tests have found, and what ends it there; t = 1 is the end of the window.
+struct Earliest<S> {
+    t: f64,
+    switch: Option<S>,
+}
+
+impl<S> Earliest<S> {
+    /// Keeps an end that is earlier.
+    #[inline(always)]
+    fn offer(&mut self, t: Option<f64>, switch: S) {
+        if let Some(t) = t.filter(|&t| t < self.t) {
+            *self = Self { t, switch: Some(switch) };
+        }
+    }
+
+    /// What was found, without an end that is hardly before that of the window.
+    fn found(self) -> (f64, Option<S>) {
+        if self.t > 1.0 - AT_END && self.t < 1.0 {
+            return (1.0, None);
+        }
+        (self.t, self.switch)
     }
 }
 

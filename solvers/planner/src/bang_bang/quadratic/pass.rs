@@ -10,6 +10,7 @@ use super::phase::{Law, Phase};
 use super::quotient::Quotient;
 use super::slide::slide;
 use super::subpiece::{Axes, SubPiece};
+use feedplan_geometry::bisection::boundary;
 
 /// More switches than on any sub-piece: at most M − 1 transitions lie between two slides, and a slide ends at one of
 /// few roots.
@@ -259,17 +260,8 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
             step += step;
             beyond = (a + step).min(b);
         }
-        loop {
-            let middle = 0.5 * (below + beyond);
-            if middle <= below || middle >= beyond {
-                return Some((below, ceiling.at(self.sub, self.axes, below)));
-            }
-            if above(middle) {
-                beyond = middle;
-            } else {
-                below = middle;
-            }
-        }
+        let [x, _] = boundary(below, beyond, |x| !above(x));
+        Some((x, ceiling.at(self.sub, self.axes, x)))
     }
 
     /// Lowers p to the limit curve at the start; says whether the limit curve has to be followed.

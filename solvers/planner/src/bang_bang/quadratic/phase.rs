@@ -70,24 +70,21 @@ impl Phase {
         (a, at_a): (f64, f64),
         (b, at_b): (f64, f64),
     ) -> Quotient {
-        // n = v_k² and n' = 2 a_k g_k, from the end where the phase is slower: p may be infinite at the other.
-        let rising = |k: u8| {
-            let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
-            let gain = axes.acceleration[k as usize] * (b - a);
-            let n = ga * ga * at_a;
-            let n = [n, n + gain * ga, n + gain * (ga + gb)];
-            Quotient { n, d: [ga * ga, ga * gb, gb * gb], denominator: Denominator::AxisSq(k as usize) }
-        };
-        let falling = |k: u8| {
-            let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
-            let gain = axes.acceleration[k as usize] * (b - a);
-            let n = gb * gb * at_b;
-            let n = [n + gain * (ga + gb), n + gain * gb, n];
-            Quotient { n, d: [ga * ga, ga * gb, gb * gb], denominator: Denominator::AxisSq(k as usize) }
-        };
         match self.law {
-            Law::Accelerating(k) => rising(k),
-            Law::Braking(k) => falling(k),
+            Law::Accelerating(k) | Law::Braking(k) => {
+                let k = k as usize;
+                let (ga, gb) = (sub.axis_tangent(k, a), sub.axis_tangent(k, b));
+                let gain = axes.acceleration[k] * (b - a);
+                // n = v_k² and n' = 2 a_k g_k, from the end where the phase is slower: p may be infinite at the other.
+                let n = if let Law::Accelerating(_) = self.law {
+                    let n = ga * ga * at_a;
+                    [n, n + gain * ga, n + gain * (ga + gb)]
+                } else {
+                    let n = gb * gb * at_b;
+                    [n + gain * (ga + gb), n + gain * gb, n]
+                };
+                Quotient { n, d: [ga * ga, ga * gb, gb * gb], denominator: Denominator::AxisSq(k) }
+            }
             Law::Flat(_) | Law::LimitCurve => Quotient::line(at_a, at_b),
             Law::Cap => sub.cap_quotient(a, b),
         }

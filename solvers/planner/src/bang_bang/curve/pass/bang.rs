@@ -1,9 +1,9 @@
 //! The phase of greatest acceleration in a window: its control axis, and the switch that ends it (tests: table of
 //! `pass`).
 
-use super::{first_failure, Law, Pass, Start, Stuck, MAX_HOPS};
+use super::{first_failure, Earliest, Law, Pass, Start, Stuck, MAX_HOPS};
 use crate::bang_bang::curve::window::Ceiling;
-use crate::bang_bang::tolerance::{AT_END, NEARLY_FLAT, NEARLY_ON_CEILING, TEST, TIE, WEAK_TIE};
+use crate::bang_bang::tolerance::{NEARLY_FLAT, NEARLY_ON_CEILING, TEST, TIE, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -111,13 +111,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         } else {
             0
         };
-        let mut first = 1.0;
-        let mut switch = None;
-        let mut found = |t: Option<f64>, what: Switch| {
-            if let Some(t) = t.filter(|&t| t < first) {
-                (first, switch) = (t, Some(what));
-            }
-        };
+        let mut earliest = Earliest { t: 1.0, switch: None };
         if !self.straight {
             for l in self.moving().filter(|&l| l != j) {
                 let [below_limit, above_limit] = self.surely_within_limits(l, j, &w);
@@ -138,7 +132,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                 if !below_limit {
                     let above = cube.combine(a[l], &need, -1.0);
                     let slack = WEAK_TIE * a[l] * cube.first();
-                    found(first_failure(&above, || size(a[l]), roots, slack), Switch::Transition(l));
+                    earliest.offer(first_failure(&above, || size(a[l]), roots, slack), Switch::Transition(l));
                 }
                 if !above_limit {
                     let below = cube.combine(low[l], &need, 1.0);
@@ -149,16 +143,15 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                     } else {
                         1
                     };
-                    found(first_failure(&below, || size(low[l]), known + contact, 0.0), Switch::Low(l));
+                    earliest
+                        .offer(first_failure(&below, || size(low[l]), known + contact, 0.0), Switch::Low(l));
                 }
             }
         }
         if on_ceiling || !self.stays_below_ceiling(j, &w) {
-            found(self.first_crossing(j, &w, turns, on_ceiling), Switch::Ceiling);
+            earliest.offer(self.first_crossing(j, &w, turns, on_ceiling), Switch::Ceiling);
         }
-        if first > 1.0 - AT_END && first < 1.0 {
-            (first, switch) = (1.0, None);
-        }
+        let (first, switch) = earliest.found();
         let Some(switch) = switch else {
             self.push(1.0, Law::Accelerating(j), Some(&w), slow_sq);
             self.after_step();

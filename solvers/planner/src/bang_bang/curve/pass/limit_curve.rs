@@ -1,7 +1,7 @@
 //! Along the limit curve, backward only: one axis at +A, one at −A⁻ (tests: table of `pass`).
 
-use super::{first_failure, Law, Pass};
-use crate::bang_bang::tolerance::{AT_END, ON_CEILING, TEST};
+use super::{first_failure, Earliest, Law, Pass};
+use crate::bang_bang::tolerance::{ON_CEILING, TEST};
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Why the limit curve is left: a tangency, another pair of axes, the ceiling.
@@ -27,25 +27,20 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         let (n_slope, w_slope) = (n.derivative(), w.derivative());
         let size = window.g[j].wronskian_magnitude(&window.g[l]);
         let weight = &window.weight;
-        let mut first = 1.0;
-        let mut switch = None;
-        {
-            let mut leave = weight.multiply(&n.multiply(&w_slope).combine(1.0, &n_slope.multiply(&w), -3.0));
-            if weight.degree() > 0 {
-                leave = leave.combine(1.0, &weight.derivative().multiply(&n).multiply(&w), 2.0);
-            }
-            let terms = || {
-                let terms = n.magnitude().multiply(&w_slope.magnitude()).combine(
-                    100.0 * TEST,
-                    &n_slope.magnitude().multiply(&size),
-                    300.0 * TEST,
-                );
-                weight.multiply(&terms)
-            };
-            if let Some(t) = first_failure(&leave, terms, 0, 0.0) {
-                (first, switch) = (t, Some(Leave::Tangent));
-            }
+        let mut leave = weight.multiply(&n.multiply(&w_slope).combine(1.0, &n_slope.multiply(&w), -3.0));
+        if weight.degree() > 0 {
+            leave = leave.combine(1.0, &weight.derivative().multiply(&n).multiply(&w), 2.0);
         }
+        let terms = || {
+            let terms = n.magnitude().multiply(&w_slope.magnitude()).combine(
+                100.0 * TEST,
+                &n_slope.magnitude().multiply(&size),
+                300.0 * TEST,
+            );
+            weight.multiply(&terms)
+        };
+        let tangent = first_failure(&leave, terms, 0, 0.0);
+        let mut earliest = Earliest { t: tangent.unwrap_or(1.0), switch: tangent.map(|_| Leave::Tangent) };
         for i in self.moving().filter(|&i| i != j && i != l) {
             let g = &window.g[i];
             let need = g.derivative().multiply(&n).combine(1.0, &g.multiply(&n_slope), -1.0);
@@ -59,11 +54,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
             };
             for (most, sign, what) in [(up[i], -1.0, Leave::Pair(i, l)), (down[i], 1.0, Leave::Pair(j, i))] {
                 let inside = w.combine(most, &need, sign);
-                if let Some(t) = first_failure(&inside, || terms(most), 0, 0.0) {
-                    if t < first {
-                        (first, switch) = (t, Some(what));
-                    }
-                }
+                earliest.offer(first_failure(&inside, || terms(most), 0, 0.0), what);
             }
         }
         if let Some((ceiling, d)) = window.quotient().filter(|_| !self.cap_is_unreachable()) {
@@ -73,16 +64,11 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                 let margin = limit.combine(1.0, &used, -1.0);
                 let on = self.pi >= window.ceiling_at_start() * (1.0 - ON_CEILING);
                 let slack = if on { f64::INFINITY } else { 0.0 };
-                if let Some(t) = first_failure(&margin, || used.magnitude().scale(0.1 * TEST), 0, slack) {
-                    if t < first {
-                        (first, switch) = (t, Some(Leave::Ceiling));
-                    }
-                }
+                let size = || used.magnitude().scale(0.1 * TEST);
+                earliest.offer(first_failure(&margin, size, 0, slack), Leave::Ceiling);
             }
         }
-        if first > 1.0 - AT_END && first < 1.0 {
-            (first, switch) = (1.0, None);
-        }
+        let (first, switch) = earliest.found();
         let moved = self.is_step(first);
         if moved {
             let scale = self.window.length().powi(2);
