@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
-use feedplan_checks::Random;
+use feedplan_checks::{problem, Random};
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
-use feedplan_geometry::watch::Watch;
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_planner::problem::Problem;
 use feedplan_planner::Exact as _;
 
@@ -38,35 +38,6 @@ fn cam_path(count: usize, seed: u64) -> Vec<Quadratic<3>> {
         .collect()
 }
 
-fn problem<'a>(
-    control: &'a [[f64; 3]],
-    offset: &'a [usize],
-    width: &'a [f64],
-    runs: &'a [usize],
-    feed: &'a [f64],
-    junction: &'a [f64],
-) -> Problem<'a, 3> {
-    Problem {
-        control,
-        weight: &[],
-        offset,
-        width,
-        tip: None,
-        way: None,
-        feed_share: &[],
-        runs,
-        feed,
-        junction_speed: junction,
-        max_velocity: [[250.0; 3]; 2],
-        max_acceleration: [[3000.0, 3000.0, 1000.0]; 2],
-        chord_tolerance: 0.01,
-        period: 0.001,
-        start_speed: 0.0,
-        end_speed: 0.0,
-        watch: Watch::default(),
-    }
-}
-
 fn pieces(criterion: &mut Criterion) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let mut group = criterion.benchmark_group("bang_bang");
@@ -77,10 +48,11 @@ fn pieces(criterion: &mut Criterion) {
             let (runs, feed, junction) = ([0, count], vec![feed; count], vec![f64::INFINITY; count + 1]);
             group.throughput(Throughput::Elements(count as u64));
             group.bench_with_input(BenchmarkId::new(name, count), &count, |bencher, _| {
-                let control: Vec<_> = path.iter().flat_map(|piece| piece.control).collect();
-                let width: Vec<_> = path.iter().map(|piece| piece.width).collect();
-                let offset: Vec<_> = (0..=count).map(|i| 3 * i).collect();
-                let problem = problem(&control, &offset, &width, &runs, &feed, &junction);
+                let mut curve = CompositeCurve::default();
+                path.iter().for_each(|piece| curve.push(&piece.control, &[], piece.width));
+                let limits = [[250.0; 3], [3000.0, 3000.0, 1000.0]];
+                let problem = problem(&curve, &runs, &feed, &junction, limits);
+                let problem = Problem { chord_tolerance: 0.01, ..problem };
                 pool.install(|| bencher.iter(|| problem.fastest().expect("a profile")));
             });
         }

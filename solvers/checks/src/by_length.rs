@@ -1,5 +1,7 @@
 //! Curves along their arc length, for tests of the jerk-limited planner.
 
+use feedplan_geometry::arc_length::{W, X};
+use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 
 /// A curve C(t) in M axes with its first three derivatives.
@@ -17,15 +19,6 @@ pub struct ByLength<C, const M: usize> {
     first: Vec<usize>,
     knots: Vec<f64>,
     pub feed: f64,
-}
-
-const X: [f64; 4] =
-    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
-const W: [f64; 4] =
-    [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
-
-fn dot<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
-    (0..M).map(|k| a[k] * b[k]).sum()
 }
 
 impl<C: Curve<M>, const M: usize> ByLength<C, M> {
@@ -55,10 +48,7 @@ impl<C: Curve<M>, const M: usize> ByLength<C, M> {
 
     fn length(&self, a: f64, b: f64) -> f64 {
         let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-        let speed = |t: f64| {
-            let d = self.curve.at(t)[1];
-            dot(&d, &d).sqrt()
-        };
+        let speed = |t: f64| norm(&self.curve.at(t)[1]);
         half * (0..4).map(|i| W[i] * (speed(middle - half * X[i]) + speed(middle + half * X[i]))).sum::<f64>()
     }
 
@@ -69,8 +59,7 @@ impl<C: Curve<M>, const M: usize> ByLength<C, M> {
         let (a, b) = (self.t[i], self.t[i + 1]);
         let mut t = a + (b - a) * (s - self.s[i]) / (self.s[i + 1] - self.s[i]);
         for _ in 0..20 {
-            let d = self.curve.at(t)[1];
-            let step = (s - self.s[i] - self.length(a, t)) / dot(&d, &d).sqrt();
+            let step = (s - self.s[i] - self.length(a, t)) / norm(&self.curve.at(t)[1]);
             t = (t + step).clamp(a, b);
             // Newton's method squares the error: the next step would be below rounding.
             if step.abs() < 1e-8 * (b - a) {

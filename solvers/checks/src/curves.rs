@@ -1,12 +1,12 @@
 //! Random problems on curves of any degree, polynomial and rational, most of them adversarial.
 
 use feedplan_geometry::spline::CompositeCurve;
-use feedplan_geometry::watch::Watch;
-use feedplan_planner::problem::{Fault, Problem};
+use feedplan_planner::problem::Fault;
 use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 
 use super::axes::{padded, PADDED};
+use super::elevated::problem;
 use super::random::Random;
 use super::regular_path::RegularPath;
 
@@ -43,27 +43,12 @@ impl<const M: usize> CurveCase<M> {
             curve.push(&piece.points, weights, piece.width);
         }
         let RegularPath { curve, junction, .. } = RegularPath::new(&curve, &self.junction);
-        let control: Vec<[f64; PADDED]> = curve.control.iter().map(|point| padded(point, 0.0)).collect();
-        let problem = Problem {
-            control: &control,
-            weight: &curve.weights,
-            offset: &curve.offsets,
-            width: &curve.width,
-            tip: None,
-            way: None,
-            feed_share: &[],
-            runs: &[0, curve.len()],
-            feed: &vec![self.feed; curve.len()],
-            junction_speed: &junction,
-            max_velocity: [padded(&self.velocity, 1.0); 2],
-            max_acceleration: [padded(&self.acceleration, 1.0); 2],
-            chord_tolerance: f64::INFINITY,
-            period: 0.001,
-            start_speed: 0.0,
-            end_speed: 0.0,
-            watch: Watch::default(),
-        };
-        problem.fastest()
+        let control = curve.control.iter().map(|point| padded(point, 0.0)).collect();
+        let CompositeCurve { weights, offsets, width, .. } = curve;
+        let curve = CompositeCurve::<PADDED> { control, weights, offsets, width };
+        let (runs, feed) = ([0, curve.len()], vec![self.feed; curve.len()]);
+        let limits = [self.velocity, self.acceleration].map(|limits| padded(&limits, 1.0));
+        problem(&curve, &runs, &feed, &junction, limits).fastest()
     }
 
     /// The path in the reverse direction.

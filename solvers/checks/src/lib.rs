@@ -19,5 +19,5 @@ pub use audit::{audit, Audit};
 pub use axes::{padded, AXES, FEW_AXES, PADDED};
 pub use campaign::{assert_none, seeds};
 pub use cases::{milder_case, random_case, Case};
-pub use elevated::Elevated;
+pub use elevated::{problem, Elevated};
 pub use random::Random;

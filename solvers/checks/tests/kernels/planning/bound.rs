@@ -78,7 +78,7 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
         .into_par_iter()
         .filter_map(|seed| {
             let count = FEW_AXES[(seed % 3) as usize];
-            feedplan_checks::for_few_axes!(count, M, {
+            feedplan_checks::for_axes!(count, M, {
                 let case = random_case::<M>(seed);
                 let phases = case.plan().ok()?.phases;
                 let time = phases.time();

@@ -24,7 +24,7 @@ fn curves_made_to_break_the_planner_are_planned_in_finite_time() {
     let count = seeds(6_000).end;
     let (mut slowed, mut stuck, mut arcs) = (0, 0, 0);
     for seed in 0..count {
-        feedplan_checks::for_few_axes!(FEW_AXES[(seed % 3) as usize], M, {
+        feedplan_checks::for_axes!(FEW_AXES[(seed % 3) as usize], M, {
             let case = random_curves::<M>(seed);
             match case.plan() {
                 Err(_) => stuck += 1,

@@ -7,7 +7,7 @@ fn quadratics_of_elevated_degree_take_the_same_time() {
     let mut failures = vec![];
     for seed in 0..2000 {
         let axes = FEW_AXES[(seed % 3) as usize];
-        feedplan_checks::for_few_axes!(axes, M, {
+        feedplan_checks::for_axes!(axes, M, {
             let mut case = milder_case::<M>(seed);
             case.chord_tolerance = f64::INFINITY;
             let exact = case.time();
