@@ -109,6 +109,11 @@ def test_words_of_fanuc_make_linuxcncs_moves(tmp_path: Path) -> None:
     assert not wrong, "\n".join(wrong)
 
 
+def test_a_call_stands_beside_another_tool() -> None:
+    program = read_gcode("G21 M98 P1 M61 Q7\nM30\nO1\nG0 X#5400\nM99\n")
+    assert program.target.tolist() == [[7, 0, 0]]
+
+
 def test_further_work_offsets_are_the_machines() -> None:
     axes = tuple(Axis(name, 100.0, 1000.0) for name in "XYZ")
     shop = Machine(name="shop", axes=axes, offsets=(("G54.1 P7", (10.0, 20.0, 30.0)),))

@@ -285,6 +285,11 @@ impl Block {
         (self.groups & (1 << group as u8) != 0).then(|| self.codes[group as usize])
     }
 
+    /// All G codes.
+    pub fn codes(&self) -> impl Iterator<Item = u16> + '_ {
+        (0..GROUPS).filter(|group| self.groups >> group & 1 == 1).map(|group| self.codes[group])
+    }
+
     /// True where the block has no G code other than one of motion, and no M code.
     #[inline(always)]
     pub fn only_motion(&self) -> bool {

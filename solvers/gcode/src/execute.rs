@@ -119,7 +119,7 @@ impl Interpreter<'_> {
         match block.m_code(MGroup::Stop) {
             Some(code) => {
                 let ends = matches!(code, 2 | 30);
-                self.moves.event(self.line, b'M', f64::from(code), None, None);
+                self.moves.event(self.line, b'M', f64::from(code), [None; 2]);
                 self.moves.stop(if ends { Stop::End } else { Stop::Pause });
                 Ok(ends)
             }
@@ -149,7 +149,7 @@ impl Interpreter<'_> {
             self.state.spindle_speed = None;
         }
         if let Some(speed) = block.get(b'S') {
-            self.moves.event(self.line, b'S', speed, None, None);
+            self.moves.event(self.line, b'S', speed, [None; 2]);
             self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
         }
         if block.words & bits(b"SHTD") != 0 {
@@ -199,13 +199,8 @@ impl Interpreter<'_> {
             }
             let output = block.get(b'E').filter(|_| matches!(code, 66..=68));
             let tool = (code == 6).then(|| self.tool_number());
-            self.moves.event(
-                self.line,
-                b'M',
-                f64::from(code),
-                tool.or(block.get(b'P')).or(output),
-                block.get(b'Q'),
-            );
+            let words = [tool.or(block.get(b'P')).or(output), block.get(b'Q')];
+            self.moves.event(self.line, b'M', f64::from(code), words);
             match code {
                 3 | 4 => (self.state.spindle_on, self.state.spindle_back) = (true, code == 4),
                 5 => self.state.spindle_on = false,
@@ -242,7 +237,7 @@ impl Interpreter<'_> {
                 format!("a dwell takes {seconds} s: dwells are read in seconds, not in milliseconds")
             });
         }
-        self.moves.event(self.line, b'G', 4.0, Some(seconds), None);
+        self.moves.event(self.line, b'G', 4.0, [Some(seconds), None]);
         self.moves.dwell(seconds);
         Ok(())
     }
@@ -253,14 +248,19 @@ impl Interpreter<'_> {
         if self.state.offsets.rotation != 0.0 || self.state.polar || block.is_polar() {
             return self.turned_target(block, machine, &self.position());
         }
-        let mut target = self.position();
         let zero = if machine { [0.0; 9] } else { *self.state.offsets.sum() };
+        self.place(block, self.position(), &zero)
+    }
+
+    /// The place that axis words name, with G91 from `place`.
+    #[inline(always)]
+    pub(super) fn place(&mut self, block: &Block, mut place: Point, zero: &Point) -> Outcome<Point> {
         let absolute = self.state.absolute;
         self.axis_values(block, |axis, value| {
-            target[axis] = value + if absolute { zero[axis] } else { target[axis] };
+            place[axis] = value + if absolute { zero[axis] } else { place[axis] };
         })?;
-        self.check_reach(&target)?;
-        Ok(target)
+        self.check_reach(&place)?;
+        Ok(place)
     }
 
     pub(super) fn rapid(&mut self, target: &Point) -> Outcome<()> {

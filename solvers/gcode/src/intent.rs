@@ -108,9 +108,7 @@ pub fn check_use(
     directed: bool,
 ) -> Outcome<()> {
     let mut used = FREE_WORDS | axes | if directed { bits(b"IJK") } else { 0 };
-    let groups =
-        [Group::Once, Group::Control, Group::Turn, Group::System, Group::ToolLength, Group::Compensation];
-    for code in groups.map(|group| block.code(group)).into_iter().chain([motion]).flatten() {
+    for code in block.codes().chain(motion) {
         used |= words_of(code);
     }
     if block.m_code(MGroup::User).is_some()
@@ -119,13 +117,14 @@ pub fn check_use(
     {
         used |= bits(b"PQRL");
     }
-    used |= match (block.m_code(MGroup::Output), block.m_code(MGroup::Call), block.m_code(MGroup::ToolChange))
-    {
-        (Some(_), ..) => bits(b"PQLE"),
-        (_, Some(_), _) => bits(b"PL"),
-        (.., Some(61)) => bit(b'Q'),
-        _ => 0,
+    used |= match (block.m_code(MGroup::Output), block.m_code(MGroup::Call)) {
+        (Some(_), _) => bits(b"PQLE"),
+        (None, Some(_)) => bits(b"PL"),
+        (None, None) => 0,
     };
+    if block.m_code(MGroup::ToolChange) == Some(61) {
+        used |= bit(b'Q');
+    }
     if block.m_code(MGroup::Override).is_some() {
         used |= bit(b'P');
     }

@@ -118,11 +118,6 @@ impl<'a> Interpreter<'a> {
         self.state.feed.map_or(0.0, |feed| feed.angular * per)
     }
 
-    /// A message to the operator, or a comment.
-    pub fn remark(&mut self, line: u32, letter: u8, text: String) {
-        self.moves.remark(line, letter, text);
-    }
-
     /// Calls `each` for each axis that the block names, with its value in mm or degrees. An axis that is named for the
     /// first time gets a column.
     #[inline(always)]
@@ -173,7 +168,11 @@ impl<'a> Interpreter<'a> {
     pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
         let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
         // All nine are tested without a branch, and the faulty one is looked up afterwards.
-        if (0..9).fold(true, |all, axis| all & reached(axis)) {
+        let mut all = true;
+        for axis in 0..9 {
+            all &= reached(axis);
+        }
+        if all {
             return Ok(());
         }
         let axis = (0..9).find(|&axis| !reached(axis)).unwrap_or(0);

@@ -11,16 +11,22 @@ impl Interpreter<'_> {
     /// Plane, units, path control, distance modes and retract mode.
     pub(super) fn set_modes(&mut self, block: &Block) -> Outcome<()> {
         let state = &mut self.state;
-        match block.code(Group::Plane) {
-            Some(170) => state.normal = 2,
-            Some(180) => state.normal = 1,
-            Some(190) => state.normal = 0,
-            _ => {}
+        if let Some(code) = block.code(Group::Plane) {
+            state.normal = usize::from((190 - code) / 10);
         }
-        if let Some(code) = block.code(Group::Units) {
-            state.inches = code == 200;
-            state.units_given = true;
+        let switches = [
+            (Group::Units, 200, &mut state.inches),
+            (Group::Distance, 900, &mut state.absolute),
+            (Group::ArcDistance, 901, &mut state.absolute_centres),
+            (Group::Lathe, 70, &mut state.diameters),
+            (Group::Polar, 160, &mut state.polar),
+            (Group::Retract, 980, &mut state.retract_to_initial),
+        ];
+        for (group, on, switch) in switches {
+            *switch = block.code(group).map_or(*switch, |code| code == on);
         }
+        state.units_given |= block.code(Group::Units).is_some();
+        state.retract_given |= block.code(Group::Retract).is_some();
         match block.code(Group::Control) {
             Some(610) => state.control = Control::new(Mode::ExactPath),
             Some(611) => state.control = Control::new(Mode::ExactStop),
@@ -38,24 +44,8 @@ impl Interpreter<'_> {
             }
             _ => {}
         }
-        if let Some(code) = block.code(Group::Distance) {
-            state.absolute = code == 900;
-        }
-        if let Some(code) = block.code(Group::ArcDistance) {
-            state.absolute_centres = code == 901;
-        }
-        if let Some(code) = block.code(Group::Lathe) {
-            state.diameters = code == 70;
-        }
-        if let Some(code) = block.code(Group::Polar) {
-            state.polar = code == 160;
-        }
         if block.code(Group::Once) == Some(600) && block.words & AXIS_WORDS == 0 {
             state.control = Control::new(Mode::ExactStop);
-        }
-        if let Some(code) = block.code(Group::Retract) {
-            state.retract_to_initial = code == 980;
-            state.retract_given = true;
         }
         Ok(())
     }

@@ -331,15 +331,15 @@ impl Moves {
         }
     }
 
-    /// Adds an event after the moves so far.
-    pub fn event(&mut self, line: u32, letter: u8, number: f64, p: Option<f64>, q: Option<f64>) {
-        self.events.push(self.kind.len(), line, letter, number, [p, q]);
+    /// Adds an event, with its words P and Q, after the moves so far.
+    pub fn event(&mut self, line: u32, letter: u8, number: f64, words: [Option<f64>; 2]) {
+        self.events.push(self.kind.len(), line, letter, number, words);
     }
 
     /// Adds a message to the operator, or a comment.
     pub fn remark(&mut self, line: u32, letter: u8, text: String) {
         let index = self.events.index_of(text, line);
-        self.event(line, letter, index as f64, None, None);
+        self.event(line, letter, index as f64, [None; 2]);
     }
 
     /// A full stop after the last move; of several causes the last one of `Stop` is kept.

@@ -195,7 +195,7 @@ impl<'a> Runner<'a> {
                     }
                     let line = frame.reported.unwrap_or(lexer.line);
                     for (letter, text) in lexer.remarks.drain(..) {
-                        self.interpreter.remark(line, letter, text);
+                        self.interpreter.moves.remark(line, letter, text);
                     }
                     if self.interpreter.run(&self.block, line)? {
                         return Ok(Exit::End(Some("M2 or M30")));

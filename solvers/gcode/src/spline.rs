@@ -227,14 +227,8 @@ impl Interpreter<'_> {
 
     /// A control point of G6.2, with G91 from the one before.
     fn control_point(&mut self, block: &Block, before: Point) -> Outcome<Point> {
-        let mut point = before;
         let zero = *self.state.offsets.sum();
-        let absolute = self.state.absolute;
-        self.axis_values(block, |axis, value| {
-            point[axis] = value + if absolute { zero[axis] } else { point[axis] };
-        })?;
-        self.check_reach(&point)?;
-        Ok(point)
+        self.place(block, before, &zero)
     }
 
     /// Adds the move along a NURBS that is complete.

@@ -30,7 +30,7 @@ impl Interpreter<'_> {
     pub(super) fn set_tool(&mut self, block: &Block, change: Option<u16>) -> Outcome<()> {
         if let Some(number) = block.count(b'T', 0, "tool number")? {
             self.selected = Some(number);
-            self.moves.event(self.line, b'T', f64::from(number), None, None);
+            self.moves.event(self.line, b'T', f64::from(number), [None; 2]);
         }
         let number = match change {
             Some(6) => {
