@@ -1,17 +1,15 @@
 //! The chord error: how far the path leaves the straight line between two setpoints, from speed and curvature.
 
+use super::number::Number;
+
 /// How far a circle of this curvature leaves its chord of length `step`. Chords longer than the diameter do not
 /// exist; a path of length `step` stays within half of it of one of its ends.
 #[inline(always)]
-pub fn chord_error(step: f64, curvature: f64) -> f64 {
-    let half = 0.5 * step;
-    let reach = half * curvature;
-    if reach < 1.0 {
-        // ρ − √(ρ² − half²), without the cancellation.
-        half * reach / (1.0 + (1.0 - reach * reach).sqrt())
-    } else {
-        half
-    }
+pub fn chord_error<T: Number>(step: T, curvature: T) -> T {
+    let (half, one) = (step * 0.5, step.filled(1.0));
+    let reach = (half * curvature).smaller(one);
+    // ρ − √(ρ² − half²), without the cancellation.
+    half * reach / (one + (one - reach * reach).root())
 }
 
 #[cfg(test)]

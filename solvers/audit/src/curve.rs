@@ -5,6 +5,7 @@
 use std::rc::Rc;
 
 use super::hodographs::Hodographs;
+use super::number::Number;
 use super::polygon::Polygon;
 use super::vectors::{curvature, length, vector, vector_of};
 
@@ -297,23 +298,11 @@ impl<const M: usize> Curve<M> {
         by_width(self.hodographs.rates(t, rest), self.per_width)
     }
 
-    /// The first three derivatives of each axis at several u, of a piece without weights.
+    /// The same of a piece without weights, at one u or at several.
     #[inline(always)]
-    pub fn derivatives_at_each<const K: usize>(&self, u: &[f64; K]) -> [[[f64; K]; M]; 3] {
-        let (mut t, mut rest, mut scale) = ([0.0; K], [0.0; K], 1.0);
-        for i in 0..K {
-            (t[i], rest[i]) = self.parts(u[i]);
-        }
-        let mut derivatives = self.hodographs.rates_at_each(&t, &rest);
-        for derivative in &mut derivatives {
-            scale *= self.per_width;
-            for k in 0..M {
-                for i in 0..K {
-                    derivative[k][i] *= scale;
-                }
-            }
-        }
-        derivatives
+    pub fn polynomial_derivatives<T: Number>(&self, u: T) -> [[T; M]; 3] {
+        let (t, rest) = (u * self.per_width, (u.filled(self.width) - u) * self.per_width);
+        by_width(self.hodographs.polynomial_rates(t, rest), self.per_width)
     }
 
     /// What the rounding of the first three derivatives is relative to.
@@ -394,12 +383,12 @@ pub fn sagitta(bend: f64, step: f64) -> f64 {
 
 /// Derivatives by t to those by u.
 #[inline(always)]
-fn by_width<const M: usize>(mut derivatives: [[f64; M]; 3], per_width: f64) -> [[f64; M]; 3] {
+fn by_width<const M: usize, T: Number>(mut derivatives: [[T; M]; 3], per_width: f64) -> [[T; M]; 3] {
     let mut scale = 1.0;
     for derivative in &mut derivatives {
         scale *= per_width;
         for x in derivative {
-            *x *= scale;
+            *x = *x * scale;
         }
     }
     derivatives

@@ -5,6 +5,7 @@
 
 use fearless_simd::{dispatch, Level};
 
+use super::number::Number;
 use super::polygon::{Polygon, MOST};
 use super::vectors::{from_to, inner, length, vector_of};
 
@@ -174,22 +175,16 @@ impl<const M: usize> Hodographs<M> {
             let [_, rates @ ..] = self.local::<4>(t, rest);
             return rates;
         }
-        let mut rates = [[0.0; M]; 3];
+        self.polynomial_rates(t, rest)
+    }
+
+    /// The same of a piece without weights, at one t or at several.
+    #[inline(always)]
+    pub fn polynomial_rates<T: Number>(&self, t: T, rest: T) -> [[T; M]; 3] {
+        let mut rates = [[t.filled(0.0); M]; 3];
         with_degree!(self.degree, n, {
             for order in 1..=n.min(3) {
                 rates[order - 1] = sum(&self.rows[order][..=n - order], t, rest);
-            }
-        });
-        rates
-    }
-
-    /// The first three derivatives by t of each axis at several t, of a piece without weights.
-    #[inline(always)]
-    pub fn rates_at_each<const K: usize>(&self, t: &[f64; K], rest: &[f64; K]) -> [[[f64; K]; M]; 3] {
-        let mut rates = [[[0.0; K]; M]; 3];
-        with_degree!(self.degree, n, {
-            for order in 1..=n.min(3) {
-                rates[order - 1] = sum_at_each(&self.rows[order][..=n - order], t, rest);
             }
         });
         rates
@@ -218,10 +213,13 @@ impl<const M: usize> Hodographs<M> {
 
 /// Σ rows_i t^i rest^(n − i).
 #[inline(always)]
-fn sum<const M: usize>(rows: &[[f64; M]], t: f64, rest: f64) -> [f64; M] {
-    let (mut value, mut power) = (rows[0], 1.0);
+fn sum<const M: usize, T: Number>(rows: &[[f64; M]], t: T, rest: T) -> [T; M] {
+    let (mut value, mut power) = ([t; M], t.filled(1.0));
+    for k in 0..M {
+        value[k] = t.filled(rows[0][k]);
+    }
     for row in &rows[1..] {
-        power *= t;
+        power = power * t;
         for k in 0..M {
             value[k] = value[k] * rest + power * row[k];
         }

@@ -147,17 +147,17 @@ impl<const M: usize> PhaseByLength<M> {
     }
 
     /// What is known of the places between two, in the order of travel; nothing where |C'| has no bound.
-    pub fn bulge(&self, [from, to]: [&Place; 2], [near, far]: [&Station<M>; 2]) -> Option<Bulge> {
+    pub fn bulge(&self, [from, to]: [&Place; 2], [near, far]: [&Station<M>; 2]) -> Option<Bulge<f64>> {
         let most = |a: &[f64; M], b: &[f64; M]| inner(a, a).max(inner(b, b)).sqrt();
         let known = Known {
             interval: to.u - from.u,
             slopes: [near.slope.min(far.slope), near.slope.max(far.slope)],
             second: most(&near.second, &far.second),
             third: most(&near.third, &far.third),
-            paces: [&from.pace, &to.pace],
-            way: (to.way - from.way).abs(),
+            paces: self.speed.bounds([&from.pace, &to.pace], (to.way - from.way).abs()),
         };
-        bulge(self.curve.bounds(), &self.speed, &known)
+        let bulge = bulge(self.curve.bounds(), &known);
+        (bulge.slope > 0.0).then_some(bulge)
     }
 }
 

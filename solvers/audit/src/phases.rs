@@ -1,5 +1,7 @@
 //! The phases of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
+use std::ops::Range;
+
 use super::columns::Columns;
 use super::curve::Followed;
 use super::phase_by_length::PhaseByLength;
@@ -79,6 +81,18 @@ impl Phases<'_> {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.piece.is_empty()
+    }
+
+    /// Phases that follow each other on one piece, so many at most.
+    pub fn groups(&self, among: Range<usize>, most: usize) -> Vec<Range<usize>> {
+        let (mut groups, mut start) = (Vec::new(), among.start);
+        for i in among.start + 1..=among.end {
+            if i == among.end || i - start == most || self.piece[i] != self.piece[start] {
+                groups.push(start..i);
+                start = i;
+            }
+        }
+        groups
     }
 
     /// Whether the phases are those of the runs of a path, with good numbers on so many axes or joints.

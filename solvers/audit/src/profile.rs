@@ -7,6 +7,8 @@
 mod at_once;
 mod by_length;
 
+use std::ops::Range;
+
 use super::chord::chord_error;
 use super::columns::{Columns, CHORD};
 use super::parallel;
@@ -18,7 +20,7 @@ use super::speed_by_length::is_same_speed;
 use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
-use at_once::{Places, PLACES};
+use at_once::{Part, Places, PHASES, PLACES};
 use by_length::{Look, Looker};
 
 /// Even intervals of a phase.
@@ -43,7 +45,7 @@ const MOST_HALVINGS: u32 = 200;
 /// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
 
-/// One of so many phases is looked at before all others: of what they use of the limits most phases use less.
+/// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less.
 const FIRST: usize = 16;
 
 /// What is measured on which path.
@@ -64,28 +66,39 @@ pub fn audit_profile<'a, const M: usize>(
 ) -> Tally<M> {
     let phases = of.phases;
     let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
-        let mut columns = columns();
+        let (mut columns, mut open) = (columns(), Vec::new());
         let (first, count) = (block.start, columns.count());
         let good = |i: usize| phases.has_good_numbers(i, count);
-        for i in block.clone().step_by(FIRST) {
-            of.phase(i, &mut columns, &mut None, tally);
+        let groups = phases.groups(block, PHASES);
+        for group in groups.iter().step_by(FIRST) {
+            let times = of.at_once(group, &mut columns, &mut open, tally);
+            for (i, time) in group.clone().zip(times) {
+                of.phase((i, time), &mut columns, &mut None, tally);
+            }
         }
         let (mut is_good, mut last) = (first > 0 && good(first - 1), None);
         let begun = phases.runs.partition_point(|&begin| begin < first as i64);
         let mut runs = phases.runs[begun..].iter().peekable();
-        for i in block {
-            tell(seen, i);
-            let is_known = (i - first).is_multiple_of(FIRST);
-            let found = if is_known { good(i) } else { of.phase(i, &mut columns, &mut last, tally) };
-            let was_good = std::mem::replace(&mut is_good, found);
-            // Of runs without a phase several begin at once.
-            let mut begins = false;
-            while runs.next_if_eq(&&(i as i64)).is_some() {
-                begins = true;
-            }
-            // What has no good numbers is reported with the phase itself.
-            if i > 0 && was_good && is_good && !begins {
-                of.joint([i - 1, i], &mut columns, tally);
+        for (number, group) in groups.into_iter().enumerate() {
+            let is_known = number.is_multiple_of(FIRST);
+            let times = match is_known {
+                true => [None; PHASES],
+                false => of.at_once(&group, &mut columns, &mut open, tally),
+            };
+            for (i, time) in group.zip(times) {
+                tell(seen, i);
+                let found =
+                    if is_known { good(i) } else { of.phase((i, time), &mut columns, &mut last, tally) };
+                let was_good = std::mem::replace(&mut is_good, found);
+                // Of runs without a phase several begin at once.
+                let mut begins = false;
+                while runs.next_if_eq(&&(i as i64)).is_some() {
+                    begins = true;
+                }
+                // What has no good numbers is reported with the phase itself.
+                if i > 0 && was_good && is_good && !begins {
+                    of.joint([i - 1, i], &mut columns, tally);
+                }
             }
         }
     });
@@ -95,11 +108,11 @@ pub fn audit_profile<'a, const M: usize>(
 }
 
 impl<const M: usize> Audited<'_, M> {
-    /// A phase; whether its numbers, taken alone, can be measured. `last` is the station at the end of the one before, with its
-    /// piece.
+    /// A phase, with its time where it cannot change the tally; whether its numbers, taken alone, can be measured. `last` is the station
+    /// at the end of the one before, with its piece.
     fn phase(
         &self,
-        i: usize,
+        (i, known): (usize, Option<f64>),
         columns: &mut Columns<M>,
         last: &mut Option<(usize, Station<M>)>,
         tally: &mut Tally<M>,
@@ -113,12 +126,12 @@ impl<const M: usize> Audited<'_, M> {
         }
         let width = columns.path.width[piece];
         let u = [phases.u0[i], phases.u1[i]];
-        if u[1] <= u[0] || u[0] < 0.0 || u[1] > width * (1.0 + ROUNDINGS * EPS) {
+        if !is_order(u, width) {
             tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
             return true;
         }
         let width_rounding = EPS * width / (u[1] - u[0]);
-        if let Some(elapsed) = self.at_once(i, columns, tally) {
+        if let Some(elapsed) = known {
             tally.samples += PLACES as u64;
             *last = None;
             self.duration(i, [elapsed, 0.0], width_rounding, line, tally);
@@ -185,25 +198,38 @@ impl<const M: usize> Audited<'_, M> {
         true
     }
 
-    /// The time of a phase that cannot change the tally, where eight places of it and a bound of what lies between show that.
-    fn at_once(&self, i: usize, columns: &mut Columns<M>, tally: &Tally<M>) -> Option<f64> {
-        let (phases, piece) = (self.phases, self.phases.piece[i] as usize);
-        if !columns.are_axes() || phases.kind[i] == PATH_JERK || !phases.is_by_length(i, columns) {
-            return None;
+    /// The times of those phases of a group that cannot change the tally, where eight places of each and a bound of what lies between
+    /// show that.
+    fn at_once(
+        &self,
+        group: &Range<usize>,
+        columns: &mut Columns<M>,
+        open: &mut Vec<Part>,
+        tally: &Tally<M>,
+    ) -> [Option<f64>; PHASES] {
+        let (phases, piece) = (self.phases, self.phases.piece[group.start] as usize);
+        if !columns.are_axes() || piece >= phases.pieces {
+            return [None; PHASES];
         }
         let curve = columns.curve(piece).clone();
         if curve.polygon.is_rational() {
-            return None;
+            return [None; PHASES];
         }
-        let phase = at_once::Phase {
-            u: [phases.u0[i], phases.u1[i]],
-            p: [phases.p0[i], phases.p1[i]],
-            a: [phases.a0[i], phases.a1[i]],
-            held_sq: (phases.kind[i] == FEED).then(|| phases.value[i]),
-        };
+        let mut looked_at = [None; PHASES];
+        for (i, phase) in group.clone().zip(&mut looked_at) {
+            let u = [phases.u0[i], phases.u1[i]];
+            let is_cubic = phases.kind[i] != PATH_JERK && phases.is_by_length(i, columns);
+            *phase = (is_cubic && phases.has_good_numbers(i, columns.count()) && is_order(u, curve.width()))
+                .then(|| at_once::Phase {
+                    u,
+                    p: [phases.p0[i], phases.p1[i]],
+                    a: [phases.a0[i], phases.a1[i]],
+                    held_sq: (phases.kind[i] == FEED).then(|| phases.value[i]),
+                });
+        }
         let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
         let places = Places { curve: &curve, columns, limits: self.limits, feeds, feeds_along };
-        places.time(&phase, tally)
+        places.times(&looked_at, open, tally)
     }
 
     /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share
@@ -401,6 +427,11 @@ impl<const M: usize> Audited<'_, M> {
             self.jerks(columns).rest(i, side == 1, line, tally);
         }
     }
+}
+
+/// Whether the ends of a phase are in order on a piece of this width.
+fn is_order([from, to]: [f64; 2], width: f64) -> bool {
+    from < to && 0.0 <= from && to <= width * (1.0 + ROUNDINGS * EPS)
 }
 
 /// Walks one phase and offers what it meets.

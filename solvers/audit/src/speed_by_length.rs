@@ -6,6 +6,7 @@
 
 use fearless_simd::{dispatch, Level};
 
+use super::number::Number;
 use super::quadrature::{integral, MOST_HALVINGS};
 use super::{EPS, ROUNDINGS};
 
@@ -14,10 +15,10 @@ const MOST_STEPS: u32 = 1100;
 
 /// Speed, acceleration and jerk along the path, in mm and s.
 #[derive(Clone, Copy, Debug)]
-pub struct Pace {
-    pub v: f64,
-    pub a: f64,
-    pub j: f64,
+pub struct Pace<T = f64> {
+    pub v: T,
+    pub a: T,
+    pub j: T,
 }
 
 /// The speed along a phase, counted from its anchor: where that is the end, time runs back.
@@ -79,39 +80,49 @@ impl SpeedByLength {
 
     /// Bounds of v, a and j and of their derivatives by the length between two places that are so long a way apart, in the order
     /// of travel: v' = a/v, a' = j/v.
-    pub fn bounds(&self, [from, to]: [&Pace; 2], way: f64) -> [Bounds; 3] {
-        let (slowest, v, a, j, j1, j2);
+    pub fn bounds(&self, [from, to]: [&Pace; 2], way: f64) -> [Bounds<f64>; 3] {
         match self {
-            Self::Constant { speed } => return [[*speed, 0.0, 0.0], [0.0; 3], [0.0; 3]].map(Bounds),
+            Self::Constant { speed } => [[*speed, 0.0, 0.0], [0.0; 3], [0.0; 3]].map(Bounds),
             // v between its coefficients in Bernstein form by time, a linear.
             Self::Jerk { start: Pace { j: constant, .. }, .. } => {
                 let gained = 0.5 * from.a * (to.a - from.a) / constant;
                 let inner = from.v + if gained.is_finite() { gained } else { 0.0 };
-                slowest = from.v.min(inner).min(to.v);
-                v = from.v.max(inner).max(to.v);
-                a = from.a.abs().max(to.a.abs());
-                (j, j1, j2) = (constant.abs(), 0.0, 0.0);
+                let (slowest, v) = (from.v.min(inner).min(to.v), from.v.max(inner).max(to.v));
+                let a = from.a.abs().max(to.a.abs());
+                bounds_from(slowest, [v, a], [constant.abs(), 0.0, 0.0])
             }
-            // The same of v² and a by the length; j/v is linear in it.
-            Self::Cubic { .. } => {
-                let third = 2.0 / 3.0 * way;
-                let ends = [from.v * from.v, to.v * to.v];
-                let inner = [ends[0] + third * from.a, ends[1] - third * to.a];
-                slowest = ends[0].min(inner[0]).min(inner[1]).min(ends[1]).max(0.0).sqrt();
-                v = ends[0].max(inner[0]).max(inner[1]).max(ends[1]).sqrt();
-                a = from.a.abs().max(((inner[1] - inner[0]) / third).abs()).max(to.a.abs());
-                let rates = [from.j / from.v, to.j / to.v];
-                let (rate, slope) = (rates[0].abs().max(rates[1].abs()), (rates[1] - rates[0]).abs() / way);
-                j = rate * v;
-                j1 = rate * a / slowest + slope * v;
-                j2 = rate * (rate + a * a / (slowest * slowest)) / slowest + 2.0 * slope * a / slowest;
-            }
+            Self::Cubic { .. } => cubic_bounds([from, to], way),
         }
-        let per = 1.0 / slowest;
-        let v = Bounds([v, a * per, (j + a * a * per) * per * per]);
-        let a = Bounds([a, j * per, (j1 + j * a * per * per) * per]);
-        [v, a, Bounds([j, j1, j2])]
     }
+}
+
+/// The same where v² is a cubic of the length: v² and a between their coefficients in Bernstein form by the length, in which j/v is
+/// linear.
+#[inline(always)]
+pub fn cubic_bounds<T: Number>([from, to]: [&Pace<T>; 2], way: T) -> [Bounds<T>; 3] {
+    let third = way * (2.0 / 3.0);
+    let ends = [from.v * from.v, to.v * to.v];
+    let inner = [ends[0] + third * from.a, ends[1] - third * to.a];
+    let least = ends[0].smaller(inner[0]).smaller(inner[1].smaller(ends[1]));
+    let most = ends[0].greater(inner[0]).greater(inner[1].greater(ends[1]));
+    let (slowest, v) = (least.greater(way.filled(0.0)).root(), most.root());
+    let a = from.a.size().greater(((inner[1] - inner[0]) / third).size()).greater(to.a.size());
+    let rates = [from.j / from.v, to.j / to.v];
+    let (rate, slope) = (rates[0].size().greater(rates[1].size()), (rates[1] - rates[0]).size() / way);
+    let per = way.filled(1.0) / slowest;
+    let gained = a * per;
+    let j1 = rate * gained + slope * v;
+    let j2 = rate * (rate + gained * gained) * per + slope * gained * 2.0;
+    bounds_from(slowest, [v, a], [rate * v, j1, j2])
+}
+
+/// From the least speed, the greatest speed and acceleration, and the greatest jerk with its derivatives by the length.
+#[inline(always)]
+fn bounds_from<T: Number>(slowest: T, [v, a]: [T; 2], [j, j1, j2]: [T; 3]) -> [Bounds<T>; 3] {
+    let per = slowest.filled(1.0) / slowest;
+    let v = Bounds([v, a * per, (j + a * a * per) * per * per]);
+    let a = Bounds([a, j * per, (j1 + j * a * per * per) * per]);
+    [v, a, Bounds([j, j1, j2])]
 }
 
 /// Whether a recorded speed is the same as another one: the rounding of the velocities is at least twice this part of them.
@@ -121,17 +132,19 @@ pub fn is_same_speed(speed: f64, recorded: f64) -> bool {
 
 /// Bounds of the size of a function and of its first two derivatives.
 #[derive(Clone, Copy, Debug)]
-pub struct Bounds(pub [f64; 3]);
+pub struct Bounds<T>(pub [T; 3]);
 
-impl Bounds {
+impl<T: Number> Bounds<T> {
     /// Of a product.
+    #[inline(always)]
     pub fn times(self, Self(b): Self) -> Self {
         let Self(a) = self;
-        Self([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + 2.0 * a[1] * b[1] + a[2] * b[0]])
+        Self([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[1] * b[1] * 2.0 + a[2] * b[0]])
     }
 
     /// By a variable in which that of the function has these first two derivatives.
-    pub fn at(self, first: f64, second: f64) -> Self {
+    #[inline(always)]
+    pub fn at(self, first: T, second: T) -> Self {
         let Self([f, f1, f2]) = self;
         Self([f, f1 * first, f2 * first * first + f1 * second])
     }

@@ -1,35 +1,39 @@
-//! Tells whether a phase can change what was found: from eight places of it at once, in the vectors of the processor.
+//! Tells which of some phases of a piece can change what was found: eight phases at once, in the vectors of the processor.
 //!
-//! The places are the nodes of Lobatto's rule of eight points (Abramowitz and Stegun 25.4.32), both ends among them. |C'| there gives
-//! the lengths up to all of them by the polynomial through them, v² by the length gives speed, acceleration and jerk along the path,
-//! the derivatives of C those of all axes. Where no place uses more of a limit than was found before, nor a parabola between two of
-//! them and the polynomial half-way, nothing needs to be looked at closer. As in `by_length`, of which these are fewer places,
+//! Each is looked at in eight places, the nodes of Lobatto's rule (Abramowitz and Stegun 25.4.32), both ends among them. |C'| there
+//! gives the lengths up to all of them by the polynomial through them, v² by the length gives speed, acceleration and jerk along the
+//! path, the derivatives of C those of all axes. Where no place uses more of a limit than was found before, nor a parabola between two
+//! of them and the polynomial half-way, nothing needs to be looked at closer. As in `by_length`, of which these are fewer places,
 //! `bulge` bounds what lies between two: where that is much above both, both halves are looked at instead. Where more of a limit is
 //! used, `by_length` looks.
 
-use fearless_simd::{dispatch, Level};
+use fearless_simd::{dispatch, f64x8, mask64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use crate::bulge::{bulge, Known};
 use crate::chord::chord_error;
 use crate::columns::{Columns, RATES};
 use crate::curve::Curve;
-use crate::speed_by_length::{is_same_speed, Pace, SpeedByLength};
+use crate::number::Number;
+use crate::speed_by_length::{cubic_bounds, is_same_speed, Pace, SpeedByLength};
 use crate::{Check, Limits, Tally, FEEDS};
 
 use super::by_length::WIDE;
 
+/// Phases that are looked at at once.
+pub const PHASES: usize = 8;
+
 /// Places of a phase.
 pub const PLACES: usize = 8;
 
-/// A number at each place.
-type Lanes = [f64; PLACES];
+/// A number of each phase.
+type Lanes = [f64; PHASES];
 
 /// Where the places are: from −1 at the start of the phase to 1 at its end; and in parts of the phase.
-const NODES: Lanes = {
+const NODES: [f64; PLACES] = {
     let [a, b, c] = [0.209_299_217_902_478_88, 0.591_700_181_433_142_3, 0.871_740_148_509_606_6];
     [-1.0, -c, -b, -a, a, b, c, 1.0]
 };
-const SHARES: Lanes = {
+const SHARES: [f64; PLACES] = {
     let (mut shares, mut i) = (NODES, 0);
     while i < PLACES {
         shares[i] = 0.5 * (1.0 + NODES[i]);
@@ -41,13 +45,13 @@ const SHARES: Lanes = {
 /// What the values at the places make of a function, by the polynomials that are 1 at one of some places and 0 at the others.
 struct Weights {
     /// Of the integrals from the start up to each place, a row for each value. The last column is Lobatto's rule, good to degree 13.
-    up_to: [Lanes; PLACES],
+    up_to: [[f64; PLACES]; PLACES],
     /// Of the values half-way to the next place; at the last place of its own.
-    between: [Lanes; PLACES],
+    between: [[f64; PLACES]; PLACES],
     /// Of the integral over the first half, less half of the whole one: of what is odd about the middle.
-    odd: Lanes,
+    odd: [f64; PLACES],
     /// Of the greatest change that a value makes half-way between two places, against the polynomial through the others.
-    last: Lanes,
+    last: [f64; PLACES],
 }
 
 const fn weights<const N: usize>(places: [usize; N]) -> Weights {
@@ -99,7 +103,7 @@ const fn weights<const N: usize>(places: [usize; N]) -> Weights {
 }
 
 /// Σ c_i x^(i + 1) / (i + 1).
-const fn primitive(c: &Lanes, x: f64) -> f64 {
+const fn primitive(c: &[f64; PLACES], x: f64) -> f64 {
     let (mut sum, mut i) = (0.0, PLACES);
     while i > 0 {
         i -= 1;
@@ -141,33 +145,34 @@ pub struct Phase {
     pub held_sq: Option<f64>,
 }
 
-/// The speed on a phase, and its length.
-type Law = (SpeedByLength, f64);
-
-/// What eight places of a part show: that it changes nothing, with its time and its length; that fewer of it may show that, with the
-/// law if the length is known; or that it has to be looked at closer.
-enum Found {
-    Nothing([f64; 2]),
-    Open(Option<Law>),
-    More,
+/// A part of a phase, which has this number among those that are looked at. What is not known of it is no number.
+#[derive(Clone, Copy)]
+pub struct Part {
+    number: usize,
+    u: [f64; 2],
+    /// The lengths from the start of the phase up to both ends.
+    ends: [f64; 2],
+    /// v² at both ends of the phase, and its length.
+    speed_sq: [f64; 2],
+    whole: f64,
+    halvings: u32,
 }
 
-impl Phase {
-    /// The speed where the squares of |C'| at both ends and the length are known; nothing next to rest, and where both records of
-    /// a speed that is held differ by more than rounding.
-    fn speed(&self, square: [f64; 2], length: f64) -> Option<SpeedByLength> {
-        let recorded = [square[0] * self.p[0], square[1] * self.p[1]];
-        let is_held = |sq: f64| recorded.iter().all(|recorded| is_same_speed(sq.sqrt(), recorded.sqrt()));
-        let [from, to] = match self.held_sq {
-            Some(sq) if !is_held(sq) => return None,
-            Some(sq) => [sq; 2],
-            None => recorded,
-        };
-        (from.min(to) > SLOW_SQ * from.max(to)).then(|| SpeedByLength::cubic([from, to], self.a, length))
-    }
+/// What eight places of a part show: that it changes nothing; that fewer of it may show that; or that it has to be looked at closer.
+const NOTHING: f64 = 0.0;
+const OPEN: f64 = 1.0;
+const MORE: f64 = 2.0;
+
+/// The same of each part, with its time, its length, and v² at both ends and the length of its phase, each where that is known.
+struct Found {
+    verdict: Lanes,
+    time: Lanes,
+    length: Lanes,
+    speed_sq: [Lanes; 2],
+    whole: Lanes,
 }
 
-/// What holds on the piece of a phase.
+/// What holds on the piece of the phases.
 pub struct Places<'a, 'b, const M: usize> {
     pub curve: &'a Curve<M>,
     pub columns: &'a Columns<'b, M>,
@@ -177,290 +182,395 @@ pub struct Places<'a, 'b, const M: usize> {
 }
 
 impl<const M: usize> Places<'_, '_, M> {
-    /// The time of a phase that cannot change the tally, by its law.
-    pub fn time(&self, phase: &Phase, tally: &Tally<M>) -> Option<f64> {
-        self.part(phase, (phase.u, 0.0), (None, MOST_HALVINGS), tally).map(|[time, _]| time)
+    /// The times of those phases that cannot change the tally, by their laws. `open` is memory for parts of them.
+    pub fn times(
+        &self,
+        phases: &[Option<Phase>; PHASES],
+        open: &mut Vec<Part>,
+        tally: &Tally<M>,
+    ) -> [Option<f64>; PHASES] {
+        let mut times = [None; PHASES];
+        let Some(any) = phases.iter().flatten().next() else { return times };
+        let none = [f64::NAN; 2];
+        let (ends, halvings) = ([0.0, f64::NAN], MOST_HALVINGS);
+        let whole = Part { number: 0, u: any.u, ends, speed_sq: none, whole: f64::NAN, halvings };
+        let (mut parts, mut count) = ([whole; PHASES], 0);
+        let mut lanes = [any; PHASES];
+        for (number, phase) in phases.iter().enumerate() {
+            if let Some(phase) = phase {
+                parts[count] = Part { number, u: phase.u, ..whole };
+                (times[number], lanes[count], count) = (Some(0.0), phase, count + 1);
+            }
+        }
+        while count > 0 {
+            let found = dispatch!(Level::new(), simd => self.look(simd, &parts, &lanes, tally));
+            for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
+                let sum = times[part.number];
+                times[part.number] = if found.verdict[i] == NOTHING {
+                    sum.zip(part.time(phase, &found, i)).map(|(sum, time)| sum + time)
+                } else if found.verdict[i] == OPEN {
+                    sum.filter(|_| self.halve((part, phase), &found, i, open).is_some())
+                } else {
+                    None
+                };
+            }
+            count = 0;
+            while let Some(part) = if count < PHASES { open.pop() } else { None } {
+                if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
+                    (parts[count], lanes[count], count) = (part, phase, count + 1);
+                }
+            }
+        }
+        times
     }
 
-    /// The time and the length of a part of a phase, so far from the start of that, where it cannot change the tally.
-    fn part(
+    /// Adds both halves of a part that was found open.
+    fn halve(
         &self,
-        phase: &Phase,
-        (u, before): ([f64; 2], f64),
-        (law, halvings): (Option<Law>, u32),
-        tally: &Tally<M>,
-    ) -> Option<[f64; 2]> {
-        let (law, halvings) = match dispatch!(Level::new(), _simd => self.in_vectors(phase, (u, before), law, tally))
-        {
-            Found::Nothing(found) => return Some(found),
-            Found::Open(law) => (law, halvings.checked_sub(1)?),
-            Found::More => return None,
-        };
-        let law = match law {
-            Some(law) => law,
+        (part, phase): (&Part, &Phase),
+        found: &Found,
+        i: usize,
+        open: &mut Vec<Part>,
+    ) -> Option<()> {
+        let halvings = part.halvings.checked_sub(1)?;
+        let known = |x: f64| Some(x).filter(|x| !x.is_nan());
+        let length = known(found.length[i]).or_else(|| self.length(part.u, MOST_HALVINGS))?;
+        let [start, end] = part.ends(length);
+        let (speed_sq, whole) = match known(found.whole[i]) {
+            Some(whole) => (found.speed_sq.map(|lanes| lanes[i]), whole),
             None => {
-                let length = self.length(phase.u, MOST_HALVINGS)?;
-                let [from, to] = self.curve.speeds(phase.u, &[1.0; M]);
-                (phase.speed([from * from, to * to], length)?, length)
+                let square = self.curve.speeds(part.u, &[1.0; M]).map(|slope| slope * slope);
+                (phase.speed_sq(square)?, length)
             }
         };
-        let middle = 0.5 * (u[0] + u[1]);
-        let [time, length] = self.part(phase, ([u[0], middle], before), (Some(law), halvings), tally)?;
-        let rest = ([middle, u[1]], before + length);
-        let [more_time, more_length] = self.part(phase, rest, (Some(law), halvings), tally)?;
-        Some([time + more_time, length + more_length])
+        let middle = 0.5 * (part.u[0] + part.u[1]);
+        let half = |u, ends| Part { u, ends, speed_sq, whole, halvings, ..*part };
+        open.push(half([middle, part.u[1]], [f64::NAN, end]));
+        open.push(half([part.u[0], middle], [start, f64::NAN]));
+        Some(())
     }
 
     /// The length between two parameters.
     fn length(&self, [from, to]: [f64; 2], halvings: u32) -> Option<f64> {
         let width = to - from;
-        let (length, is_good) = integral(&self.curve.speeds(each(|i| from + SHARES[i] * width), &[1.0; M]));
-        if is_good {
+        let (length, doubts) =
+            integral(&self.curve.speeds(SHARES.map(|share| from + share * width), &[1.0; M]));
+        if doubts.iter().all(|&doubt| doubt <= RULES_AGREE * length) {
             return Some(length * width);
         }
         let (middle, halvings) = (0.5 * (from + to), halvings.checked_sub(1)?);
         Some(self.length([from, middle], halvings)? + self.length([middle, to], halvings)?)
     }
 
+    /// Looks at parts of phases.
     #[inline(always)]
-    fn in_vectors(
+    fn look<S: Simd>(
         &self,
-        phase: &Phase,
-        (u, before): ([f64; 2], f64),
-        law: Option<Law>,
+        simd: S,
+        parts: &[Part; PHASES],
+        phases: &[&Phase; PHASES],
         tally: &Tally<M>,
     ) -> Found {
-        let width = u[1] - u[0];
-        let [c1, c2, c3] = self.curve.derivatives_at_each(&each(|i| u[0] + SHARES[i] * width));
-        let square = inner(&c1, &c1);
-        let slope = each(|i| square[i].sqrt());
-        let slopes = [least(&slope), greatest(&slope)];
-        let (whole, is_good) = integral(&slope);
-        if slopes[0] <= STILL * self.curve.size_lengths()[0] {
-            return Found::More;
+        let all = |x: f64| f64x8::splat(simd, x);
+        let nothing = all(0.0);
+        let from = of_each(simd, parts, |part| part.u[0]);
+        let width = of_each(simd, parts, |part| part.u[1]) - from;
+        let (mut derivatives, mut slope) = ([[[nothing; M]; 3]; PLACES], [nothing; PLACES]);
+        for i in 0..PLACES {
+            derivatives[i] = self.curve.polynomial_derivatives(from + width * SHARES[i]);
+            slope[i] = inner(&derivatives[i][0], &derivatives[i][0]).sqrt();
         }
-        if !is_good {
-            return Found::Open(law);
-        }
+        let slopes = [joined(&slope, f64x8::min), joined(&slope, f64x8::max)];
+        let (share, doubts) = integral(&slope);
+        let is_good = agree(share, doubts);
+        let is_still = slopes[0].simd_le(all(STILL * self.curve.size_lengths()[0]));
+        let length = share * width;
         // The motion along the path.
-        let mut way = [0.0; PLACES];
-        for (row, slope) in ALL.up_to.iter().zip(slope) {
-            for i in 0..PLACES {
-                way[i] += row[i] * slope;
+        let ends = [0, PLACES - 1].map(|i| <[f64; PHASES]>::from(slope[i] * slope[i]));
+        let mut speed_sq = [[f64::NAN; PHASES]; 2];
+        for i in 0..PHASES {
+            let of_ends = || phases[i].speed_sq(ends.map(|square| square[i])).unwrap_or([f64::NAN; 2]);
+            let [first, last] = if parts[i].whole.is_nan() { of_ends() } else { parts[i].speed_sq };
+            (speed_sq[0][i], speed_sq[1][i]) = (first, last);
+        }
+        let known = of_each(simd, parts, |part| part.whole);
+        let unknown = is_good.select(length, all(f64::NAN));
+        let whole = known.simd_eq(known).select(known, unknown);
+        let [first, last] = speed_sq.map(|lanes| f64x8::from_slice(simd, &lanes));
+        let (twice, rise) = (whole + whole, last - first);
+        let [start_slope, end_slope] = [0, 1].map(|end| of_each(simd, phases, |phase| phase.a[end]) * twice);
+        let c = [
+            first,
+            start_slope,
+            rise * 3.0 - start_slope * 2.0 - end_slope,
+            start_slope + end_slope - rise * 2.0,
+        ];
+        let [before, after] = [0, 1].map(|end| of_each(simd, parts, |part| part.ends[end]));
+        let before = before.simd_eq(before).select(before, after - length);
+        let per_whole = 1.0 / whole;
+        let (per_slope, per_bend) = (per_whole * 0.5, per_whole * per_whole * 0.5);
+        // Speeds, squares of curvatures, and the rates of the axes.
+        let (mut v, mut slowness, mut second_sq) = ([nothing; PLACES], [nothing; PLACES], [nothing; PLACES]);
+        let (mut rates, mut third_sq) = ([[[nothing; PLACES]; M]; 3], nothing);
+        let mut paces = [Pace { v: nothing, a: nothing, j: nothing }; PLACES];
+        for i in 0..PLACES {
+            let mut way = nothing;
+            for j in 0..PLACES {
+                way += slope[j] * ALL.up_to[j][i];
             }
-        }
-        let length = whole * width;
-        let law = law.or_else(|| Some((phase.speed([square[0], square[PLACES - 1]], length)?, length)));
-        let Some((speed @ SpeedByLength::Cubic { c, .. }, total)) = law else { return Found::More };
-        let per_total = 1.0 / total;
-        let x = each(|i| (before + way[i] * width) * per_total);
-        let v = each(|i| (c[0] + x[i] * (c[1] + x[i] * (c[2] + x[i] * c[3]))).sqrt());
-        let (per_slope, per_bend) = (0.5 * per_total, 0.5 * per_total * per_total);
-        let a = each(|i| per_slope * (c[1] + x[i] * (2.0 * c[2] + x[i] * (3.0 * c[3]))));
-        let j = each(|i| per_bend * v[i] * (2.0 * c[2] + 6.0 * c[3] * x[i]));
-        let time = match integral(&each(|i| slope[i] / v[i])) {
-            (time, true) => time * width,
-            // The time of a speed that changes fast takes more places than anything else.
-            _ => speed.time(before + length) - speed.time(before),
-        };
-        if !time.is_finite() {
-            return Found::More;
-        }
-        // The derivatives by the length; see `Station`.
-        let per = each(|i| 1.0 / slope[i]);
-        let first: [Lanes; M] = axes(|k| each(|i| c1[k][i] * per[i]));
-        let (along2, along3) = (inner(&first, &c2), inner(&first, &c3));
-        let across: [Lanes; M] = axes(|k| each(|i| c2[k][i] - along2[i] * first[k][i]));
-        let across_sq = inner(&across, &across);
-        let turned = each(|i| across_sq[i] * per[i]);
-        let bent = each(|i| 3.0 * along2[i] * per[i]);
-        let (per2, per3) = (each(|i| per[i] * per[i]), each(|i| per[i] * per[i] * per[i]));
-        let second: [Lanes; M] = axes(|k| each(|i| across[k][i] * per2[i]));
-        let mut third = [[0.0; PLACES]; M];
-        for k in 0..M {
-            for i in 0..PLACES {
-                let along = (along3[i] + turned[i]) * first[k][i];
-                third[k][i] = (c3[k][i] - bent[i] * across[k][i] - along) * per3[i];
+            let x = (before + way * width) * per_whole;
+            v[i] = (c[0] + x * (c[1] + x * (c[2] + x * c[3]))).sqrt();
+            let a = per_slope * (c[1] + x * (c[2] * 2.0 + x * (c[3] * 3.0)));
+            let j = per_bend * v[i] * (c[2] * 2.0 + x * (c[3] * 6.0));
+            paces[i] = Pace { v: v[i], a, j };
+            slowness[i] = slope[i] / v[i];
+            // The derivatives by the length; see `Station`.
+            let ([c1, c2, c3], per) = (derivatives[i], 1.0 / slope[i]);
+            let (per2, square, mixed) = (per * per, v[i] * v[i], v[i] * a * 3.0);
+            let (per3, cube) = (per2 * per, square * v[i]);
+            let mut first = [nothing; M];
+            for k in 0..M {
+                first[k] = c1[k] * per;
             }
+            let (along2, along3) = (inner(&first, &c2), inner(&first, &c3));
+            let mut across = [nothing; M];
+            for k in 0..M {
+                across[k] = c2[k] - along2 * first[k];
+            }
+            let along = along3 + inner(&across, &across) * per;
+            let (bent, mut sums) = (along2 * per * 3.0, [nothing; 2]);
+            for k in 0..M {
+                let second = across[k] * per2;
+                let third = (c3[k] - bent * across[k] - along * first[k]) * per3;
+                sums[0] += second * second;
+                sums[1] += third * third;
+                rates[0][k][i] = first[k] * v[i];
+                rates[1][k][i] = first[k] * a + second * square;
+                rates[2][k][i] = first[k] * j + second * mixed + third * cube;
+            }
+            (second_sq[i], third_sq) = (sums[0], third_sq.max(sums[1]));
         }
-        let (second_sq, third_sq) = (inner(&second, &second), inner(&third, &third));
-        let curvatures = each(|i| second_sq[i].sqrt());
-        let curvature = greatest(&curvatures);
-        let pace = |i: usize| Pace { v: v[i], a: a[i], j: j[i] };
+        let (time, doubts) = integral(&slowness);
+        let time = agree(time, doubts).select(time * width, all(f64::NAN));
         let known = Known {
-            interval: LONGEST * width,
+            interval: width * LONGEST,
             slopes,
-            second: curvature,
-            third: greatest(&third_sq).sqrt(),
-            paces: [&pace(0), &pace(PLACES - 1)],
-            way: length,
+            second: joined(&second_sq, f64x8::max).sqrt(),
+            third: third_sq.sqrt(),
+            paces: cubic_bounds([&paces[0], &paces[PLACES - 1]], length),
         };
-        let Some(bulge) = bulge(self.curve.bounds(), &speed, &known) else { return Found::Open(law) };
-        // The rates of the axes.
+        let bulge = bulge(self.curve.bounds(), &known);
+        let is_bounded = bulge.slope.simd_gt(nothing);
+        let [nothing_more, open, more] = [NOTHING, OPEN, MORE].map(all);
+        let is_refused = first.simd_ne(first);
+        let mut verdict = is_bounded.select(nothing_more, open);
+        verdict = is_refused.select(more, verdict);
+        verdict = is_good.select(verdict, open);
+        verdict = is_still.select(more, verdict);
+        let mut find = |found: f64x8<S>| verdict = verdict.simd_eq(nothing).select(found, verdict);
+        // The limits of the axes.
         let (moves, judged) = (self.curve.derivative_size(), if self.limits.judges_jerk { 3 } else { 2 });
-        let (square, mixed) = (each(|i| v[i] * v[i]), each(|i| 3.0 * v[i] * a[i]));
-        let cube = each(|i| square[i] * v[i]);
         for row in (0..judged).rev() {
             let worst = tally.ratios(RATES[row]);
             let (per, per_least) = (&self.columns.rates[row][1], &self.columns.per_least[row]);
             for k in (0..M).filter(|&k| moves[k] > 0.0) {
                 // No axis is faster than the tool.
-                if row == 0 && bulge.most_speed * per_least[k] <= worst[k] {
+                if row == 0 && are_all((bulge.most_speed * per_least[k]).simd_le(all(worst[k]))) {
                     continue;
                 }
-                let (q1, q2, q3) = (&first[k], &second[k], &third[k]);
-                let rate = match row {
-                    0 => each(|i| q1[i] * v[i]),
-                    1 => each(|i| q1[i] * a[i] + q2[i] * square[i]),
-                    _ => each(|i| q1[i] * j[i] + q2[i] * mixed[i] + q3[i] * cube[i]),
-                };
-                let off = bulge.rates[row] * per_least[k];
-                match is_below(&rate, |rate| rate * per.of(k, rate), off, worst[k]) {
-                    Some(true) => {}
-                    Some(false) => return Found::More,
-                    None => return Found::Open(law),
-                }
+                let [positive, negative] = [per.positive[k], per.negative[k]].map(all);
+                let use_of = |rate: f64x8<S>| rate * rate.simd_lt(nothing).select(negative, positive);
+                find(verdict_of(&rates[row][k], use_of, bulge.rates[row] * per_least[k], worst[k]));
             }
         }
         let worst = |check: Check| tally.get(check, 0).ratio;
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
             let (per, worst) = (1.0 / limit, worst(Check::Feed));
             // No share of the speed along the path is greater than that speed.
-            if bulge.most_speed * per <= worst {
+            if are_all((bulge.most_speed * per).simd_le(all(worst))) {
                 continue;
             }
             let mut speed = v;
             if !self.feeds_along[feed] {
-                let counted = axes(|k| each(|i| self.limits.feed_axes[feed][k] * first[k][i]));
-                let square = inner::<M>(&counted, &counted);
-                speed = each(|i| square[i].sqrt() * v[i]);
+                for i in 0..PLACES {
+                    let mut square = nothing;
+                    for k in 0..M {
+                        let counted = rates[0][k][i] * self.limits.feed_axes[feed][k];
+                        square += counted * counted;
+                    }
+                    speed[i] = square.sqrt();
+                }
             }
-            match is_below(&speed, |v| v * per, bulge.rates[0] * per, worst) {
-                Some(true) => {}
-                Some(false) => return Found::More,
-                None => return Found::Open(law),
-            }
+            find(verdict_of(&speed, |v| v * per, bulge.rates[0] * per, worst));
         }
         if self.limits.chord_tolerance.is_finite() {
-            let known = worst(Check::Chord) * self.limits.chord_tolerance;
-            let most = |fastest: f64, curvature: f64| {
+            let most = all(worst(Check::Chord) * self.limits.chord_tolerance);
+            let is_low = |fastest: f64x8<S>, curvature_sq: f64x8<S>| {
                 let fastest = (fastest + bulge.rates[0]).min(bulge.most_speed);
-                chord_error(fastest * self.limits.period, curvature + bulge.curvature)
+                chord_error(fastest * self.limits.period, curvature_sq.sqrt() + bulge.curvature).simd_le(most)
             };
-            // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
-            let greater = |of: &Lanes, i: usize| of[i].max(of[i + 1]);
-            let is_low = |i: usize| most(greater(&v, i), greater(&curvatures, i)) <= known;
-            let is_all_low = most(bulge.most_speed, curvature) <= known;
-            if !is_all_low && !(0..PLACES - 1).all(is_low) {
-                return Found::Open(law);
+            let mut are_low = is_low(bulge.most_speed, joined(&second_sq, f64x8::max));
+            if !are_all(are_low) {
+                // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
+                let step = |i: usize| is_low(v[i].max(v[i + 1]), second_sq[i].max(second_sq[i + 1]));
+                are_low = (1..PLACES - 1).fold(step(0), |low, i| low & step(i)) | are_low;
             }
+            find(are_low.select(nothing, open));
         }
-        Found::Nothing([time, length])
+        Found {
+            verdict: verdict.into(),
+            time: time.into(),
+            length: unknown.into(),
+            speed_sq,
+            whole: whole.into(),
+        }
     }
 }
 
-/// Whether the uses of a limit at the places are no more than the `worst`, and those between, which are off the straight line from
-/// place to place by no more than `off`: by that bound, or by a parabola through two places and the polynomial half-way between
-/// those; see `peak`. None where only that of the places is known.
+impl Phase {
+    /// v² at both ends, where the squares of |C'| there are known; nothing next to rest, and where both records of a speed that is held
+    /// differ by more than rounding.
+    fn speed_sq(&self, square: [f64; 2]) -> Option<[f64; 2]> {
+        let recorded = [square[0] * self.p[0], square[1] * self.p[1]];
+        let is_held = |sq: f64| recorded.iter().all(|recorded| is_same_speed(sq.sqrt(), recorded.sqrt()));
+        let [from, to] = match self.held_sq {
+            Some(sq) if !is_held(sq) => return None,
+            Some(sq) => [sq; 2],
+            None => recorded,
+        };
+        (from.min(to) > SLOW_SQ * from.max(to)).then_some([from, to])
+    }
+}
+
+impl Part {
+    /// The lengths from the start of the phase up to both ends of the part, whose length is known.
+    fn ends(&self, length: f64) -> [f64; 2] {
+        match self.ends {
+            [start, end] if start.is_nan() => [end - length, end],
+            [start, _] => [start, start + length],
+        }
+    }
+
+    /// The time of a part that changes nothing. That of a speed that changes fast takes more places than anything else.
+    fn time(&self, phase: &Phase, found: &Found, i: usize) -> Option<f64> {
+        let mut time = found.time[i];
+        if time.is_nan() {
+            let speed = SpeedByLength::cubic(found.speed_sq.map(|lanes| lanes[i]), phase.a, found.whole[i]);
+            let [start, end] = self.ends(found.length[i]);
+            time = speed.time(end) - speed.time(start);
+        }
+        time.is_finite().then_some(time)
+    }
+}
+
+/// What the uses of a limit at the places say, where nothing between two of them is off the straight line from place to place by more
+/// than `off`: by that bound, or by a parabola through two places and the polynomial half-way between those; see `peak`.
 #[inline(always)]
-fn is_below(rate: &Lanes, use_of: impl Fn(f64) -> f64, off: f64, worst: f64) -> Option<bool> {
-    let used = each(|i| use_of(rate[i]));
-    let (mut are_certain, mut are_below) = (true, true);
+fn verdict_of<S: Simd>(
+    rate: &[f64x8<S>; PLACES],
+    use_of: impl Fn(f64x8<S>) -> f64x8<S>,
+    off: f64x8<S>,
+    worst: f64,
+) -> f64x8<S> {
+    let all = |x: f64| f64x8::splat(off.simd, x);
+    let (most, mut used, mut sum) = (all(worst), *rate, all(0.0));
     for i in 0..PLACES {
-        are_certain &= used[i].abs() + off <= worst;
-        are_below &= used[i].abs() <= worst;
+        used[i] = use_of(rate[i]);
+        // A number that is none does not get lost in sums.
+        sum += used[i];
     }
-    let is_narrow = off <= WIDE;
-    if are_certain || !are_below || !is_narrow {
-        return if are_below && !are_certain { None } else { Some(are_below) };
+    let greatest = joined(&used.map(|used| used.abs()), f64x8::max);
+    let are_below = greatest.simd_le(most) & (sum * 0.0).simd_eq(all(0.0));
+    let are_certain = are_below & (greatest + off).simd_le(most);
+    let verdict = are_certain.select(all(NOTHING), are_below.select(all(OPEN), all(MORE)));
+    let are_narrow = are_below & !are_certain & off.simd_le(all(WIDE));
+    if !is_any(are_narrow) {
+        return verdict;
     }
-    let (mut middle, mut last) = ([0.0; PLACES], 0.0);
+    let mut last = all(0.0);
     for j in 0..PLACES {
-        last += ALL.last[j] * rate[j];
-        for i in 0..PLACES {
-            middle[i] += ALL.between[j][i] * rate[j];
+        last += rate[j] * ALL.last[j];
+    }
+    let doubt = use_of(last).abs();
+    let limit = most - doubt;
+    let mut are_low = are_narrow;
+    for i in 0..PLACES - 1 {
+        let mut middle = all(0.0);
+        for j in 0..PLACES {
+            middle += rate[j] * ALL.between[j][i];
         }
-    }
-    let (between, doubt) = (each(|i| use_of(middle[i])), use_of(last).abs());
-    let next = each(|i| used[(i + 1).min(PLACES - 1)]);
-    let bend = each(|i| 2.0 * between[i] - used[i] - next[i]);
-    let mut are_far_below = true;
-    for i in 0..PLACES {
-        are_far_below &= between[i].abs() + 1.5 * bend[i].abs() + doubt <= worst;
-    }
-    if are_far_below {
-        return Some(true);
-    }
-    let (most, per_worst) = (worst - doubt, 1.0 / worst);
-    for i in 0..PLACES {
-        let slope = next[i] - used[i];
-        let top = (between[i] + slope * slope / (8.0 * bend[i])).abs() + bend[i] * bend[i] * per_worst;
-        are_below &= (top <= most) | (slope.abs() >= 2.0 * bend[i].abs());
-    }
-    are_below.then_some(true)
-}
-
-/// The integral over the phase, its width being 1, and whether the rules agree.
-#[inline(always)]
-fn integral(f: &Lanes) -> (f64, bool) {
-    let by = |weights: Lanes| joined(each(|i| weights[i] * f[i]), |a, b| a + b);
-    let rule = |of: &Weights| each(|i| of.up_to[i][PLACES - 1]);
-    let whole = by(rule(&ALL));
-    let [lower, lowest] = [&LOWER, &LOWEST].map(|of| (by(rule(of)) - whole).abs());
-    let (odd, most) = (by(each(|i| ALL.odd[i] - LOWER.odd[i])).abs(), RULES_AGREE * whole);
-    (whole, lower <= most && odd <= most && CHANCE * lowest <= most)
-}
-
-#[inline(always)]
-fn each(number: impl Fn(usize) -> f64) -> Lanes {
-    let mut lanes = [0.0; PLACES];
-    for i in 0..PLACES {
-        lanes[i] = number(i);
-    }
-    lanes
-}
-
-#[inline(always)]
-fn axes<const M: usize>(lanes: impl Fn(usize) -> Lanes) -> [Lanes; M] {
-    let mut of_axes = [[0.0; PLACES]; M];
-    for k in 0..M {
-        of_axes[k] = lanes(k);
-    }
-    of_axes
-}
-
-#[inline(always)]
-fn inner<const M: usize>(a: &[Lanes; M], b: &[Lanes; M]) -> Lanes {
-    let mut sum = [0.0; PLACES];
-    for k in 0..M {
-        for i in 0..PLACES {
-            sum[i] += a[k][i] * b[k][i];
+        let between = use_of(middle);
+        let bend = between * 2.0 - used[i] - used[i + 1];
+        let are_far_below = (between.abs() + bend.abs() * 1.5).simd_le(limit);
+        if are_all(are_far_below) {
+            continue;
         }
+        let slope = used[i + 1] - used[i];
+        let top = (between + slope * slope / (bend * 8.0)).abs() + bend * bend / most;
+        let is_flat = top.simd_le(limit) | slope.abs().simd_ge(bend.abs() * 2.0);
+        are_low = are_low & (are_far_below | is_flat);
+    }
+    are_low.select(all(NOTHING), verdict)
+}
+
+/// The integral over the phase, its width being 1, and by how much each of three rules is in doubt of it.
+#[inline(always)]
+fn integral<T: Number>(f: &[T; PLACES]) -> (T, [T; 3]) {
+    let (mut sums, mut odd) = ([f[0].filled(0.0); 3], f[0].filled(0.0));
+    for i in 0..PLACES / 2 {
+        let [near, far] = [f[i], f[PLACES - 1 - i]];
+        for (sum, of) in sums.iter_mut().zip([&ALL, &LOWER, &LOWEST]) {
+            *sum = *sum + (near + far) * of.up_to[i][PLACES - 1];
+        }
+        odd = odd + (near + far * -1.0) * (ALL.odd[i] - LOWER.odd[i]);
+    }
+    let [whole, lower, lowest] = sums;
+    (whole, [(lower - whole).size(), odd.size(), (lowest - whole).size() * CHANCE])
+}
+
+/// Where the rules agree.
+#[inline(always)]
+fn agree<S: Simd>(whole: f64x8<S>, doubts: [f64x8<S>; 3]) -> mask64x8<S> {
+    let most = whole * RULES_AGREE;
+    let [lower, odd, lowest] = doubts.map(|doubt| doubt.simd_le(most));
+    lower & odd & lowest
+}
+
+#[inline(always)]
+fn of_each<S: Simd, T>(simd: S, of: &[T; PHASES], number: impl Fn(&T) -> f64) -> f64x8<S> {
+    let mut lanes = [0.0; PHASES];
+    for i in 0..PHASES {
+        lanes[i] = number(&of[i]);
+    }
+    f64x8::from_slice(simd, &lanes)
+}
+
+#[inline(always)]
+fn inner<const M: usize, S: Simd>(a: &[f64x8<S>; M], b: &[f64x8<S>; M]) -> f64x8<S> {
+    let mut sum = a[0] * b[0];
+    for k in 1..M {
+        sum += a[k] * b[k];
     }
     sum
 }
 
 #[inline(always)]
-fn least(lanes: &Lanes) -> f64 {
-    joined(*lanes, |a, b| if b < a { b } else { a })
-}
-
-#[inline(always)]
-fn greatest(lanes: &Lanes) -> f64 {
-    joined(*lanes, |a, b| if b > a { b } else { a })
-}
-
-/// All numbers as one, by halves: in their order each would wait for the one before.
-#[inline(always)]
-fn joined(mut lanes: Lanes, join: impl Fn(f64, f64) -> f64) -> f64 {
-    let mut count = PLACES;
-    while count > 1 {
-        count /= 2;
-        for i in 0..count {
-            lanes[i] = join(lanes[i], lanes[i + count]);
-        }
+fn joined<S: Simd>(of: &[f64x8<S>; PLACES], join: impl Fn(f64x8<S>, f64x8<S>) -> f64x8<S>) -> f64x8<S> {
+    let mut whole = of[0];
+    for i in 1..PLACES {
+        whole = join(whole, of[i]);
     }
-    lanes[0]
+    whole
+}
+
+#[inline(always)]
+fn are_all<S: Simd>(mask: mask64x8<S>) -> bool {
+    mask.to_bitmask() == (1 << PHASES) - 1
+}
+
+#[inline(always)]
+fn is_any<S: Simd>(mask: mask64x8<S>) -> bool {
+    mask.to_bitmask() != 0
 }
 
 #[cfg(test)]
@@ -473,7 +583,7 @@ mod tests {
     use crate::Sided;
     use proptest::prelude::*;
 
-    fn sum(weights: &Lanes, degree: i32) -> f64 {
+    fn sum(weights: &[f64; PLACES], degree: i32) -> f64 {
         (0..PLACES).map(|i| weights[i] * SHARES[i].powi(degree)).sum()
     }
 
@@ -482,7 +592,7 @@ mod tests {
         let near = |found: f64, exact: f64| (found - exact).abs() < 1e-14;
         for degree in 0..=13 {
             let exact = |x: f64| x.powi(degree + 1) / f64::from(degree + 1);
-            let column = |rows: &[Lanes; PLACES], i: usize| sum(&each(|j| rows[j][i]), degree);
+            let column = |rows: &[[f64; PLACES]; PLACES], i: usize| sum(&rows.map(|row| row[i]), degree);
             let whole = |of: &Weights| column(&of.up_to, PLACES - 1);
             assert!(near(whole(&ALL), exact(1.0)), "{degree}");
             assert!(degree > 5 || near(whole(&LOWER), exact(1.0)), "{degree}");
@@ -544,7 +654,17 @@ mod tests {
         let (feeds, feeds_along) = ([fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY], [true; FEEDS]);
         let columns = Columns::new(&path, &limits, None);
         let places = Places { curve: &curve, columns: &columns, limits: &limits, feeds, feeds_along };
-        (places.time(&Phase { u, p, a, held_sq: None }, &tally), motion.time(), most)
+        // Beside other phases and alone it has the same answer; halves are added in another order.
+        let (phase, mut open) = (Some(Phase { u, p, a, held_sq: None }), Vec::new());
+        let gentle = Some(Phase { u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
+        let beside = [None, gentle, phase, phase, None, gentle, phase, None];
+        let times = places.times(&beside, &mut open, &tally);
+        let [found, ..] = places.times(&[phase, None, None, None, None, None, None, None], &mut open, &tally);
+        for time in [times[2], times[3], times[6]] {
+            assert_eq!(time.is_some(), found.is_some());
+            assert!(time.zip(found).is_none_or(|(a, b)| (a / b - 1.0).abs() < 1e-14));
+        }
+        (found, motion.time(), most)
     }
 
     #[test]
@@ -577,8 +697,8 @@ mod tests {
     #[test]
     fn a_speed_that_is_held_has_both_records_of_it() {
         let phase = |p: f64| Phase { u: [0.0, 1.0], p: [4.0, p], a: [0.0; 2], held_sq: Some(16.0) };
-        assert!(phase(1.0).speed([4.0, 16.0], 3.0).is_some());
-        assert!(phase(1.0 + 1e-13).speed([4.0, 16.0], 3.0).is_none());
+        assert_eq!(phase(1.0).speed_sq([4.0, 16.0]), Some([16.0; 2]));
+        assert_eq!(phase(1.0 + 1e-13).speed_sq([4.0, 16.0]), None);
     }
 
     #[test]

@@ -1,0 +1,77 @@
+//! Formulas that are evaluated for one number as well as for eight at once, in the vectors of the processor.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+use fearless_simd::{f64x8, Simd, SimdBase, SimdFloat};
+
+/// One number or eight. No product is fused with a sum, so that results are the same on every processor.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Add<f64, Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Mul<f64, Output = Self>
+    + Div<Output = Self>
+{
+    /// The same number in all places, where `self` has its places.
+    fn filled(self, value: f64) -> Self;
+    fn smaller(self, other: Self) -> Self;
+    fn greater(self, other: Self) -> Self;
+    fn size(self) -> Self;
+    fn root(self) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn filled(self, value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        self.min(other)
+    }
+
+    #[inline(always)]
+    fn greater(self, other: Self) -> Self {
+        self.max(other)
+    }
+
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+}
+
+impl<S: Simd> Number for f64x8<S> {
+    #[inline(always)]
+    fn filled(self, value: f64) -> Self {
+        Self::splat(self.simd, value)
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        self.min(other)
+    }
+
+    #[inline(always)]
+    fn greater(self, other: Self) -> Self {
+        self.max(other)
+    }
+
+    #[inline(always)]
+    fn size(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.sqrt()
+    }
+}
