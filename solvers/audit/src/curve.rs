@@ -383,15 +383,15 @@ pub fn sagitta(bend: f64, step: f64) -> f64 {
 
 /// Derivatives by t to those by u.
 #[inline(always)]
-fn by_width<const M: usize, T: Number>(mut derivatives: [[T; M]; 3], per_width: f64) -> [[T; M]; 3] {
-    let mut scale = 1.0;
-    for derivative in &mut derivatives {
-        scale *= per_width;
-        for x in derivative {
-            *x = *x * scale;
+fn by_width<const M: usize, T: Number>([first, second, third]: [[T; M]; 3], per_width: f64) -> [[T; M]; 3] {
+    let per_width_sq = per_width * per_width;
+    let scaled = |mut derivative: [T; M], scale: f64| {
+        for k in 0..M {
+            derivative[k] = derivative[k] * scale;
         }
-    }
-    derivatives
+        derivative
+    };
+    [scaled(first, per_width), scaled(second, per_width_sq), scaled(third, per_width_sq * per_width)]
 }
 
 #[cfg(test)]

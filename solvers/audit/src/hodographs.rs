@@ -181,13 +181,20 @@ impl<const M: usize> Hodographs<M> {
     /// The same of a piece without weights, at one t or at several.
     #[inline(always)]
     pub fn polynomial_rates<T: Number>(&self, t: T, rest: T) -> [[T; M]; 3] {
-        let mut rates = [[t.filled(0.0); M]; 3];
+        // Each in a place of its own: a place that is counted to is one in memory.
+        let (mut first, mut second, mut third) = ([t.filled(0.0); M], [t.filled(0.0); M], [t.filled(0.0); M]);
         with_degree!(self.degree, n, {
-            for order in 1..=n.min(3) {
-                rates[order - 1] = sum(&self.rows[order][..=n - order], t, rest);
+            if n >= 1 {
+                first = sum(&self.rows[1][..n], t, rest);
+            }
+            if n >= 2 {
+                second = sum(&self.rows[2][..n - 1], t, rest);
+            }
+            if n >= 3 {
+                third = sum(&self.rows[3][..n - 2], t, rest);
             }
         });
-        rates
+        [first, second, third]
     }
 
     /// C and its first R − 1 derivatives by t.

@@ -1,17 +1,15 @@
 //! The parameter u at a given length S, from a table of lengths: a monotone rational cubic predicts it on the panel, and
-//! corrects it on brackets that shrink.
+//! corrects it on brackets that shrink. Where the greatest slope of S' is known, a last step of Newton's method needs no
+//! further integral: S is off its tangent by no more than half of that slope times the square of the step.
 //!
 //! Source: Cheatham 2007, sections 3.2.3 and 3.2.4 (equations 3.11–3.14), after Sarfraz. S may be the integral of any
 //! `Table`, S' its integrand; d = 1/S' is the slope of u(S).
 
-use crate::arc_length::{quadrature, quadrature_of_part, Integrand, Node, Table};
+use crate::arc_length::{quadrature, quadrature_of_part, Integrand, Node, Table, SEVEN_NODES};
 
 /// Greatest number of rounds. Each makes the miss four times smaller, or a halving of the bracket follows; so fewer are
 /// needed from the width of a panel to its last digit.
 pub const MAX_ITERATIONS: u32 = 200;
-
-/// An end of the bracket within this part of the panel is the start of the next quadrature.
-const NEAR: f64 = 0.02;
 
 /// A parameter and how it was found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,8 +37,14 @@ pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
 }
 
 /// The u with S(u) = s within `tolerance`; beyond either end that end. Rows that are `known` beside those of the table may be nearer to
-/// it on both sides.
-pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64, known: &[Node]) -> Located {
+/// it on both sides. `steepest` is at least |S''|; infinite where that is not known.
+pub fn locate<F: Integrand>(
+    table: &Table<F>,
+    s: f64,
+    tolerance: f64,
+    known: &[Node],
+    steepest: f64,
+) -> Located {
     let first = table.panel(|node| node.sum <= s);
     let start = table.nodes[first];
     let (mut low, mut high) = (start, table.nodes[first + 1]);
@@ -66,9 +70,9 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64, known: &[N
         if !(low.u < u && u < high.u) {
             u = middle;
         }
-        // From the nearer end of the bracket, once that has come near.
+        // From the nearer end of the bracket, where that is near.
         let near = if u - low.u < high.u - u { low } else { high };
-        let (sum, rate) = if (u - near.u).abs() < NEAR * panel {
+        let (sum, rate) = if (u - near.u).abs() <= SEVEN_NODES * panel {
             let [way, rate] = quadrature_of_part(&table.f, near.u, u, panel);
             (near.sum + way, Some(rate))
         } else {
@@ -82,6 +86,11 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64, known: &[N
         }
         let before = high.u - low.u;
         let row = Node { u, sum, rate: rate.unwrap_or_else(|| table.f.at(u)) };
+        let step = (s - sum) / row.rate;
+        let (next, after) = (u + step, 0.5 * steepest * step * step);
+        if after <= tolerance && low.u <= next && next <= high.u {
+            return Located { u: next, miss: after, iterations };
+        }
         if sum > s {
             high = row;
         } else {
@@ -99,7 +108,7 @@ mod tests {
 
     use super::*;
     use crate::arc_length::{tabulate, Length, QuadraticSpeed};
-    use crate::quadratic::Quadratic;
+    use crate::quadratic::{norm, Quadratic};
 
     fn row(u: f64, sum: f64, rate: f64) -> Node {
         Node { u, sum, rate }
@@ -128,7 +137,7 @@ mod tests {
         let mut nodes = Vec::new();
         let f = Length(QuadraticSpeed::new(&line));
         tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
-        let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12, &[]);
+        let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12, &[], 0.0);
         assert_eq!(located.iterations, 1);
         assert!((located.u - 1.25).abs() < 1e-14);
     }
@@ -142,12 +151,25 @@ mod tests {
         let known = [0.3, 0.32].map(|u| row(u, table.integral(u), f.at(u)));
         for u in [0.305, 0.31, 0.319] {
             let [alone, beside] =
-                [&[][..], &known].map(|known| locate(&table, table.integral(u), 1e-9, known));
+                [&[][..], &known].map(|known| locate(&table, table.integral(u), 1e-9, known, f64::INFINITY));
             assert!((beside.u - u).abs() < 1e-9, "{beside:?}");
             assert!(beside.iterations < alone.iterations, "{alone:?} {beside:?}");
         }
         // A place that is not between them.
-        assert!((locate(&table, table.integral(0.6), 1e-13, &known).u - 0.6).abs() < 1e-12);
+        assert!((locate(&table, table.integral(0.6), 1e-13, &known, f64::INFINITY).u - 0.6).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_last_step_of_newtons_method_needs_no_further_integral() {
+        let piece = Quadratic::<2> { control: [[0.0, 0.0], [0.5, 0.0], [1.0, 0.5]], width: 1.0 };
+        let (f, mut nodes) = (Length(QuadraticSpeed::new(&piece)), Vec::new());
+        tabulate(f, 0.0, 1.0, 1e-13, &mut nodes);
+        let table = Table { f, nodes: &nodes };
+        let known = [0.3, 0.32].map(|u| row(u, table.integral(u), f.at(u)));
+        let [slow, fast] =
+            [f64::INFINITY, 1.0].map(|most| locate(&table, table.integral(0.307), 1e-15, &known, most));
+        assert!((slow.u - 0.307).abs() < 2e-15 && (fast.u - 0.307).abs() < 2e-15, "{slow:?} {fast:?}");
+        assert!(fast.iterations < slow.iterations, "{slow:?} {fast:?}");
     }
 
     proptest! {
@@ -181,10 +203,14 @@ mod tests {
             tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
             let table = Table { f, nodes: &nodes };
             let (s, tolerance) = (at * table.total(), 1e-13 * table.total());
-            let located = locate(&table, s, tolerance, &[]);
-            prop_assert!(located.miss <= tolerance, "{located:?}");
-            prop_assert!((table.integral(located.u) - s).abs() <= 2.0 * tolerance);
-            prop_assert!(located.iterations <= 30, "{located:?}");
+            let bend: [f64; 2] = std::array::from_fn(|k| a[k] - 2.0 * middle[k] + c[k]);
+            let steepest = 2.0 / 9.0 * norm(&bend);
+            for steepest in [steepest, f64::INFINITY] {
+                let located = locate(&table, s, tolerance, &[], steepest);
+                prop_assert!(located.miss <= tolerance, "{located:?}");
+                prop_assert!((table.integral(located.u) - s).abs() <= 2.0 * tolerance);
+                prop_assert!(located.iterations <= 30, "{located:?}");
+            }
         }
     }
 }

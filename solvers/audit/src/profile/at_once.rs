@@ -275,7 +275,8 @@ impl<const M: usize> Places<'_, '_, M> {
         let nothing = all(0.0);
         let from = of_each(simd, parts, |part| part.u[0]);
         let width = of_each(simd, parts, |part| part.u[1]) - from;
-        let (mut derivatives, mut slope) = ([[[nothing; M]; 3]; PLACES], [nothing; PLACES]);
+        // Whatever they are before: nothing would be written by a call.
+        let (mut derivatives, mut slope) = ([[[width; M]; 3]; PLACES], [width; PLACES]);
         for i in 0..PLACES {
             derivatives[i] = self.curve.polynomial_derivatives(from + width * SHARES[i]);
             slope[i] = inner(&derivatives[i][0], &derivatives[i][0]).sqrt();
@@ -286,32 +287,35 @@ impl<const M: usize> Places<'_, '_, M> {
         let is_still = slopes[0].simd_le(all(STILL * self.curve.size_lengths()[0]));
         let length = share * width;
         // The motion along the path.
-        let ends = [0, PLACES - 1].map(|i| <[f64; PHASES]>::from(slope[i] * slope[i]));
+        let ends: [Lanes; 2] = [(slope[0] * slope[0]).into(), (slope[PLACES - 1] * slope[PLACES - 1]).into()];
         let mut speed_sq = [[f64::NAN; PHASES]; 2];
         for i in 0..PHASES {
-            let of_ends = || phases[i].speed_sq(ends.map(|square| square[i])).unwrap_or([f64::NAN; 2]);
+            let of_ends = || phases[i].speed_sq([ends[0][i], ends[1][i]]).unwrap_or([f64::NAN; 2]);
             let [first, last] = if parts[i].whole.is_nan() { of_ends() } else { parts[i].speed_sq };
             (speed_sq[0][i], speed_sq[1][i]) = (first, last);
         }
         let known = of_each(simd, parts, |part| part.whole);
         let unknown = is_good.select(length, all(f64::NAN));
         let whole = known.simd_eq(known).select(known, unknown);
-        let [first, last] = speed_sq.map(|lanes| f64x8::from_slice(simd, &lanes));
+        let first = f64x8::from_slice(simd, &speed_sq[0]);
+        let last = f64x8::from_slice(simd, &speed_sq[1]);
         let (twice, rise) = (whole + whole, last - first);
-        let [start_slope, end_slope] = [0, 1].map(|end| of_each(simd, phases, |phase| phase.a[end]) * twice);
+        let start_slope = of_each(simd, phases, |phase| phase.a[0]) * twice;
+        let end_slope = of_each(simd, phases, |phase| phase.a[1]) * twice;
         let c = [
             first,
             start_slope,
             rise * 3.0 - start_slope * 2.0 - end_slope,
             start_slope + end_slope - rise * 2.0,
         ];
-        let [before, after] = [0, 1].map(|end| of_each(simd, parts, |part| part.ends[end]));
-        let before = before.simd_eq(before).select(before, after - length);
+        let start = of_each(simd, parts, |part| part.ends[0]);
+        let end = of_each(simd, parts, |part| part.ends[1]);
+        let before = start.simd_eq(start).select(start, end - length);
         let per_whole = 1.0 / whole;
         let (per_slope, per_bend) = (per_whole * 0.5, per_whole * per_whole * 0.5);
         // Speeds, squares of curvatures, and the rates of the axes.
-        let (mut v, mut slowness, mut second_sq) = ([nothing; PLACES], [nothing; PLACES], [nothing; PLACES]);
-        let (mut rates, mut third_sq) = ([[[nothing; PLACES]; M]; 3], nothing);
+        let (mut v, mut slowness, mut second_sq, mut third_sq) = (slope, slope, slope, nothing);
+        let mut rates = [[[width; PLACES]; M]; 3];
         let mut paces = [Pace { v: nothing, a: nothing, j: nothing }; PLACES];
         for i in 0..PLACES {
             let mut way = nothing;
@@ -325,14 +329,14 @@ impl<const M: usize> Places<'_, '_, M> {
             paces[i] = Pace { v: v[i], a, j };
             slowness[i] = slope[i] / v[i];
             // The derivatives by the length; see `Station`.
-            let ([c1, c2, c3], per) = (derivatives[i], 1.0 / slope[i]);
+            let ([c1, c2, c3], per) = (&derivatives[i], 1.0 / slope[i]);
             let (per2, square, mixed) = (per * per, v[i] * v[i], v[i] * a * 3.0);
             let (per3, cube) = (per2 * per, square * v[i]);
             let mut first = [nothing; M];
             for k in 0..M {
                 first[k] = c1[k] * per;
             }
-            let (along2, along3) = (inner(&first, &c2), inner(&first, &c3));
+            let (along2, along3) = (inner(&first, c2), inner(&first, c3));
             let mut across = [nothing; M];
             for k in 0..M {
                 across[k] = c2[k] - along2 * first[k];
@@ -361,7 +365,7 @@ impl<const M: usize> Places<'_, '_, M> {
         };
         let bulge = bulge(self.curve.bounds(), &known);
         let is_bounded = bulge.slope.simd_gt(nothing);
-        let [nothing_more, open, more] = [NOTHING, OPEN, MORE].map(all);
+        let (nothing_more, open, more) = (all(NOTHING), all(OPEN), all(MORE));
         let is_refused = first.simd_ne(first);
         let mut verdict = is_bounded.select(nothing_more, open);
         verdict = is_refused.select(more, verdict);
@@ -378,7 +382,7 @@ impl<const M: usize> Places<'_, '_, M> {
                 if row == 0 && are_all((bulge.most_speed * per_least[k]).simd_le(all(worst[k]))) {
                     continue;
                 }
-                let [positive, negative] = [per.positive[k], per.negative[k]].map(all);
+                let (positive, negative) = (all(per.positive[k]), all(per.negative[k]));
                 let use_of = |rate: f64x8<S>| rate * rate.simd_lt(nothing).select(negative, positive);
                 find(verdict_of(&rates[row][k], use_of, bulge.rates[row] * per_least[k], worst[k]));
             }
@@ -473,13 +477,14 @@ fn verdict_of<S: Simd>(
     worst: f64,
 ) -> f64x8<S> {
     let all = |x: f64| f64x8::splat(off.simd, x);
-    let (most, mut used, mut sum) = (all(worst), *rate, all(0.0));
+    let (most, mut used) = (all(worst), *rate);
+    let (mut greatest, mut sum) = (all(0.0), all(0.0));
     for i in 0..PLACES {
         used[i] = use_of(rate[i]);
+        greatest = greatest.max(used[i].abs());
         // A number that is none does not get lost in sums.
         sum += used[i];
     }
-    let greatest = joined(&used.map(|used| used.abs()), f64x8::max);
     let are_below = greatest.simd_le(most) & (sum * 0.0).simd_eq(all(0.0));
     let are_certain = are_below & (greatest + off).simd_le(most);
     let verdict = are_certain.select(all(NOTHING), are_below.select(all(OPEN), all(MORE)));
@@ -532,8 +537,7 @@ fn integral<T: Number>(f: &[T; PLACES]) -> (T, [T; 3]) {
 #[inline(always)]
 fn agree<S: Simd>(whole: f64x8<S>, doubts: [f64x8<S>; 3]) -> mask64x8<S> {
     let most = whole * RULES_AGREE;
-    let [lower, odd, lowest] = doubts.map(|doubt| doubt.simd_le(most));
-    lower & odd & lowest
+    doubts[0].simd_le(most) & doubts[1].simd_le(most) & doubts[2].simd_le(most)
 }
 
 #[inline(always)]

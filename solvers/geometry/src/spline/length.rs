@@ -148,7 +148,16 @@ impl<const M: usize> CurveLength<M> {
         let last = self.width.len() - 1;
         let piece = self.starts[1..=last].partition_point(|&start| start <= length);
         let rest = length - self.starts[piece];
-        (piece, on_table!(self, piece, table, inverse_length::locate(&table, rest, tolerance, &[])).u)
+        (
+            piece,
+            on_table!(
+                self,
+                piece,
+                table,
+                inverse_length::locate(&table, rest, tolerance, &[], f64::INFINITY)
+            )
+            .u,
+        )
     }
 
     /// Lengths up to many places, in parallel.

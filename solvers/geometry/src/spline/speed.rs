@@ -92,16 +92,28 @@ impl<'a, const M: usize> Speed<'a, M> {
 
     /// The same for tables with a cusp at u.
     pub fn with_foot(mut self, u: f64) -> Self {
-        let n = self.h.len() - 1;
-        let growth = self.greatest(|i| {
-            let (low, high) = (self.plain(i), self.plain((i + 1).min(n)));
-            std::array::from_fn(|k| n as f64 * (high[k] - low[k]))
-        });
         let value = self.numerator(u / self.width).0;
         self.foot = u;
         self.at_foot = dot(&value, &value).sqrt() * self.inverse_square();
-        self.slope = growth * self.inverse_square() / self.width;
+        self.slope = self.growth() * self.inverse_square() / self.width;
         self
+    }
+
+    /// At least the slope of |C'|, which is no more than |C''|; infinite on rational pieces.
+    pub fn steepest(&self) -> f64 {
+        match self.omega {
+            [] => self.growth() / (self.width * self.width),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The greatest dh/dt.
+    fn growth(&self) -> f64 {
+        let n = self.h.len() - 1;
+        self.greatest(|i| {
+            let (low, high) = (self.plain(i), self.plain((i + 1).min(n)));
+            std::array::from_fn(|k| n as f64 * (high[k] - low[k]))
+        })
     }
 
     fn plain(&self, i: usize) -> [f64; M] {

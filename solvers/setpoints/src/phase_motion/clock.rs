@@ -209,7 +209,8 @@ impl SpeedLine {
     fn invert<F: Integrand>(&self, f: F, part: f64, error: f64) -> Located {
         let table = Table { f, nodes: &self.times };
         let total = table.total();
-        let found = inverse_length::locate(&table, part * total, (error * total).max(table.rounding()), &[]);
+        let tolerance = (error * total).max(table.rounding());
+        let found = inverse_length::locate(&table, part * total, tolerance, &[], f64::INFINITY);
         Located { miss: (found.miss + self.time_error) / total, ..found }
     }
 

@@ -92,8 +92,9 @@ impl<'a, const M: usize> PiecePath<'a, M> {
             return Located { u: length / even, ..Located::default() };
         }
         let table = lengths.table();
-        let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()), ends);
-        Located { miss: found.miss + lengths.error(), ..found }
+        let Filled { error, steepest, .. } = *lengths.filled();
+        let found = inverse_length::locate(&table, length, tolerance.max(table.rounding()), ends, steepest);
+        Located { miss: found.miss + error, ..found }
     }
 
     /// The length of a phase from one quadrature.
@@ -113,17 +114,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
 
     /// Square of the length per u.
     pub(super) fn square(&self, law: PhaseLaw, u: f64) -> f64 {
-        let of = |share: &dyn Fn([f64; M]) -> [f64; M]| {
-            let q = share(derivatives(&self.piece, u)[1]);
-            dot(&q, &q)
-        };
-        let square = match self.counts(law).1 {
-            Counts::Axes => of(&|q| q),
-            Counts::Shares(share) => of(&|q| times(share, &q)),
-            Counts::Tip(tip) => tip.derivatives[0].value(u / self.piece.width),
-        };
-        let g = square.max(0.0).sqrt();
-        g * g
+        self.rate(law, Line::ONE).at(u).powi(2)
     }
 
     /// The length per u, and its first two derivatives, where q and its derivatives are known.
@@ -225,14 +216,20 @@ impl<const M: usize> Speeds<M> {
     }
 }
 
+/// A table of a length, its proven error, and at least the slope of the length per u.
+struct Filled {
+    nodes: Vec<Node>,
+    error: f64,
+    steepest: f64,
+}
+
 /// A length of a piece, with a table of it that is filled when it is first asked for.
 struct Lengths<'a, const M: usize> {
     piece: Piece<'a, M>,
     speeds: Speeds<M>,
     /// The length per u, where it is the same everywhere: on lines.
     even: Option<f64>,
-    /// With its proven error.
-    table: OnceCell<(Vec<Node>, f64)>,
+    table: OnceCell<Filled>,
     /// A parameter and the length up to it that was asked for last: most phases begin where one has ended.
     last: Cell<[f64; 2]>,
 }
@@ -275,16 +272,20 @@ impl<'a, const M: usize> Lengths<'a, M> {
         Rate { source, line, foot }
     }
 
-    fn filled(&self) -> &(Vec<Node>, f64) {
-        self.table.get_or_init(|| fill(self.bounded(Line::ONE), (0.0, self.piece.width)))
+    fn filled(&self) -> &Filled {
+        self.table.get_or_init(|| {
+            let rate = self.bounded(Line::ONE);
+            let (nodes, error) = fill(rate, (0.0, self.piece.width));
+            Filled { nodes, error, steepest: rate.source.steepest() }
+        })
     }
 
     fn table(&self) -> Table<'_, Rate<'_, M>> {
-        Table { f: self.rate(Line::ONE), nodes: &self.filled().0 }
+        Table { f: self.rate(Line::ONE), nodes: &self.filled().nodes }
     }
 
     fn error(&self) -> f64 {
-        self.even.map_or_else(|| self.filled().1, |_| 0.0)
+        self.even.map_or_else(|| self.filled().error, |_| 0.0)
     }
 }
 

@@ -98,6 +98,14 @@ impl<const M: usize> Source<'_, M> {
         }
     }
 
+    /// At least the slope of the speed; infinite where that is not known.
+    pub fn steepest(&self) -> f64 {
+        match self {
+            Self::Own(speed) => speed.steepest(),
+            Self::Tip(_) => f64::INFINITY,
+        }
+    }
+
     fn foot_error(&self, width: f64) -> f64 {
         match self {
             Self::Own(speed) => speed.foot_error(width),

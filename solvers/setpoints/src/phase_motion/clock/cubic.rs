@@ -49,7 +49,7 @@ impl Cubic {
         let back = || SpeedSq::between([speeds[1], speeds[0]], [-phase.a1, -phase.a0], length);
         let own = if from_start { speed_sq } else { back() };
         let unit = if phase.duration > 0.0 { phase.duration } else { 2.0 * length / (speeds[0] + speeds[1]) };
-        let (mut others, mut time, mut x, mut width, mut error) = (Vec::new(), 0.0, 0.0, 1.0, 0.0);
+        let (mut others, mut time, mut width, mut error) = (Vec::new(), 0.0, 1.0, 0.0);
         // A series that is good from here on, or as short as any; how long it lasts, and where it ends.
         let mut next = |time: f64, x: f64, mut width: f64| loop {
             let series = Series::new(&own, time, x, width, unit / length);
@@ -57,20 +57,20 @@ impl Cubic {
             let fails = series.error > ERROR || slope <= 0.0 || end > 1.0 + OVER;
             if !fails || width <= SHORTEST {
                 error += series.error;
-                return (series, width, end);
+                return (series, width, [end, slope]);
             }
             width *= 0.5;
         };
-        let first;
-        (first, width, x) = next(time, x, width);
-        while !(x >= 1.0 - OVER || x.is_nan() || others.len() + 1 == MOST_PARTS) {
+        let (first, mut end);
+        (first, width, end) = next(time, 0.0, width);
+        while !(end[0] >= 1.0 - OVER || end[0].is_nan() || others.len() + 1 == MOST_PARTS) {
             time += width;
             let series;
-            (series, width, x) = next(time, x, 2.0 * width);
+            (series, width, end) = next(time, end[0], 2.0 * width);
             others.push(series);
         }
         let last = others.last().unwrap_or(&first);
-        let total = last.from + last.width * last.time(1.0);
+        let total = last.from + last.width * last.time_of_all(end);
         Self { speed_sq, from_start, first, others, total, error }
     }
 
@@ -206,6 +206,17 @@ impl Series {
             way = way * s + term;
         }
         [self.x + way, slope]
+    }
+
+    /// The part of the time at all of the length, where the whole time makes this part of it, with its derivative.
+    fn time_of_all(&self, [end, slope]: [f64; 2]) -> f64 {
+        // Mostly the first step of Newton's method is the last.
+        let time = 1.0 - (end - 1.0) / slope;
+        if (time - 1.0).abs() <= LAST_STEP {
+            time
+        } else {
+            self.time(1.0)
+        }
     }
 
     /// The part of the time at a part of the length, at the end or before.
