@@ -20,7 +20,7 @@ use super::speed_by_length::is_same_speed;
 use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
-use at_once::{Part, Places, PHASES, PLACES};
+use at_once::{Looks, Places, PLACES};
 use by_length::{Look, Looker};
 
 /// Even intervals of a phase.
@@ -45,6 +45,9 @@ const MOST_HALVINGS: u32 = 200;
 /// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
 
+/// Phases of a piece are looked at together, so many at most.
+const GROUP: usize = 32;
+
 /// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less.
 const FIRST: usize = 16;
 
@@ -66,14 +69,14 @@ pub fn audit_profile<'a, const M: usize>(
 ) -> Tally<M> {
     let phases = of.phases;
     let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
-        let (mut columns, mut open) = (columns(), Vec::new());
+        let (mut columns, mut looks) = (columns(), Looks::default());
         let (first, count) = (block.start, columns.count());
         let good = |i: usize| phases.has_good_numbers(i, count);
-        let groups = phases.groups(block, PHASES);
+        let groups = phases.groups(block, GROUP);
         for group in groups.iter().step_by(FIRST) {
-            let times = of.at_once(group, &mut columns, &mut open, tally);
-            for (i, time) in group.clone().zip(times) {
-                of.phase((i, time), &mut columns, &mut None, tally);
+            of.at_once(group, &mut columns, &mut looks, tally);
+            for (i, time) in group.clone().zip(&looks.times) {
+                of.phase((i, *time), &mut columns, &mut None, tally);
             }
         }
         let (mut is_good, mut last) = (first > 0 && good(first - 1), None);
@@ -81,14 +84,15 @@ pub fn audit_profile<'a, const M: usize>(
         let mut runs = phases.runs[begun..].iter().peekable();
         for (number, group) in groups.into_iter().enumerate() {
             let is_known = number.is_multiple_of(FIRST);
-            let times = match is_known {
-                true => [None; PHASES],
-                false => of.at_once(&group, &mut columns, &mut open, tally),
-            };
-            for (i, time) in group.zip(times) {
+            if !is_known {
+                of.at_once(&group, &mut columns, &mut looks, tally);
+            }
+            for (number, i) in group.enumerate() {
                 tell(seen, i);
-                let found =
-                    if is_known { good(i) } else { of.phase((i, time), &mut columns, &mut last, tally) };
+                let found = match is_known {
+                    true => good(i),
+                    false => of.phase((i, looks.times[number]), &mut columns, &mut last, tally),
+                };
                 let was_good = std::mem::replace(&mut is_good, found);
                 // Of runs without a phase several begin at once.
                 let mut begins = false;
@@ -120,7 +124,7 @@ impl<const M: usize> Audited<'_, M> {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
         let line = columns.path.line_of(piece);
-        if !phases.has_good_numbers(i, columns.count()) {
+        if known.is_none() && !phases.has_good_numbers(i, columns.count()) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return false;
         }
@@ -198,38 +202,33 @@ impl<const M: usize> Audited<'_, M> {
         true
     }
 
-    /// The times of those phases of a group that cannot change the tally, where eight places of each and a bound of what lies between
-    /// show that.
-    fn at_once(
-        &self,
-        group: &Range<usize>,
-        columns: &mut Columns<M>,
-        open: &mut Vec<Part>,
-        tally: &Tally<M>,
-    ) -> [Option<f64>; PHASES] {
+    /// Finds the times of those phases of a group that cannot change the tally, where eight places of each and a bound of what lies
+    /// between show that.
+    fn at_once(&self, group: &Range<usize>, columns: &mut Columns<M>, looks: &mut Looks, tally: &Tally<M>) {
         let (phases, piece) = (self.phases, self.phases.piece[group.start] as usize);
+        looks.phases.clear();
+        looks.times.clear();
+        looks.times.resize(group.len(), None);
         if !columns.are_axes() || piece >= phases.pieces {
-            return [None; PHASES];
+            return;
         }
         let curve = columns.curve(piece).clone();
         if curve.polygon.is_rational() {
-            return [None; PHASES];
+            return;
         }
-        let mut looked_at = [None; PHASES];
-        for (i, phase) in group.clone().zip(&mut looked_at) {
+        looks.phases.extend(group.clone().map(|i| {
             let u = [phases.u0[i], phases.u1[i]];
             let is_cubic = phases.kind[i] != PATH_JERK && phases.is_by_length(i, columns);
-            *phase = (is_cubic && phases.has_good_numbers(i, columns.count()) && is_order(u, curve.width()))
-                .then(|| at_once::Phase {
-                    u,
-                    p: [phases.p0[i], phases.p1[i]],
-                    a: [phases.a0[i], phases.a1[i]],
-                    held_sq: (phases.kind[i] == FEED).then(|| phases.value[i]),
-                });
-        }
+            let is_good = phases.has_good_numbers(i, columns.count()) && is_order(u, curve.width());
+            (is_cubic && is_good).then(|| at_once::Phase {
+                u,
+                p: [phases.p0[i], phases.p1[i]],
+                a: [phases.a0[i], phases.a1[i]],
+                held_sq: (phases.kind[i] == FEED).then(|| phases.value[i]),
+            })
+        }));
         let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
-        let places = Places { curve: &curve, columns, limits: self.limits, feeds, feeds_along };
-        places.times(&looked_at, open, tally)
+        Places { curve: &curve, columns, limits: self.limits, feeds, feeds_along }.look_at(looks, tally);
     }
 
     /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share

@@ -20,6 +20,9 @@ use feedplan_audit::{Check, Limits, Sided, Tally, FEEDS};
 
 const OF_PATH: &str = "the arrays of the path differ in length";
 
+/// Pieces of a path, of which fit and plan may leave some kilobytes each.
+const LONG: usize = 20_000;
+
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
 
@@ -239,8 +242,11 @@ pub fn audit_plan(
     program: Option<Of<Moves>>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
-    py.detach(memory::give_back);
     let path = problem.followed(&feed)?;
+    // What a short plan has left takes longer to give back, and to get again, than it is worth.
+    if path.len() >= LONG {
+        py.detach(memory::give_back);
+    }
     let junction_speed = problem.junction_speed.as_slice()?;
     let phases = profile.as_ref().map(|profile| phases(profile, &problem)).transpose()?;
     let program = program.as_ref().map(|moves| programmed(moves, problem.axes())).transpose()?;

@@ -147,7 +147,7 @@ pub struct Phase {
 
 /// A part of a phase, which has this number among those that are looked at. What is not known of it is no number.
 #[derive(Clone, Copy)]
-pub struct Part {
+struct Part {
     number: usize,
     u: [f64; 2],
     /// The lengths from the start of the phase up to both ends.
@@ -172,6 +172,15 @@ struct Found {
     whole: Lanes,
 }
 
+/// Phases of a piece, those that can be looked at at once, and the times of those of them that change nothing.
+#[derive(Default)]
+pub struct Looks {
+    pub phases: Vec<Option<Phase>>,
+    pub times: Vec<Option<f64>>,
+    /// Parts of them that have not been looked at.
+    open: Vec<Part>,
+}
+
 /// What holds on the piece of the phases.
 pub struct Places<'a, 'b, const M: usize> {
     pub curve: &'a Curve<M>,
@@ -182,27 +191,35 @@ pub struct Places<'a, 'b, const M: usize> {
 }
 
 impl<const M: usize> Places<'_, '_, M> {
-    /// The times of those phases that cannot change the tally, by their laws. `open` is memory for parts of them.
-    pub fn times(
-        &self,
-        phases: &[Option<Phase>; PHASES],
-        open: &mut Vec<Part>,
-        tally: &Tally<M>,
-    ) -> [Option<f64>; PHASES] {
-        let mut times = [None; PHASES];
-        let Some(any) = phases.iter().flatten().next() else { return times };
-        let none = [f64::NAN; 2];
-        let (ends, halvings) = ([0.0, f64::NAN], MOST_HALVINGS);
-        let whole = Part { number: 0, u: any.u, ends, speed_sq: none, whole: f64::NAN, halvings };
-        let (mut parts, mut count) = ([whole; PHASES], 0);
-        let mut lanes = [any; PHASES];
+    /// Finds the times of those phases that cannot change the tally, by their laws.
+    pub fn look_at(&self, Looks { phases, times, open }: &mut Looks, tally: &Tally<M>) {
+        times.clear();
+        times.extend(phases.iter().map(|phase| phase.map(|_| 0.0)));
+        open.clear();
         for (number, phase) in phases.iter().enumerate() {
-            if let Some(phase) = phase {
-                parts[count] = Part { number, u: phase.u, ..whole };
-                (times[number], lanes[count], count) = (Some(0.0), phase, count + 1);
-            }
+            let (ends, speed_sq, whole) = ([0.0, f64::NAN], [f64::NAN; 2], f64::NAN);
+            open.extend(phase.map(|Phase { u, .. }| Part {
+                number,
+                u,
+                ends,
+                speed_sq,
+                whole,
+                halvings: MOST_HALVINGS,
+            }));
         }
-        while count > 0 {
+        let Some((&any, Some(phase))) = open.last().map(|part| (part, &phases[part.number])) else { return };
+        let (mut parts, mut lanes) = ([any; PHASES], [phase; PHASES]);
+        loop {
+            // Halves of parts that were open, and other phases.
+            let mut count = 0;
+            while let Some(part) = if count < PHASES { open.pop() } else { None } {
+                if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
+                    (parts[count], lanes[count], count) = (part, phase, count + 1);
+                }
+            }
+            if count == 0 {
+                return;
+            }
             let found = dispatch!(Level::new(), simd => self.look(simd, &parts, &lanes, tally));
             for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
                 let sum = times[part.number];
@@ -214,14 +231,7 @@ impl<const M: usize> Places<'_, '_, M> {
                     None
                 };
             }
-            count = 0;
-            while let Some(part) = if count < PHASES { open.pop() } else { None } {
-                if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
-                    (parts[count], lanes[count], count) = (part, phase, count + 1);
-                }
-            }
         }
-        times
     }
 
     /// Adds both halves of a part that was found open.
@@ -659,12 +669,18 @@ mod tests {
         let columns = Columns::new(&path, &limits, None);
         let places = Places { curve: &curve, columns: &columns, limits: &limits, feeds, feeds_along };
         // Beside other phases and alone it has the same answer; halves are added in another order.
-        let (phase, mut open) = (Some(Phase { u, p, a, held_sq: None }), Vec::new());
+        let phase = Some(Phase { u, p, a, held_sq: None });
         let gentle = Some(Phase { u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
-        let beside = [None, gentle, phase, phase, None, gentle, phase, None];
-        let times = places.times(&beside, &mut open, &tally);
-        let [found, ..] = places.times(&[phase, None, None, None, None, None, None, None], &mut open, &tally);
-        for time in [times[2], times[3], times[6]] {
+        let mut looks = Looks::default();
+        let mut found_of = |phases: &[Option<Phase>]| {
+            looks.phases = phases.to_vec();
+            places.look_at(&mut looks, &tally);
+            looks.times.clone()
+        };
+        let found = found_of(&[phase])[0];
+        let beside = [None, gentle, phase, phase, None, gentle, phase, None, gentle, phase, gentle];
+        let times = found_of(&beside);
+        for time in [times[2], times[3], times[6], times[9]] {
             assert_eq!(time.is_some(), found.is_some());
             assert!(time.zip(found).is_none_or(|(a, b)| (a / b - 1.0).abs() < 1e-14));
         }
