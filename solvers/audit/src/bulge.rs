@@ -57,7 +57,8 @@ pub fn bulge<T: Number>([m2, m3, m4, m5]: [f64; 4], known: &Known<T>) -> Bulge<T
     bend.0[0] = bend.0[0].smaller(known.second + curvature);
     change.0[0] = change.0[0].smaller(known.third + eighth * change.0[2]);
     let steepest = known.slopes[1] + h * (0.5 * m2);
-    let [v, a, j] = known.paces.map(|by_length| by_length.at(steepest, nothing + m2));
+    let ([v, a, j], bend_most) = (known.paces, nothing + m2);
+    let (v, a, j) = (v.at(steepest, bend_most), a.at(steepest, bend_most), j.at(steepest, bend_most));
     let square = v.times(v);
     let bulge = |of: Bounds<T>| eighth * of.0[2];
     Bulge {

@@ -288,12 +288,12 @@ fn derive<const M: usize>(
     orders: usize,
     found: &mut [Rows<M>],
 ) -> [f64; 4] {
-    let mut lengths = [0.0_f64; 4];
+    let (mut factors, mut squares, mut lengths) = ([0.0; 4], [0.0; 4], [0.0; 4]);
     for order in 0..5.min(orders).min(degree + 1) {
         let count = degree - order;
         if order > 0 {
-            let square = rows[..=count].iter().fold(0.0_f64, |most, row| most.max(inner(row, row)));
-            lengths[order - 1] = factor * square.sqrt();
+            factors[order - 1] = factor;
+            squares[order - 1] = rows[..=count].iter().fold(0.0_f64, |most, row| most.max(inner(row, row)));
         }
         if let Some(found) = found.get_mut(order) {
             for i in 0..=count {
@@ -305,6 +305,10 @@ fn derive<const M: usize>(
             rows[i] = from_to(&rows[i], &rows[i + 1]);
         }
         factor *= count as f64;
+    }
+    // All roots together: each alone takes as long.
+    for i in 0..4 {
+        lengths[i] = factors[i] * f64::sqrt(squares[i]);
     }
     lengths
 }

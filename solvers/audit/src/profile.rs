@@ -49,7 +49,7 @@ const BLOCK: usize = 4096;
 const GROUP: usize = 32;
 
 /// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less.
-const FIRST: usize = 16;
+const FIRST: usize = 64;
 
 /// What is measured on which path.
 pub struct Audited<'a, const M: usize> {

@@ -328,9 +328,11 @@ impl<const M: usize> Places<'_, '_, M> {
         let mut rates = [[[width; PLACES]; M]; 3];
         let mut paces = [Pace { v: nothing, a: nothing, j: nothing }; PLACES];
         for i in 0..PLACES {
-            let mut way = nothing;
-            for j in 0..PLACES {
-                way += slope[j] * ALL.up_to[j][i];
+            let mut way = if i == PLACES - 1 { share } else { nothing };
+            if (1..PLACES - 1).contains(&i) {
+                for j in 0..PLACES {
+                    way += slope[j] * ALL.up_to[j][i];
+                }
             }
             let x = (before + way * width) * per_whole;
             v[i] = (c[0] + x * (c[1] + x * (c[2] + x * c[3]))).sqrt();
