@@ -133,9 +133,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
                 (Measure::Parameter, Clock::Line(Box::new(line)))
             }
             PhaseLaw::PathJerk => by_length(&|_| Clock::Jerk(Jerk::new(phase, speeds()))),
-            PhaseLaw::SpeedCubic => {
-                by_length(&|length| Clock::Cubic(Box::new(Cubic::new(phase, speeds(), length))))
-            }
+            PhaseLaw::SpeedCubic => by_length(&|length| Clock::Cubic(Cubic::new(phase, speeds(), length))),
         };
         let mut motion = Self { path, phase: *phase, measure, clock, safe: [u0, u1], straight: None };
         let off = motion.off_ends(squares);

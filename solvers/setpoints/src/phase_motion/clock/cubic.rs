@@ -43,35 +43,40 @@ pub struct Cubic {
 }
 
 impl Cubic {
-    pub fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Self {
+    /// It is made where it stays: it is too large to be moved for each phase.
+    pub fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Box<Self> {
         let (from_start, speed_sq) = (speeds[0] <= speeds[1], SpeedSq::new(phase, speeds, length));
         // Time runs back from the end.
         let back = || SpeedSq::between([speeds[1], speeds[0]], [-phase.a1, -phase.a0], length);
         let own = if from_start { speed_sq } else { back() };
         let unit = if phase.duration > 0.0 { phase.duration } else { 2.0 * length / (speeds[0] + speeds[1]) };
-        let (mut others, mut time, mut width, mut error) = (Vec::new(), 0.0, 1.0, 0.0);
-        // A series that is good from here on, or as short as any; how long it lasts, and where it ends.
-        let mut next = |time: f64, x: f64, mut width: f64| loop {
-            let series = Series::new(&own, time, x, width, unit / length);
+        let (first, others) = (Series::default(), Vec::new());
+        let mut cubic = Box::new(Self { speed_sq, from_start, first, others, total: 0.0, error: 0.0 });
+        // A series that is good from here on, or as short as any; where it ends.
+        let fill = |series: &mut Series, time: f64, x: f64, mut width: f64| loop {
+            series.fill(&own, [time, x, width], unit / length);
             let [end, slope] = series.at(1.0);
             let fails = series.error > ERROR || slope <= 0.0 || end > 1.0 + OVER;
             if !fails || width <= SHORTEST {
-                error += series.error;
-                return (series, width, [end, slope]);
+                return [end, slope];
             }
             width *= 0.5;
         };
-        let (first, mut end);
-        (first, width, end) = next(time, 0.0, width);
-        while !(end[0] >= 1.0 - OVER || end[0].is_nan() || others.len() + 1 == MOST_PARTS) {
-            time += width;
-            let series;
-            (series, width, end) = next(time, end[0], 2.0 * width);
-            others.push(series);
+        let mut end = fill(&mut cubic.first, 0.0, 0.0, 1.0);
+        while !(end[0] >= 1.0 - OVER || end[0].is_nan() || cubic.others.len() + 1 == MOST_PARTS) {
+            let Series { from, width, .. } = *cubic.last();
+            cubic.others.push(Series::default());
+            end =
+                fill(cubic.others.last_mut().expect("one has been added"), from + width, end[0], 2.0 * width);
         }
-        let last = others.last().unwrap_or(&first);
-        let total = last.from + last.width * last.time_of_all(end);
-        Self { speed_sq, from_start, first, others, total, error }
+        let last = cubic.last();
+        cubic.total = last.from + last.width * last.time_of_all(end);
+        cubic.error = cubic.first.error + cubic.others.iter().map(|series| series.error).sum::<f64>();
+        cubic
+    }
+
+    fn last(&self) -> &Series {
+        self.others.last().unwrap_or(&self.first)
     }
 
     /// The last series that begins at a place where `has_begun` holds, or the first.
@@ -151,6 +156,7 @@ impl SpeedSq {
 }
 
 /// The part of the length over a time, in powers of the part of that.
+#[derive(Default)]
 struct Series {
     /// When it begins and how long it lasts, in parts of some unit.
     from: f64,
@@ -164,14 +170,14 @@ struct Series {
 }
 
 impl Series {
-    /// `per` is the unit of time over the length.
-    fn new(speed_sq: &SpeedSq, from: f64, x: f64, width: f64, per: f64) -> Self {
+    /// Becomes that from a time and a place on, of this width; `per` is the unit of time over the length.
+    fn fill(&mut self, speed_sq: &SpeedSq, [from, x, width]: [f64; 3], per: f64) {
         let [w, slope, bend] = speed_sq.derivatives(x);
         let scale = width * per;
         let half = 0.5 * scale * scale;
         // ẍ = p0 + p1 x + p2 x² about the start.
         let [p0, p1, p2] = [half * slope, half * bend, half * 3.0 * speed_sq.c[3]];
-        let mut terms = [0.0; MOST_TERMS];
+        let terms = &mut self.terms;
         // The last two terms beside the table: a pair of numbers that have just been stored cannot be loaded at once.
         let (mut before, mut last, mut count) = (scale * w.sqrt(), 0.5 * p0, 3);
         (terms[1], terms[2]) = (before, last);
@@ -194,7 +200,8 @@ impl Series {
         let square: f64 = (1..count).map(|i| terms[i].abs() * rest[(count - 2).saturating_sub(i)]).sum();
         let missed = p1.abs() * rest[count - 2] + p2.abs() * square;
         let is_gentle = p1.abs() + 2.0 * p2.abs() * rest[0] <= 1.0;
-        Self { from, width, x, terms, count, error: if is_gentle { missed } else { f64::INFINITY } }
+        (self.from, self.width, self.x, self.count) = (from, width, x, count);
+        self.error = if is_gentle { missed } else { f64::INFINITY };
     }
 
     /// The part of the length at a part of the time, and its derivative.
