@@ -38,7 +38,7 @@ pub const SEVEN_NODES: f64 = 0.5;
 /// The positive ones of seven nodes, and the weights of each pair and of the middle.
 const X7: [f64; 3] = [0.405_845_151_377_397_2, 0.741_531_185_599_394_4, 0.949_107_912_342_758_5];
 const W7: [f64; 4] =
-    [0.381_830_050_505_118_94, 0.279_705_391_489_276_7, 0.129_484_966_168_869_7, 0.417_959_183_673_469_4];
+    [0.381_830_050_505_118_9, 0.279_705_391_489_276_7, 0.129_484_966_168_869_7, 0.417_959_183_673_469_4];
 
 /// An interval that needs more equal panels is halved.
 const UNIFORM: f64 = 4.0;
@@ -172,6 +172,15 @@ impl<F: Integrand> Table<'_, F> {
     pub fn integral(&self, u: f64) -> f64 {
         let node = &self.nodes[self.panel(|node| node.u <= u)];
         node.sum + quadrature(&self.f, node.u, u)
+    }
+
+    /// A row at u, from the nearer end of its panel.
+    pub fn row(&self, u: f64) -> Node {
+        let first = self.panel(|node| node.u <= u);
+        let (start, end) = (self.nodes[first], self.nodes[first + 1]);
+        let near = if u - start.u <= end.u - u { start } else { end };
+        let [way, rate] = quadrature_of_part(&self.f, near.u, u, end.u - start.u);
+        Node { u, sum: near.sum + way, rate }
     }
 
     /// The last panel whose first node satisfies `before`, a condition that holds up to some node.
@@ -362,7 +371,10 @@ mod tests {
     fn a_part_of_a_panel_has_its_integral_and_its_rate() {
         let f = Length(QuadraticSpeed::new(&parabola()));
         let panel = 1.0 / table_size(1.0, &f.disc(0.0, 1.0), 1e-13).ceil();
+        let (nodes, _) = table_of(f, 0.0, 1.0, 1e-13);
         for part in [1e-3, 2e-2, 0.1, 0.3, 0.5, 0.7] {
+            let row = Table { f, nodes: &nodes }.row(part);
+            assert!((row.sum - exact_length(&parabola(), part)).abs() < 1e-15 && row.rate == f.at(part));
             for [a, b] in [[0.0, part * panel], [panel, (1.0 - part) * panel]] {
                 let [way, rate] = quadrature_of_part(&f, a, b, panel);
                 let exact = exact_length(&parabola(), b) - exact_length(&parabola(), a);

@@ -105,13 +105,19 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         let (u0, u1) = (phase.u0, phase.u1);
         let width = u1 - u0;
         let mean_pace = || (Measure::Parameter, Clock::Even(Even::constant(width / phase.duration)));
-        let squares = match phase.law {
-            PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity | PhaseLaw::ParameterAcceleration => [1.0; 2],
-            _ => path.end_squares(phase),
+        let ends = match phase.law {
+            PhaseLaw::Feed | PhaseLaw::PathJerk | PhaseLaw::SpeedCubic => {
+                Some([u0, u1].map(|u| path.row(phase.law, u)))
+            }
+            _ => None,
+        };
+        let squares = match (phase.law, &ends) {
+            (_, Some(ends)) => [ends[0].rate.powi(2), ends[1].rate.powi(2)],
+            (PhaseLaw::SpeedLine, _) => path.end_squares(phase),
+            _ => [1.0; 2],
         };
         let by_length = |clock: &dyn Fn(f64) -> Clock| {
-            let end = |u: f64, square: f64| Node { u, sum: path.length(phase.law, u), rate: square.sqrt() };
-            let ends = [end(u0, squares[0]), end(u1, squares[1])];
+            let ends = ends.expect("laws of the length have both");
             let total = ends[1].sum - ends[0].sum;
             (Measure::Length { ends, total }, clock(total))
         };
@@ -244,7 +250,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         match &self.measure {
             Measure::Axis(way) => way.part(&self.phase, u),
             Measure::Length { ends, total } => {
-                let share = (self.path.length(law, u) - ends[0].sum) / total;
+                let share = (self.path.row(law, u).sum - ends[0].sum) / total;
                 Part { from_start: true, share: share.clamp(0.0, 1.0) }.nearer_end()
             }
             Measure::Parameter if u - u0 <= u1 - u => Part { from_start: true, share: (u - u0) / (u1 - u0) },

@@ -525,7 +525,7 @@ fn verdict_of<S: Simd>(
         let slope = used[i + 1] - used[i];
         let top = (between + slope * slope / (bend * 8.0)).abs() + bend * bend / most;
         let is_flat = top.simd_le(limit) | slope.abs().simd_ge(bend.abs() * 2.0);
-        are_low = are_low & (are_far_below | is_flat);
+        are_low &= are_far_below | is_flat;
     }
     are_low.select(all(NOTHING), verdict)
 }

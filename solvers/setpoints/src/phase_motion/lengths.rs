@@ -9,7 +9,6 @@ use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_geometry::newton;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::{dot, norm};
-use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::{Coefficients, Speed};
 use feedplan_geometry::spline::Piece;
 use feedplan_geometry::tolerance;
@@ -79,10 +78,10 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         self.lengths(number, counts)
     }
 
-    /// The length from the start of the piece to u.
-    pub(super) fn length(&self, law: PhaseLaw, u: f64) -> f64 {
+    /// The length from the start of the piece to u, and per u there.
+    pub(super) fn row(&self, law: PhaseLaw, u: f64) -> Node {
         let lengths = self.of(law);
-        lengths.even.map_or_else(|| lengths.up_to(u), |even| even * u)
+        lengths.even.map_or_else(|| lengths.row(u), |even| Node { u, sum: even * u, rate: even })
     }
 
     /// The place at a length between two places with theirs, with the proven error of the table in its miss.
@@ -230,25 +229,25 @@ struct Lengths<'a, const M: usize> {
     /// The length per u, where it is the same everywhere: on lines.
     even: Option<f64>,
     table: OnceCell<Filled>,
-    /// A parameter and the length up to it that was asked for last: most phases begin where one has ended.
-    last: Cell<[f64; 2]>,
+    /// What was asked for last: most phases begin where one has ended.
+    last: Cell<Node>,
 }
 
 impl<'a, const M: usize> Lengths<'a, M> {
     fn new(piece: Piece<'a, M>, counts: &Counts<M>) -> Self {
-        let speeds = Speeds::new(&piece, counts);
-        Self { piece, even: speeds.even(), speeds, table: OnceCell::new(), last: Cell::new([0.0; 2]) }
+        let (speeds, none) = (Speeds::new(&piece, counts), Node { u: f64::NAN, sum: 0.0, rate: 0.0 });
+        Self { piece, even: speeds.even(), speeds, table: OnceCell::new(), last: Cell::new(none) }
     }
 
-    /// The length up to u.
-    fn up_to(&self, u: f64) -> f64 {
-        let [last, length] = self.last.get();
-        if u == last {
-            return length;
+    /// The length up to u, and per u there.
+    fn row(&self, u: f64) -> Node {
+        let last = self.last.get();
+        if u == last.u {
+            return last;
         }
-        let length = self.table().integral(u);
-        self.last.set([u, length]);
-        length
+        let row = self.table().row(u);
+        self.last.set(row);
+        row
     }
 
     /// The length per u over the root of v².
@@ -258,10 +257,7 @@ impl<'a, const M: usize> Lengths<'a, M> {
 
     /// The same with the bounds that a table is built by, and the end of the piece where C' vanishes.
     fn bounded(&self, line: Line) -> Rate<'_, M> {
-        let square = |u: f64| {
-            let q = derivatives(&self.piece, u)[1];
-            dot(&q, &q)
-        };
+        let square = |u: f64| self.rate(Line::ONE).at(u).powi(2);
         let least = SLOW * square(0.5 * self.piece.width);
         let foot = [0.0, self.piece.width].into_iter().find(|&u| square(u) <= least).unwrap_or(f64::NAN);
         let source = match self.speeds.source() {
