@@ -2,7 +2,8 @@
 
 A line is a tool: `T1 P2 Z50.3 D6 ;6 mm end mill`. T is its number, P its pocket, X to W its offset [mm, deg],
 D its diameter [mm], I and J the angles of a lathe tool, which no path needs, Q the side of its tip that cuts.
-Text after `;` is a comment.
+Text after `;` is a comment. A number given to two tools is an error: LinuxCNC takes the first one without a
+word, where most people expect the last.
 """
 
 from __future__ import annotations
@@ -40,13 +41,20 @@ def read_tools(file: Path) -> tuple[Tool, ...]:
         lines = file.read_bytes().decode("utf-8", "replace").splitlines()
     except OSError as error:
         raise InputError(unreadable(f"the tool table {file}", error, "the path of a .tbl file")) from None
-    tools: dict[int, Tool] = {}
+    tools: list[Tool] = []
+    line_of: dict[int, int] = {}
     for number, line in enumerate(lines, 1):
-        words = _words(line, f"{file.name} line {number}")
+        place = f"{file.name} line {number}"
+        words = _words(line, place)
         if words:
-            tool = _tool(words, f"{file.name} line {number}")
-            tools[tool.number] = tool
-    return tuple(tools.values())
+            tool = _tool(words, place)
+            first = line_of.setdefault(tool.number, number)
+            if first != number:
+                raise InputError(
+                    f"{place}: T{tool.number} is the tool of line {first} already: keep one of them"
+                )
+            tools.append(tool)
+    return tuple(tools)
 
 
 def _words(line: str, place: str) -> dict[str, float]:
@@ -60,7 +68,11 @@ def _words(line: str, place: str) -> dict[str, float]:
                 f"{place}: {text[at:].strip()[:24]!r} is no word of a tool table: give lines such as "
                 "T1 P1 Z50.3 D6 ;comment"
             )
-        words[match[1].upper()] = float(match[2])
+        letter = match[1].upper()
+        if letter in words:
+            word = match[0].strip()
+            raise InputError(f"{place}: {word} is the second {letter} of its tool: keep one of them")
+        words[letter] = float(match[2])
         at = match.end()
     return words
 

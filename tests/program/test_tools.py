@@ -28,6 +28,8 @@ def test_a_line_is_a_tool(tmp_path: Path) -> None:
         ("T1\nT2 P99999999999", "line 2: P is 1e\\+11: give a whole number"),
         ("T1 Q-1", "line 1: Q is -1: give a whole number"),
         ("T1\nT2 K5", "line 2: 'K5' is no word"),
+        ("T1 D6\n\nT2\nT1 D8", "tool.tbl line 4: T1 is the tool of line 1 already: keep one of them"),
+        ("T1 D6 d8", "tool.tbl line 1: d8 is the second D of its tool: keep one of them"),
     ],
 )
 def test_what_is_no_tool_is_refused(text: str, words: str, tmp_path: Path) -> None:
