@@ -17,6 +17,7 @@ from feedplan.arguments import callback, file_path, flag, instance, list_of_name
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, formats_named
 from feedplan.outputs._staging import require_folder, staged
+from feedplan.program.source import require_other
 from feedplan.progress import Listener, Progress, beside, of_stage, part, tell
 from feedplan.setpoints import SetpointChunk, Sink
 from feedplan.units import duration_text
@@ -57,7 +58,8 @@ def write_plan(
     drawing.bin. `progress` is called with a stage and the part of it that is done (0 to 1).
 
     All files are written to a temporary folder and renamed at the end, so `folder` never holds half a plan;
-    other files in it stay. Raises InputError if the folder or the file system refuses.
+    other files in it stay. Raises InputError if the folder or the file system refuses, or if the plan's own
+    program would be written over.
     """
     from feedplan.report.container import contained
     from feedplan.report.figures import SetpointFigures, chart_data
@@ -75,6 +77,10 @@ def write_plan(
         from feedplan.planned_feeds.rewrite import PlannedProgram
 
         instance(program, PlannedProgram, "the program", "what feedplan.planned_program returns")
+    if getattr(plan, "program", None) is not None:
+        own = [SUMMARY_FILE, *([] if program is None else [PROGRAM_FILE])]
+        own += [output.FILE for output in outputs.values()]
+        require_other(plan.program.text, *(folder / name for name in own))
     flag(drawing, "the drawing")
     steps = _steps(one_step_more)
     knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)

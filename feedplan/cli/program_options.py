@@ -27,12 +27,11 @@ class ProgramWanted:
         """Makes the program if it is wanted, and writes it to the file if one is given; else returns None."""
         if self.file is None and not self.in_folder:
             return None
-        from feedplan.planned_feeds.rewrite import planned_program
+        from feedplan.planned_feeds.rewrite import planned_program, write_program
 
-        planned = planned_program(plan, **self.options)
         if self.file is not None:
-            planned.write(self.file)
-        return planned
+            return write_program(plan, self.file, **self.options)
+        return planned_program(plan, **self.options)
 
 
 def _wanted(

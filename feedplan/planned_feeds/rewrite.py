@@ -28,7 +28,7 @@ from feedplan.planned_feeds.text import rewritten, usual_blank
 from feedplan.planning import Plan
 from feedplan.program.program import MoveKind, PathControl, Program
 from feedplan.program.read import read_program
-from feedplan.program.source import MAX_BYTES, content_of
+from feedplan.program.source import MAX_BYTES, content_of, require_other
 from feedplan.units import counted, duration_text
 
 # Lines of a summary that are shown one by one.
@@ -77,8 +77,10 @@ class PlannedProgram:
                 os.replace(beside, place)
             finally:
                 beside.unlink(missing_ok=True)
-        except (OSError, ValueError) as error:  # a name that no file can have
-            reason = (getattr(error, "strerror", None) or str(error)).lower()
+        except (OSError, ValueError) as error:  # a name that no file can have, or none
+            reason = (
+                (getattr(error, "strerror", None) or str(error)).lower() if place.name else "is a directory"
+            )
             raise InputError(f"{place} cannot be written ({reason}): choose another file") from error
 
     def to_json(self) -> dict[str, Any]:
@@ -194,9 +196,11 @@ def write_program(
 ) -> PlannedProgram:
     """Writes the program of a plan with planned feeds to a file, whole or not at all; see `planned_program`.
 
-    Raises InputError also where the file cannot be written.
+    Raises InputError also where the file cannot be written, or is the one that the program was read from.
     """
     place = file_path(file, "the file", "the path of a file")
+    if isinstance(plan, Plan) and plan.program is not None:
+        require_other(plan.program.text, place)
     planned = planned_program(
         plan, feed_step=feed_step, inverse_time=inverse_time, dialect=dialect, expand=expand
     )

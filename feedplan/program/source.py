@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -27,6 +28,14 @@ class Content(NamedTuple):
     content: bytes
     name: str
     text: Path | bytes
+
+
+def require_other(text: Path | bytes | None, *places: Path) -> None:
+    """Raises InputError if one of the places is the file that a program was read from: it would be lost."""
+    for place in places:
+        with suppress(OSError, ValueError):  # no such file, or a name that no file can have
+            if isinstance(text, Path) and place.samefile(text):
+                raise InputError(f"{place} is the program itself, which would be lost: choose another file")
 
 
 def content_of(source: Source, name: str | None = None, max_bytes: int = MAX_BYTES) -> Content:

@@ -51,6 +51,30 @@ def test_a_folder_tells_the_hash_of_its_program(part: Path, tmp_path: Path, caps
     assert "program.ngc cannot be read" in capsys.readouterr().err
 
 
+def test_a_program_is_not_written_over_itself(part: Path, tmp_path: Path, capsys: Any) -> None:
+    before = part.read_bytes()
+    lost = "is the program itself, which would be lost: choose another file"
+    (tmp_path / "link.ngc").symlink_to(part)
+    for place in ("part.ngc", "link.ngc"):
+        assert main(["plan", str(part), "--program-out", str(tmp_path / place)]) == 2
+        assert capsys.readouterr() == ("", f"error: {tmp_path / place} {lost}\n")
+    own = part.rename(tmp_path / "program.ngc")
+    assert main(["plan", str(own), "-o", str(tmp_path), "--program", "-q"]) == 2
+    assert capsys.readouterr().err == f"error: {own} {lost}\n"
+    assert own.read_bytes() == before
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["link.ngc", "program.ngc"]
+    assert main(["plan", str(own), "-o", str(tmp_path), "-q"]) == 0
+    assert main(["plan", str(own), "--program-out", ".", "-q"]) == 2
+    assert capsys.readouterr().err == "error: . cannot be written (is a directory): choose another file\n"
+
+
+def test_a_path_file_is_not_written_over_itself(tmp_path: Path) -> None:
+    own = tmp_path / "plan.json"
+    own.write_text('{"unit": "mm", "feed": 9, "curves": [{"degree": 1, "control_points": [[0, 0], [5, 0]]}]}')
+    with pytest.raises(InputError, match=r"plan\.json is the program itself"):
+        feedplan.write_plan(feedplan.plan(own, "mill"), tmp_path)
+
+
 def test_a_program_of_an_earlier_plan_is_told(part: Path, tmp_path: Path, capsys: Any) -> None:
     out = tmp_path / "out"
     assert main(["plan", str(part), "-o", str(out), "--program", "--format", "none", "-q"]) == 0
