@@ -77,7 +77,7 @@ def write_plan(
         from feedplan.planned_feeds.rewrite import PlannedProgram
 
         instance(program, PlannedProgram, "the program", "what feedplan.planned_program returns")
-    if getattr(plan, "program", None) is not None:
+    if plan.program is not None:
         own = [SUMMARY_FILE, *([] if program is None else [PROGRAM_FILE])]
         own += [output.FILE for output in outputs.values()]
         require_other(plan.program.text, *(folder / name for name in own))

@@ -334,9 +334,10 @@ def plan(
     followed, and `Plan.gain` says what that gained. Of `path_rounds` (1 to 3) each after the first fits it
     again, a step along the gradient of its time. Such a path depends on machine, feeds and method;
     neighbouring passes may differ by up to twice the tolerance. Methods that follow the lines themselves
-    know one path only, and take no "fastest". `feed` [mm/s] replaces the programmed feeds,
-    `feed_override` multiplies them. `reading` are keywords of `read_program`, such as a tool table. `period`
-    [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
+    know one path only, and warn where "fastest" is asked for. `feed` [mm/s] replaces the programmed feeds
+    (it is refused where a Path has none), `feed_override` multiplies them. `reading` are keywords of
+    `read_program`, such as a tool table. `period` [s] replaces the machine's servo period; `start_speed` and
+    `end_speed` [mm/s] hold at the ends.
     `interpolator` makes the setpoints: "sarfraz" or "newton".
     `controller`: what `Plan.today` compares with, the machine file's unless given: "linuxcnc", "grbl",
     "grblhal", "klipper" or "marlin", or a table as in a machine file.
@@ -385,6 +386,8 @@ def plan(
     choice = planners.corners(method)
     refits = one_of(path, "path", PATHS) == "fastest" and choice in (Corners.SMOOTH, Corners.ROUNDED)
     rounds = whole(path_rounds, "path_rounds", f"a whole number from 1 to {MAX_ROUNDS}", most=MAX_ROUNDS)
+    if rounds > 1 and path != "fastest":
+        raise refuse("path_rounds", rounds, "it with the path fastest, or leave it out")
     if period is not None:
         machine = machine.with_period(period)
     one_of(interpolator, "interpolator", INTERPOLATORS)
@@ -409,6 +412,8 @@ def plan(
             raise refuse("the tolerance", tolerance, "it where the path is made: a Path has its own")
         if path != "as-fitted":
             raise refuse("path", path, "it where the path is made: a Path has its own")
+        if feed is not None and not np.isfinite(source.feed).any():
+            raise refuse("the feed", feed, "it where the path is made: this Path has no feed to replace")
         followed = source
     else:
         report("read", 0.0)
@@ -509,6 +514,7 @@ def plan(
         max_setpoints=max_setpoints,
         warnings=(program.warnings if program else ())
         + followed.warnings
+        + _one_path(method, path, refits)
         + short
         + unknown
         + rounding_stops(problem, profile)
@@ -543,6 +549,13 @@ def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> Non
         )
     if time_limit is not None:
         raise InputError("a plan with a time limit is made here: leave the time limit or the cluster out")
+
+
+def _one_path(method: str, path: str, refits: bool) -> tuple[str, ...]:
+    """A sentence if the fastest path was asked for and the method knows one path only."""
+    if path != "fastest" or refits:
+        return ()
+    return (f"{method} follows the lines of the program: the path fastest is the path as-fitted",)
 
 
 def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:

@@ -95,6 +95,14 @@ def test_the_butterfly_of_a_path_file_takes_its_known_time(tmp_path: FilePath) -
     assert_sound(plan)
 
 
+def test_a_feed_that_a_path_does_not_take_is_refused() -> None:
+    points = [[0, 0], [10, 0], [10, 10]]
+    with pytest.raises(feedplan.InputError, match="give it where the path is made: this Path has no feed"):
+        feedplan.plan(feedplan.Path.from_bezier(points), "mill", feed=5.0)
+    path = feedplan.Path.from_bezier(points, feed=50.0)
+    assert feedplan.plan(path, "mill", feed=5.0).time > 2 * feedplan.plan(path, "mill").time
+
+
 def test_a_circle_is_followed_exactly(tmp_path: FilePath) -> None:
     plan = planned("G21 G90 G61 F60000\nG0 X10 Y0\nG3 X10 Y0 I-10 J0\nM2\n", "mill", tmp_path)
     chunk = plan.setpoints().all()
