@@ -83,6 +83,14 @@ def test_the_folder_is_written_and_named(planned: Any, square: Any, tmp_path: Pa
     assert str(tmp_path / "out" / "report.html") in capsys.readouterr().out
 
 
+def test_a_step_without_a_folder_is_refused(planned: Any, square: Any, capsys: Any) -> None:
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "--step", "0.01"]) == 2
+    assert (
+        "--step needs a folder to write to: give -o DIR and --format pvt as well" in capsys.readouterr().err
+    )
+
+
 def test_setpoints_of_an_earlier_plan_give_a_warning(
     planned: Any, square: Any, tmp_path: Path, capsys: Any
 ) -> None:

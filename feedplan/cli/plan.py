@@ -95,6 +95,8 @@ def plan(
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
     option.require_one_or_formats(formats)
+    if step is not None and not output:
+        raise click.UsageError("--step needs a folder to write to: give -o DIR and --format pvt as well")
     if wanted.in_folder and not output:
         raise click.UsageError("--program needs a folder to write to: give -o DIR, or --program-out FILE")
     if server and (one_step_more or step is not None or wanted.file is not None or wanted.in_folder):

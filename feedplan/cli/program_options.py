@@ -39,16 +39,17 @@ def _wanted(
     in_folder: bool,
     feed_step: float | None,
     inverse_time: bool,
-    dialect: str,
+    dialect: str | None,
     expand: bool,
 ) -> ProgramWanted:
-    changed = {"feed_step": feed_step, "inverse_time": inverse_time, "expand": expand}
-    if any(changed.values()) and not (in_folder or program_out):
+    options = {"feed_step": feed_step, "inverse_time": inverse_time, "dialect": dialect, "expand": expand}
+    given = {name: value for name, value in options.items() if value is not None and value is not False}
+    if given and program_out is None and not in_folder:
         raise click.UsageError(
-            "--feed-step, --inverse-time and --expand are for the program with planned feeds: "
+            "--feed-step, --inverse-time, --dialect and --expand are for the program with planned feeds: "
             "give --program-out FILE as well"
         )
-    return ProgramWanted(program_out, in_folder, {**changed, "dialect": dialect})
+    return ProgramWanted(program_out, in_folder, given)
 
 
 # The command gets them as one argument, `wanted`.
@@ -75,9 +76,8 @@ program_options = as_one(
         click.option(
             "--dialect",
             type=click.Choice(DIALECTS),
-            default="linuxcnc",
-            show_default=True,
-            help="The control that the program is for: words that it lacks are reported.",
+            help="The control that the program is for: words that it lacks are reported.  "
+            "[default: linuxcnc]",
         ),
         click.option(
             "--expand",

@@ -107,3 +107,15 @@ def test_options_that_belong_together_are_asked_for(part: Path, capsys: Any) -> 
 def test_only_a_planned_program_is_written_beside_a_plan(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"the program is 'x': give what feedplan.planned_program returns"):
         feedplan.write_plan(planned(SQUARE), tmp_path / "out", (), program="x")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "options", [("--dialect", "grbl"), ("--feed-step", "0"), ("--expand",), ("--inverse-time",)]
+)
+def test_options_of_a_program_that_is_not_asked_for_are_refused(
+    options: tuple[str, ...], part: Path, capsys: Any
+) -> None:
+    assert main(["plan", str(part), *options]) == 2
+    assert (
+        "are for the program with planned feeds: give --program-out FILE as well" in capsys.readouterr().err
+    )
