@@ -258,6 +258,14 @@ def test_an_output_of_a_name_too_long(tmp_path: Path) -> None:
     assert "choose another folder" in error
 
 
+@pytest.mark.parametrize("command", ["plan", "check", "fit"])
+def test_an_input_of_a_name_too_long(command: str) -> None:
+    code, error = _alone(command, "a" * 300)
+    assert code == cli.BAD_INPUT, error
+    _is_a_sentence(error)
+    assert "cannot be read (File name too long): give " in error
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")
 def test_a_full_standard_output(tmp_path: Path) -> None:
     program = tmp_path / "part.ngc"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path as FilePath
 
-from feedplan.errors import InputError
+from feedplan.errors import InputError, unreadable
 
 SHORTEST = 16
 
@@ -14,7 +14,7 @@ def read_token(file: FilePath) -> str:
     try:
         token = file.read_text("ascii").partition("\n")[0].strip()
     except (OSError, ValueError) as error:
-        raise InputError(f"the token file {file} cannot be read ({error}): give a file of one line") from None
+        raise InputError(unreadable(f"the token file {file}", error, "a file of one line in ASCII")) from None
     if len(token) < SHORTEST or not token.isprintable() or " " in token:
         raise InputError(
             f"{file}: the token has fewer than {SHORTEST} characters or a space: "

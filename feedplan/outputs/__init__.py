@@ -114,6 +114,9 @@ def require_format(version: object, what: str) -> None:
         )
 
 
+_PLACE = "a file of setpoints or the folder of a plan"
+
+
 def load_setpoints(place: str | os.PathLike[str], progress: Listener | None = None) -> SetpointFile:
     """The setpoints in a file, or in the folder of a plan, as one chunk.
 
@@ -121,14 +124,14 @@ def load_setpoints(place: str | os.PathLike[str], progress: Listener | None = No
     reading of a text file is. Raises InputError with the file and the remedy.
     """
     callback(progress, "the part done")
-    file = file_path(place, "the place", "a file of setpoints or the folder of a plan")
-    if file.is_dir():
-        found = files_in(file)
-        if not found:
-            raise InputError(
-                f"{file} holds no setpoints: `feedplan plan PROGRAM -o {file}` writes them there"
-            )
-        file = found[0]
+    file = file_path(place, "the place", _PLACE)
+    try:
+        found = files_in(file) if file.is_dir() else [file]
+    except OSError as error:
+        raise InputError(unreadable(file, error, _PLACE)) from None
+    if not found:
+        raise InputError(f"{file} holds no setpoints: `feedplan plan PROGRAM -o {file}` writes them there")
+    file = found[0]
     endings = {FilePath(format_named(name).FILE).suffix: name for name in formats()}
     if file.suffix in endings:
         return _load(endings[file.suffix], file, progress)

@@ -60,9 +60,9 @@ def content_of(source: Source, name: str | None = None, max_bytes: int = MAX_BYT
 
 
 def _of_file(path: Path, max_bytes: int) -> bytes:
-    if path.is_dir():
-        raise ProgramError(f"{path} is a directory: give the program file in it")
     try:
+        if path.is_dir():
+            raise ProgramError(f"{path} is a directory: give the program file in it")
         size = path.stat().st_size
         _check_size(size, str(path), max_bytes)
         with path.open("rb") as stream:

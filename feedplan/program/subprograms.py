@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from feedplan.errors import InputError, unreadable
 from feedplan.program.source import MAX_BYTES
 
 Finder = Callable[[str], tuple[str, bytes] | None]
@@ -48,7 +49,18 @@ def numbered_files(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> dict[
     return dict(file for number in sorted(numbers) if (file := find(number)) is not None)
 
 
+def require_folder(folder: Path) -> Path:
+    """The folder, if its files can be listed. Raises InputError."""
+    try:
+        next(folder.iterdir(), None)
+    except OSError as error:
+        what = f"the folder {folder} of subprograms"
+        raise InputError(unreadable(what, error, "the path of a folder")) from None
+    return folder
+
+
 def _files(folder: Path) -> list[Path]:
+    # The program's own folder may have been removed, or be one that only its files may be read in.
     try:
         return sorted(file for file in folder.iterdir() if file.is_file())
     except OSError:

@@ -162,6 +162,10 @@ def test_one_batch_at_a_time_works_on_a_folder(tmp_path: Path) -> None:
         (("--format", "npz", "--format", "none"), "--format none excludes other formats: leave one"),
         (("-m", "mil"), "machine"),
         (("--tool-table", "none.tbl"), "the tool table none.tbl cannot be read (No such file"),
+        (
+            ("--subprograms", "none"),
+            "the folder none of subprograms cannot be read (No such file or directory)",
+        ),
         (("--jobs", "2", "--cluster", "127.0.0.1:8786"), "--jobs is for processes of this computer"),
         (("--tls-ca", "ca.pem"), "are for a cluster: give --cluster too"),
         (("-o", "part0.ngc"), "is a file, not a folder: choose another folder with -o"),

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from feedplan.errors import ProgramError
+from feedplan.errors import InputError, ProgramError
 from feedplan.program.gcode import read_gcode
+from feedplan.program.read import read_program
 
 
 def targets(text: str, **options: object) -> list[list[float]]:
@@ -57,6 +58,19 @@ def test_a_fault_in_another_file_names_both_places(tmp_path: Path) -> None:
         main.write_text(f"G21\no<{name}> call\nM2\n")
         with pytest.raises(ProgramError, match="is neither in the program nor in a file"):
             read_gcode(main)
+
+
+def test_a_folder_of_subprograms_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for name, why in (
+        ("none", "No such file or directory"),
+        ("file", "Not a directory"),
+        (300 * "x", "File name"),
+    ):
+        with pytest.raises(
+            InputError, match=f"of subprograms cannot be read \\({why}.*give the path of a folder"
+        ):
+            read_program("G21\nG0 X1\nM2\n", subprograms=[tmp_path, tmp_path / name])
 
 
 def test_numbered_subprograms_share_the_parameters_of_their_caller() -> None:
