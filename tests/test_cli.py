@@ -363,6 +363,19 @@ def test_a_closed_pipe_is_no_error() -> None:
     assert done.stderr == ""
 
 
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_closed_pipe_has_the_exit_code_of_one(closed: str, tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text("G21\nG1 X5 F600\n")  # gives warnings on standard error
+    reads, writes = os.pipe()
+    os.close(reads)
+    command = [sys.executable, "-c", MAIN, "plan", str(tmp_path / "part.ngc")]
+    own = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, closed: writes}
+    done = subprocess.run(command, text=True, check=False, **own)  # type: ignore[call-overload]
+    os.close(writes)
+    assert done.returncode == 141
+    assert "error" not in f"{done.stdout}{done.stderr}"
+
+
 def test_the_help_imports_no_slow_package() -> None:
     code = "import sys, feedplan.cli; print({'rich', 'scipy', 'toppra'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

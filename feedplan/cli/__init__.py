@@ -45,6 +45,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _close_output()
         return PIPE_CLOSED
+    except SystemExit as ended:
+        # click ends with 1 where a command writes into a closed pipe; 1 means a broken limit here.
+        if ended.code != 1:
+            raise
+        return PIPE_CLOSED
     except OSError as error:
         # Errors of files are FeedplanErrors; an OSError comes from the standard output (a full disk, for
         # instance).
