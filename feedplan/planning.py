@@ -555,7 +555,7 @@ def _one_path(method: str, path: str, refits: bool) -> tuple[str, ...]:
     """A sentence if the fastest path was asked for and the method knows one path only."""
     if path != "fastest" or refits:
         return ()
-    return (f"{method} follows the lines of the program: the path fastest is the path as-fitted",)
+    return (f"the method {method} knows one path only: the path fastest is the path as-fitted",)
 
 
 def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:

@@ -99,6 +99,21 @@ def test_the_command_prints_one_row_a_method_and_writes_a_page_that_holds_them(
     assert page.count('class="broken-row"') == sum(not row["audit"]["ok"] for row in content["methods"])
 
 
+def test_warnings_are_told_once_and_by_method(tmp_path: Path, capsys: Any) -> None:
+    file = tmp_path / "angle.ngc"
+    file.write_text("G21 G90 G64 P0.05 F3000\nG43 H3\nG1 X20\nY10\nM2\n")
+    lengths = "line 2: the tool lengths that G43 calls for are not known"
+    assert (
+        main(["compare", str(file), "--methods", "bang-bang,tangential,linuxcnc", "--path", "fastest"]) == 0
+    )
+    told = capsys.readouterr().err.splitlines()
+    assert [line.partition(":")[0] for line in told] == ["warning", "warning"]
+    assert told[0].startswith(f"warning: {lengths}")
+    assert told[1].startswith("warning: linuxcnc: the method linuxcnc knows one path only")
+    assert main(["fit", str(file)]) == 0
+    assert capsys.readouterr().err.startswith(f"warning: {lengths}")
+
+
 def test_no_word_of_other_packages_is_printed(
     program: Path, capfd: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -145,7 +145,7 @@ def test_rounds_are_one_to_three() -> None:
 @pytest.mark.parametrize("method", ["linuxcnc", "junction-deviation"])
 def test_a_method_with_one_path_says_so(method: str) -> None:
     turn = "G1 X10\nG1 X2.928932 Y7.071068\n"
-    says = f"{method} follows the lines of the program: the path fastest is the path as-fitted"
+    says = f"the method {method} knows one path only: the path fastest is the path as-fitted"
     assert says in made(turn, method=method, path="fastest").warnings
     assert says not in made(turn, method=method).warnings
     assert not any("as-fitted" in own for own in made(turn, path="fastest").warnings)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path as FilePath
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
@@ -16,6 +17,9 @@ from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.comparison import TIME_LIMIT
 from feedplan.program.read import Reading
 from feedplan.units import duration_text
+
+if TYPE_CHECKING:
+    from feedplan.comparison import Row
 
 
 @click.command()
@@ -85,6 +89,8 @@ def compare(
         }
         files = write_comparison(rows, output, summary, progress) if output else ()
     if not quiet:
+        for warning in _warnings(rows):
+            print(f"warning: {warning}", file=sys.stderr)
         for row in rows:
             if row.error:
                 print(f"{row.method}: {row.error}", file=sys.stderr)
@@ -99,3 +105,11 @@ def compare(
             for file in files:
                 print(file)
     return DONE if any(row.plan for row in rows) else BROKEN
+
+
+def _warnings(rows: Sequence[Row]) -> Iterator[str]:
+    """The warnings of all plans, each once; with the method where not all plans have it."""
+    plans = [row.plan for row in rows if row.plan]
+    for warning in dict.fromkeys(warning for plan in plans for warning in plan.warnings):
+        own = [plan.method for plan in plans if warning in plan.warnings]
+        yield warning if len(own) == len(plans) else f"{', '.join(own)}: {warning}"

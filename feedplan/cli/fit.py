@@ -45,7 +45,7 @@ def fit(
         if not isinstance(moves, Program):
             moves = read_program(moves, known, progress=of_stage(progress, "read"), **reading)
         path = build_path(moves, known, tolerance, corners=choice, progress=of_stage(progress, "fit"))
-    for warning in path.warnings:
+    for warning in (*moves.warnings, *path.warnings):
         print(f"warning: {warning}", file=sys.stderr)
     ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
     summary = asdict(path.fit) | ratios | {"pieces": len(path), "runs": len(path.runs) - 1}
