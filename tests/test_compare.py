@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import json
 import logging
 import os
@@ -112,6 +113,26 @@ def test_warnings_are_told_once_and_by_method(tmp_path: Path, capsys: Any) -> No
     assert told[1].startswith("warning: linuxcnc: the method linuxcnc knows one path only")
     assert main(["fit", str(file)]) == 0
     assert capsys.readouterr().err.startswith(f"warning: {lengths}")
+
+
+def test_the_colour_of_the_first_method_is_like_no_other() -> None:
+    root = Path(__file__).parent.parent
+    sheet = (root / "feedplan" / "report" / "page.css").read_text("utf-8")
+    script = (root / "page" / "source" / "comparison.js").read_text("utf-8")
+    others = re.findall(r'"(--axis-\d)"', script)
+    light, dark = (dict(re.findall(r"(--[\w-]+): #(\w{6});", part)) for part in sheet.split("@media", 1))
+    assert len(set(others)) >= 6
+    for colours in (light, dark):
+        hue, _ = hue_and_saturation(colours["--accent"])
+        for name in others:
+            own, saturation = hue_and_saturation(colours[name])
+            assert saturation == 0.0 or 30.0 < abs(own - hue) < 330.0, name
+
+
+def hue_and_saturation(colour: str) -> tuple[float, float]:
+    """Of a colour such as `1d5f8a`: the hue [deg] and the saturation (0 to 1)."""
+    hue, _, saturation = colorsys.rgb_to_hls(*(int(colour[k : k + 2], 16) / 255 for k in (0, 2, 4)))
+    return 360.0 * hue, saturation
 
 
 def test_no_word_of_other_packages_is_printed(

@@ -8,6 +8,8 @@ import { Run } from "./run.js";
 import { onTheme } from "./theme.js";
 
 const ACROSS = { length: "over length", time: "over time" };
+/* Colours of axes that differ from the first method's: the blue ones are too near to it. */
+const OTHERS = ["--axis-0", "--axis-1", "--axis-3", "--axis-4", "--axis-6", "--axis-8"];
 const DASHES = [undefined, [2, 3], [8, 4]];
 
 export function comparison(data) {
@@ -35,9 +37,9 @@ export function comparison(data) {
     const curves = methods.map((method, k) => ({
       name: method.method,
       curve: { x: method[across], y: method.speed },
-      colour: k === 0 ? "--accent" : `--axis-${(k - 1) % 6}`,
+      colour: k === 0 ? "--accent" : OTHERS[(k - 1) % OTHERS.length],
       width: k === chosen ? 2.2 : 1.3,
-      dash: DASHES[Math.floor(Math.max(k - 1, 0) / 6) % 3],
+      dash: DASHES[Math.floor(Math.max(k - 1, 0) / OTHERS.length) % 3],
     }));
     const ends = [0, Math.max(...runs.map((run) => (across === "length" ? run.length : run.duration))) || 1];
     speed.show({ curves, ends, range: [0, 1.25 * top], unit: `${unit}/s` });
