@@ -247,7 +247,7 @@ def _fields(table: dict[str, Any], name: str) -> dict[str, Any]:
         remedy = 'give a name, or a table with type = "cartesian"'
         raise MachineError(f"kinematics is {shown(driven)}: {remedy}")
     return {
-        "name": str(table.get("name", FilePath(name).stem)),
+        "name": table.get("name", FilePath(name).stem),
         "axes": tuple(_axis(row) for row in rows),
         "kinematics": parameters["type"],
         "parameters": {key: value for key, value in parameters.items() if key != "type"},

@@ -33,7 +33,8 @@ def table_of(text: str) -> dict[str, Any]:
     for part in _NOT_OF_KEYS.split(text):
         if sum(bool(key.strip()) for key in part.split(".")) > MAX_LEVELS:
             raise MachineError(f"{shown(part)} has more than {MAX_LEVELS} levels: give fewer")
-    return tomllib.loads(text)
+    # Editors of Windows put a byte order mark before a text in UTF-8.
+    return tomllib.loads(text.removeprefix("\ufeff"))
 
 
 def table_lines(head: str, rows: Mapping[str, Any]) -> list[str]:

@@ -38,7 +38,7 @@ def read_tools(file: Path) -> tuple[Tool, ...]:
     try:
         if file.stat().st_size > MAX_BYTES:
             raise InputError(f"{file} has more than {MAX_BYTES} bytes: give a tool table")
-        lines = file.read_bytes().decode("utf-8", "replace").splitlines()
+        lines = file.read_bytes().decode("utf-8-sig", "replace").splitlines()
     except OSError as error:
         raise InputError(unreadable(f"the tool table {file}", error, "the path of a .tbl file")) from None
     tools: list[Tool] = []

@@ -27,8 +27,14 @@ max_velocity_jump = 2.0
 
 def load(text: str, folder: Path) -> Machine:
     file = folder / "machine.toml"
-    file.write_text(text)
+    file.write_text(text, "utf-8")
     return Machine.load(file)
+
+
+def test_a_byte_order_mark_before_a_machine_file_is_left_out(tmp_path: Path) -> None:
+    assert load("\ufeff" + GOOD, tmp_path) == load(GOOD, tmp_path)
+    with pytest.raises(MachineError, match="name is 5: give a text"):
+        load(GOOD.replace('"one"', "5"), tmp_path)
 
 
 def test_tarus_has_the_limits_of_the_thesis() -> None:
