@@ -75,6 +75,23 @@ def test_quiet_prints_nothing(planned: Any, square: Any, capsys: Any) -> None:
     assert capsys.readouterr() == ("", "")
 
 
+def test_quiet_prints_the_json_that_is_asked_for(planned: Any, square: Any, capsys: Any) -> None:
+    square.warnings = ("line 3: slow",)
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "-q", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["time"] == 2.0
+    assert err == ""
+
+
+def test_a_name_given_twice_is_refused(program: Path, capsys: Any) -> None:
+    twice = 2 * ["--controller-option", "junction_deviation=0.02"]
+    assert main(["plan", str(program), "--controller", "grbl", *twice]) == 2
+    assert "--controller-option has junction_deviation twice: give it once" in capsys.readouterr().err
+    assert main(["machines", "import", "a.ini", "--limit", "X.jerk=1", "--limit", "X.jerk=2"]) == 2
+    assert "--limit has X.jerk twice: give it once" in capsys.readouterr().err
+
+
 def test_the_folder_is_written_and_named(planned: Any, square: Any, tmp_path: Path, capsys: Any) -> None:
     planned["result"] = square
     assert main(["plan", "a.ngc", "-o", str(tmp_path / "out"), "--format", "csv", "--format", "npz"]) == 0

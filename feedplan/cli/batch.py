@@ -162,14 +162,14 @@ def batch(
                 print(f"{row['folder']}: {row['error']}", file=sys.stderr)
             for failure in row["failures"]:
                 print(f"{row['folder']}: {failure}", file=sys.stderr)
-        if as_json:
-            sys.stdout.write(summary_text(summary))
-        else:
-            terminal.print_table(HEADER, table_rows(rows))
-            before = f", {kept} of them before" if kept else ""
-            print(f"{counted(len(rows), 'plan')} in {duration_text(summary['seconds'])}{before}")
-            for file in files:
-                print(file)
+    if as_json:
+        sys.stdout.write(summary_text(summary))
+    elif not quiet:
+        terminal.print_table(HEADER, table_rows(rows))
+        before = f", {kept} of them before" if kept else ""
+        print(f"{counted(len(rows), 'plan')} in {duration_text(summary['seconds'])}{before}")
+        for file in files:
+            print(file)
     return BROKEN if any(row["error"] is not None or not row["ok"] for row in rows) else DONE
 
 

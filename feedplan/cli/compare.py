@@ -96,14 +96,14 @@ def compare(
                 print(f"{row.method}: {row.error}", file=sys.stderr)
         if output and (missing := missing_pictures()):
             print(f"warning: {missing}", file=sys.stderr)
-        if as_json:
-            sys.stdout.write(summary_text(summary))
-        else:
-            terminal.print_table(*terminal.comparison_table(rows, LIMITS))
-            if today:
-                print(f"today: {duration_text(today.time)} by {today.controller.name}")
-            for file in files:
-                print(file)
+    if as_json:
+        sys.stdout.write(summary_text(summary))
+    elif not quiet:
+        terminal.print_table(*terminal.comparison_table(rows, LIMITS))
+        if today:
+            print(f"today: {duration_text(today.time)} by {today.controller.name}")
+        for file in files:
+            print(file)
     return DONE if any(row.plan for row in rows) else BROKEN
 
 

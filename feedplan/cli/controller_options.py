@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from feedplan.cli.options import as_one
+from feedplan.cli.options import as_one, by_name
 from feedplan.errors import MachineError
 from feedplan.machine.controller import MODELS, Controller
 from feedplan.machine.machine import Machine
@@ -44,7 +44,7 @@ def _pair(text: str) -> tuple[str, float | list[float]]:
 
 
 def _choice(controller: str | None, controller_options: tuple[str, ...]) -> Choice:
-    given = dict(map(_pair, controller_options))
+    given = by_name(map(_pair, controller_options), "--controller-option")
     return lambda machine: chosen(machine, controller, given)
 
 

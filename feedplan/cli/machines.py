@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from feedplan.cli import terminal
+from feedplan.cli.options import by_name
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis, Limit
 from feedplan.machine.machine import Machine, bundled_machines, bundled_text, template
@@ -63,7 +64,7 @@ def import_(file: str, limits: tuple[str, ...], name: str | None, output: str | 
     from feedplan.machine.importers import find_machine
     from feedplan.machine.machine import Machine
 
-    found = find_machine(file, dict(map(_limit, limits)), name=name)
+    found = find_machine(file, by_name(map(_limit, limits), "--limit"), name=name)
     text = found.to_toml()
     Machine.from_toml(text, found.origin)
     for note in found.notes():

@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -22,6 +22,7 @@ else:
     NumberType = click.ParamType  # generic only in the newest click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+Value = TypeVar("Value")
 
 
 class Number(NumberType):
@@ -95,7 +96,7 @@ MOST_SETPOINTS = click.option(
     help="A plan of more setpoints is refused.",
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only, and what --json asks for.")
 PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
 ZERO_OR_MORE = Number(or_zero=True)
 # This value of --format means that no setpoints are written.
@@ -129,6 +130,16 @@ def as_one(
         return functools.reduce(lambda made, option: option(made), reversed(options), packed)  # type: ignore[return-value]
 
     return add
+
+
+def by_name(pairs: Iterable[tuple[str, Value]], option: str) -> dict[str, Value]:
+    """The values by their names. Raises UsageError for a name that an option was given twice with."""
+    found: dict[str, Value] = {}
+    for name, value in pairs:
+        if name in found:
+            raise click.UsageError(f"{option} has {name} twice: give it once")
+        found[name] = value
+    return found
 
 
 def require_one_or_formats(formats: Sequence[str]) -> None:

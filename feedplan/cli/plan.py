@@ -147,6 +147,7 @@ def plan(
     if not quiet:
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
+    if as_json or not quiet:
         more = {"one_step_more": [each.to_json() for each in steps]} if one_step_more else {}
         summary = {**result.summary(), **more}
         if as_json:
