@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import shutil
 from pathlib import Path
@@ -41,6 +42,17 @@ def test_the_first_commands(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         assert code == 0, (command, said[command])
     first = next(command for command in commands if " plan " in command)
     assert f"time         {first.split('report.html: ')[1]} (" in said[first]
+
+
+def test_the_gain_of_a_greater_feed_in_the_documentation(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / "docs" / "machines.md").read_text("utf-8")
+    command = next(line for line in text.splitlines() if line.endswith("--one-step-more"))
+    assert main(shlex.split(command)[1:]) == 0
+    gain = re.search(r"^feed × 1.2 +[0-9.]+ s less$", capsys.readouterr().out, re.MULTILINE)
+    assert gain is not None
+    assert f"`{' '.join(gain[0].split()[:3])}   {' '.join(gain[0].split()[3:])}`" in text
 
 
 def test_the_first_lines_of_python(folder: Path) -> None:
