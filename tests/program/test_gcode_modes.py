@@ -76,6 +76,7 @@ def test_deleted_blocks_are_left_out_and_counted() -> None:
     program = read(text)
     assert program.target[:, 0].tolist() == [1, 4]
     assert program.warnings == ("2 blocks that start with / are left out (block delete)",)
+    assert read("G0 X1\n/ X2\nM2").warnings == ("1 block that starts with / is left out (block delete)",)
 
 
 def test_deleted_blocks_are_run_on_request() -> None:

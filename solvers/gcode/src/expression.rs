@@ -278,10 +278,11 @@ pub fn excerpt(source: &[u8], at: usize) -> String {
     let line = rest.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();
     let text = String::from_utf8_lossy(&line[..line.len().min(96)]);
     let text: String = text.trim_end().chars().filter(|letter| !letter.is_control()).take(24).collect();
-    if text.is_empty() {
-        "the end of the line".into()
-    } else {
-        format!("'{text}'")
+    let unseen = line.iter().find(|byte| byte.is_ascii_control() && **byte != b'\t');
+    match (text.is_empty(), unseen) {
+        (false, _) => format!("'{text}'"),
+        (true, Some(byte)) => format!("the control character 0x{byte:02X}"),
+        (true, None) => "the end of the line".into(),
     }
 }
 

@@ -163,7 +163,12 @@ impl<'a> Runner<'a> {
     fn ending(&self, lexer: &Lexer, word: Option<&str>) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.deleted > 0 {
-            warnings.push(format!("{} blocks that start with / are left out (block delete)", self.deleted));
+            let blocks = if self.deleted == 1 {
+                "block that starts with / is"
+            } else {
+                "blocks that start with / are"
+            };
+            warnings.push(format!("{} {blocks} left out (block delete)", self.deleted));
         }
         match word {
             Some("M99") => warnings.push(format!(
