@@ -29,6 +29,17 @@ _CODE = re.compile(rb"[Gg][ \t]*0*(\d*(?:\.\d+)?)")
 _MOVING = {b"1", b"2", b"3", b"17", b"18", b"19", b"20", b"21", b"90", b"91", b"90.1", b"91.1", b"93", b"94"}
 
 
+def require_no_splines(program: Program, lines: NDArray[np.int32]) -> None:
+    """Raises InputError if a feed move is a spline, which has no F as inverse time, however it is written;
+    `lines` are those of the moves in the program that the user has."""
+    splines = np.flatnonzero((program.kind == MoveKind.SPLINE) & np.isfinite(program.feed))
+    if len(splines):
+        raise InputError(
+            f"{program.name} line {lines[splines[0]]}: a spline: inverse time (G93) is for lines and arcs: "
+            "leave out --inverse-time"
+        )
+
+
 def inverse_feeds(
     blocks: Blocks,
     program: Program,
@@ -40,7 +51,7 @@ def inverse_feeds(
     """An F for each line with a feed move, by the greatest planned speed in it; `exclusion` (n,) is that of
     each line, `parts` are those of moves that are split.
 
-    Raises InputError where a line has no one length: in loops and cycles, on splines and on turns of a tool.
+    Raises InputError where a line has no one length: in loops and cycles, and on turns of a tool.
     """
     if not np.isfinite(program.feed).any():
         raise InputError(f"{program.name} has no feed moves: inverse time (G93) is for them: {_REMEDY}")
@@ -57,8 +68,6 @@ def inverse_feeds(
             why = REASONS[Exclusion(exclusion[line])]
         elif counts[line] > 1:
             why = "several moves, as of a cycle"
-        elif program.kind[m] == MoveKind.SPLINE:
-            why = "a spline"
         elif not blocks.plain[line]:
             why = "compensation, polar words, diameters or directions of the tool"
         if why is not None:

@@ -19,7 +19,7 @@ from feedplan.planned_feeds.blocks import Blocks, Exclusion, blocks_of
 from feedplan.planned_feeds.dialects import DIALECTS, DialectName, lacks, writes_points
 from feedplan.planned_feeds.expand import expanded
 from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, exclusions_of, line_speeds, planned_feeds
-from feedplan.planned_feeds.inverse_time import inverse_feeds
+from feedplan.planned_feeds.inverse_time import inverse_feeds, require_no_splines
 from feedplan.planned_feeds.part_lines import Sense, Word, moved_axes_are_named, part_lines, words_of
 from feedplan.planned_feeds.parts import Parts, motions, parts_of
 from feedplan.planned_feeds.read_back import SAME, require_same
@@ -146,9 +146,11 @@ def planned_program(
         raise refuse("the plan", plan, "the plan of a program, as feedplan.plan returns it")
     along = speeds_along(plan.problem, plan.profile, program)
     if expand:
-        content, program, along = _expanded(program, along, dialect)
+        content, program, along, source_lines = _expanded(program, along, dialect)
     else:
-        content = _text_of(program)
+        content, source_lines = _text_of(program), program.line
+    if inverse_time:
+        require_no_splines(program, source_lines)
     blocks = blocks_of(content, bool((program.reading or {}).get("block_delete", True)))
     # A plan exceeds the requested feed only by rounding.
     greatest = np.fmin(along.greatest(), plan.problem.request.of(program.feed))
@@ -223,8 +225,11 @@ def _text_of(program: Program) -> bytes:
 
 def _expanded(
     program: Program, along: SpeedsAlong, dialect: DialectName
-) -> tuple[bytes, Program, SpeedsAlong]:
-    """The program written anew, read back, and the speeds of its moves. Raises InputError as `expanded`."""
+) -> tuple[bytes, Program, SpeedsAlong, NDArray[np.int32]]:
+    """The program written anew, read back, the speeds of its moves, and the lines that they had before.
+
+    Raises InputError as `expanded`.
+    """
     machine = (program.reading or {}).get("machine")
     content, of = expanded(program, machine, dialect)
     again = read_program(content, machine, name=program.name)
@@ -254,7 +259,7 @@ def _expanded(
             f"{program.name} is not the same when its moves are written anew: leave out --expand"
         )
     taken = replace(along, first=along.first[of], last=along.last[of], group=along.group[of])
-    return content, again, taken
+    return content, again, taken, program.line[of]
 
 
 def _curved(program: Program) -> Floats:

@@ -218,6 +218,12 @@ def test_inverse_time_begins_at_the_first_feed_and_is_for_plain_moves() -> None:
     assert rewritten(text, inverse_time=True) == "G21\nG0 X0\nG1 X30 F20 G93\nX30 F1\nM2\n"
     with pytest.raises(InputError, match=r"line 3: several moves, as of a cycle: inverse time \(G93\)"):
         rewritten("G21 F600\nG0 Z5\nG81 X3 Z-5 R1\nM2\n", inverse_time=True)
+    spline = "G21 F600\n\n\nG0 X1\nG5 X9 Y9 I3 J3 P-3 Q-3\nM2\n"
+    for expand in (False, True):
+        with pytest.raises(
+            InputError, match=r"line 5: a spline: inverse time .* arcs: leave out --inverse-time$"
+        ):
+            rewritten(spline, inverse_time=True, expand=expand)
     with pytest.raises(InputError, match="has no feed moves"):
         rewritten("G21\nG0 X3\nM2\n", inverse_time=True)
 
