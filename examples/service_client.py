@@ -98,4 +98,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except OSError as error:  # a file that cannot be read or written
+        sys.exit(f"error: {error.filename}: {error.strerror}")

@@ -37,6 +37,12 @@ def moves(text: str, words: str) -> NDArray[np.float64]:
     return np.array([[float(number) for number in match.groups()] for match in found if match])
 
 
+def test_the_client_of_the_service_tells_a_file_that_is_missing(tmp_path: Path) -> None:
+    command = [sys.executable, str(EXAMPLES / "service_client.py"), "none.ngc"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "error: none.ngc: No such file or directory\n")
+
+
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_the_script_runs_and_writes_below_out(script: str, tmp_path: Path) -> None:
     if "matplotlib" in (EXAMPLES / script).read_text(encoding="utf-8"):
