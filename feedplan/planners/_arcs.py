@@ -15,6 +15,9 @@ from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
 # The joint of an arc of constant joint acceleration has a q' that varies by at most this factor.
 _VARIES = 1e3
+# Its q' is at least this part of the greatest of all joints: of such a q' less than 1e-9 is rounding, and the
+# duration follows from it.
+_MOVES = 1e-6
 
 
 @dataclass(frozen=True)
@@ -71,11 +74,12 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs
     kind = np.full(len(mesh), PhaseLaw.PARAMETER_ACCELERATION, np.uint8)
     axis = np.full(len(mesh), NO_AXIS, np.uint8)
     value, duration = s.copy(), 2.0 * mesh.width / (np.sqrt(start) + np.sqrt(end))
+    least = _MOVES * np.abs(mesh.slope).max(axis=(0, 2))
     for k in range(len(problem.axes)):
         slope, way = mesh.slope[:, :, k], mesh.way[:, :, k]
         size = np.abs(slope)
         steady = (slope * np.sign(way[-1]) > 0.0).all(axis=0) & by_axis
-        steady &= size.max(axis=0) < _VARIES * size.min(axis=0)
+        steady &= (size.max(axis=0) < _VARIES * size.min(axis=0)) & (size.min(axis=0) > least)
         if not steady.any():
             continue
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -32,6 +32,12 @@ MESHED = ("toppra", "casadi", "clarabel")
 CHORD = 2e-4
 
 
+def test_a_joint_that_only_rounding_moves_gives_no_arc_its_duration() -> None:
+    text = b"G21 G64 P0.02\nF1500\nG1 X20 Y25 Z4\nX15 Y20\nM2\n"
+    plan = feedplan.plan(text, "corexy", "casadi", path="fastest")
+    assert plan.audit().ok, plan.audit().failures
+
+
 def line_problem(**limits: Any) -> Problem:
     """100 mm along X at most at 100 mm/s, with 1000 mm/s²."""
     path = Path.from_bezier([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]], feed=100.0)
