@@ -150,9 +150,17 @@ def _audit_axes(
     if setpoints is not None:
         report(PLAN_SHARE)
         # Setpoints on a path that has been measured need not be measured against the program as well.
-        deviation = max((found[4] for found in results[0][0] if found[0] == "deviation"), default=0.0)
-        compared = (problem, feed, profile, program, deviation)
-        results.append(_seen(SetpointAudit(limits, 0.0, *compared), setpoints))
+        findings, _ = results[0]
+        used = [ratio for name, _, _, _, ratio, _, _ in findings if name == "deviation"]
+        stream = SetpointAudit(
+            limits,
+            problem=problem,
+            feed=feed,
+            profile=profile,
+            program=program,
+            deviation=max(used, default=0.0),
+        )
+        results.append(_seen(stream, setpoints))
     return results
 
 
@@ -188,8 +196,12 @@ def _audit_joints(
         results.append(audit_joints(problem, own, profile, part(report, 0.0, whole)))
     if setpoints is not None:
         report(PLAN_SHARE)
-        compared = () if profile is None else (problem, feed, profile)
-        results.append(_seen(SetpointAudit(limits, 0.0, *compared), setpoints))
+        stream = (
+            SetpointAudit(limits)
+            if profile is None
+            else SetpointAudit(limits, problem=problem, feed=feed, profile=profile)
+        )
+        results.append(_seen(stream, setpoints))
     return results
 
 
@@ -290,7 +302,7 @@ def audit_setpoints(
         period=period,
         end_speeds=(0.0, 0.0),
     )
-    stream = SetpointAudit(limits, float(resolution))
+    stream = SetpointAudit(limits, resolution)
     for start in range(0, len(times), CHUNK):
         tell(progress, RECORDED_SHARE * start / len(times))
         own = slice(start, start + CHUNK)
