@@ -269,6 +269,12 @@ class Path:
         refuse(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
         same: Flags = (array[1:] == array[:-1]).all(axis=1)
         refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
+        with np.errstate(over="ignore"):
+            step = np.linalg.norm(np.diff(array, axis=0), axis=1)
+        beyond: Flags = ~((step > 0.0) & (step < math.inf))
+        refuse(
+            beyond, lambda i: f"the distance of points {i} and {i + 1} is no number above 0: scale the points"
+        )
         count, width = len(array) - 1, array.shape[1]
         lines = Program(
             name="points",

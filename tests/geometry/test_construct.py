@@ -167,6 +167,11 @@ def test_what_cannot_be_used_is_refused_with_a_sentence() -> None:
         Path.from_points([[0, 0]], 0.1)
     with pytest.raises(InputError, match="points 1 and 2 coincide"):
         Path.from_points([[0, 0], [1, 1], [1, 1]], 0.1)
+    for size in (1e300, 1e-300):
+        with pytest.raises(
+            InputError, match="the distance of points 0 and 1 is no number above 0: scale the"
+        ):
+            Path.from_points(size * np.array([[0.0, 0.0], [1.0, 0.0]]), 0.01)
     with pytest.raises(InputError, match="point 1 is not finite"):
         Path.from_points([[0, 0], [1, math.nan]], 0.1)
     for tolerance in (-1.0, math.nan, math.inf):
