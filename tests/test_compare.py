@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import re
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ def test_warnings_are_told_once_and_by_method(tmp_path: Path, capsys: Any) -> No
     assert capsys.readouterr().err.startswith(f"warning: {lengths}")
 
 
-def test_the_colour_of_the_first_method_is_like_no_other() -> None:
+def test_the_colours_of_methods_can_be_told_apart() -> None:
     root = Path(__file__).parent.parent
     sheet = (root / "feedplan" / "report" / "page.css").read_text("utf-8")
     script = (root / "page" / "source" / "comparison.js").read_text("utf-8")
@@ -123,16 +124,16 @@ def test_the_colour_of_the_first_method_is_like_no_other() -> None:
     light, dark = (dict(re.findall(r"(--[\w-]+): #(\w{6});", part)) for part in sheet.split("@media", 1))
     assert len(set(others)) >= 6
     for colours in (light, dark):
-        hue, _ = hue_and_saturation(colours["--accent"])
-        for name in others:
-            own, saturation = hue_and_saturation(colours[name])
-            assert saturation == 0.0 or 30.0 < abs(own - hue) < 330.0, name
+        hue = {name: hue_of(colours[name]) for name in ("--accent", *others)}
+        five = ["--accent", *others[:4]]
+        for one, other in [*combinations(five, 2), *(("--accent", other) for other in others)]:
+            assert hue[one] is None or hue[other] is None or 30.0 < abs(hue[one] - hue[other]) < 330.0
 
 
-def hue_and_saturation(colour: str) -> tuple[float, float]:
-    """Of a colour such as `1d5f8a`: the hue [deg] and the saturation (0 to 1)."""
+def hue_of(colour: str) -> float | None:
+    """The hue [deg] of a colour such as `1d5f8a`; None for a grey one."""
     hue, _, saturation = colorsys.rgb_to_hls(*(int(colour[k : k + 2], 16) / 255 for k in (0, 2, 4)))
-    return 360.0 * hue, saturation
+    return 360.0 * hue if saturation > 0.0 else None
 
 
 def test_no_word_of_other_packages_is_printed(

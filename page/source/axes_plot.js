@@ -8,6 +8,8 @@ import { axisColour, style } from "./theme.js";
 
 const PER = { velocity: "s", acceleration: "s²", jerk: "s³" };
 const HEIGHT = { speed: 120, others: 150 };
+/* The legend of so many axes is beside their limits; that of more is below them. */
+const MOST_BESIDE = 3;
 
 export class AxesPlot {
   /* `rows` are names of quantities; with `relative` values are drawn over their limits. */
@@ -25,7 +27,7 @@ export class AxesPlot {
         onZoom: (range) => this.plots.forEach(({ plot: one }) => one.zoom(range)),
         onPoint: (time) => cursor.set(time, this),
       });
-      return { name, head, plot };
+      return { name, box, head, plot };
     });
     this.end = cursor.follow((time) => this.plots.forEach(({ plot }) => plot.point(time)));
     this.show();
@@ -46,6 +48,7 @@ export class AxesPlot {
     for (const row of this.plots) {
       const shownRow = row.name === "speed" ? this.#speed() : this.#quantity(row.name);
       row.head.replaceChildren(...shownRow.head);
+      row.box.classList.toggle("beside", shownRow.curves.length <= MOST_BESIDE);
       row.plot.show({ ...shownRow, ends: [0, this.data.duration || 1] });
     }
   }
@@ -101,11 +104,13 @@ function told({ axes, units, limits, least }, name, isJudged) {
   const known = axes.flatMap((axis, k) => {
     const most = limits[name][k], low = least[name]?.[k];
     if (!most) return [];
-    return `${axis} ${low && low !== -most ? `${shown(low, 6)}…` : ""}${shown(most, 6)}`;
+    const text = `${axis} ${low && low !== -most ? `${shown(low, 6)}…` : ""}${shown(most, 6)}`;
+    return { text, unit: `${units[k]}/${PER[name]}` };
   });
   if (!known.length) return "";
-  const unit = [...new Set(units)].map((own) => `${own}/${PER[name]}`).join(", ");
-  return isJudged ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;
+  // A unit is told once, after the last of the axes in a row that have it.
+  const list = known.map(({ text, unit }, k) => (known[k + 1]?.unit === unit ? text : `${text} ${unit}`)).join(", ");
+  return isJudged ? `limits ${list}` : `not limited by this method (machine: ${list})`;
 }
 
 function heading(name, unit, note) {

@@ -8,8 +8,9 @@ import { Run } from "./run.js";
 import { onTheme } from "./theme.js";
 
 const ACROSS = { length: "over length", time: "over time" };
-/* Colours of axes that differ from the first method's: the blue ones are too near to it. */
-const OTHERS = ["--axis-0", "--axis-1", "--axis-3", "--axis-4", "--axis-6", "--axis-8"];
+/* Colours of the methods after the first: those of axes, without the blue ones, which are too near to the first
+   method's; the two that are near to each other come last. */
+const OTHERS = ["--axis-0", "--axis-1", "--axis-4", "--axis-6", "--axis-8", "--axis-3"];
 const DASHES = [undefined, [2, 3], [8, 4]];
 
 export function comparison(data) {

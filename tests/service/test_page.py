@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+import feedplan
 from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.outputs import npz
@@ -231,3 +232,35 @@ def test_the_drawing_is_sent_as_bytes(server: Server) -> None:
     assert data["path"]["time"][-1] == pytest.approx(job["result"]["time"], abs=0.01)
     assert data["path"]["length"][-1] == pytest.approx(data["length"]["speed"]["x"][-1], rel=1e-3)
     assert set(data["path"]["line"]) == {3, 4, 5}
+
+
+@in_a_browser
+@pytest.mark.parametrize(
+    ("program", "machine", "limits"),
+    [
+        ("part.ngc", "mill", "X 500, Y 500, Z 400 mm/s"),
+        ("bar.ngc", "rotary-table", "X 500, Y 500, Z 400 mm/s, A 180 deg/s"),
+    ],
+)
+def test_the_legend_of_a_report_leaves_the_limits_readable(
+    program: str, machine: str, limits: str, tmp_path: Path
+) -> None:
+    feedplan.write_plan(feedplan.plan(ROOT / "examples" / program, machine), tmp_path, formats=[])
+    for width in (400, 1080, 1280):
+        command = [
+            "node",
+            str(ROOT / "page" / "test" / "heads.mjs"),
+            str(tmp_path / "report.html"),
+            str(width),
+        ]
+        done = subprocess.run(
+            command,
+            env={**os.environ, "CHROMIUM": str(CHROMIUM)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        heads = json.loads(done.stdout)
+        assert [head["text"] for head in heads if head["covered"]] == []
+        assert heads[1]["text"].endswith(f"limits {limits}")

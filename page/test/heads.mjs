@@ -1,0 +1,22 @@
+/* Opens a report and prints, for each chart over time, its heading and whether the legend covers the heading, as JSON:
+   node page/test/heads.mjs REPORT WIDTH */
+
+import { resolve } from "node:path";
+import { pathToFileURL } from "node:url";
+import { chromium } from "playwright-core";
+
+const [, , report, width] = process.argv;
+const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+const page = await browser.newPage({ viewport: { width: Number(width), height: 1000 } });
+await page.goto(pathToFileURL(resolve(report)).href);
+await page.waitForSelector("#time .row .u-legend");
+const heads = await page.locator("#time .row").evaluateAll((rows) => rows.map((row) => {
+  const words = document.createRange();
+  words.selectNodeContents(row.querySelector("p"));
+  const entries = [...row.querySelectorAll(".u-legend .u-series:not(:first-child)")].map((entry) => entry.getBoundingClientRect());
+  const covered = [...words.getClientRects()].some((own) => entries.some((entry) =>
+    own.left < entry.right && entry.left < own.right && own.top < entry.bottom && entry.top < own.bottom));
+  return { text: words.toString(), covered };
+}));
+await browser.close();
+process.stdout.write(JSON.stringify(heads));
