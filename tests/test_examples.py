@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import feedplan
 from benchmarks.named import EXAMPLES, example
 from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.axis_words import axis_words
@@ -35,6 +36,28 @@ def moves(text: str, words: str) -> NDArray[np.float64]:
     )
     found = [re.search(pattern, line) for line in text.splitlines()]
     return np.array([[float(number) for number in match.groups()] for match in found if match])
+
+
+def test_the_times_of_the_panel_are_those_of_the_documentation(tmp_path: Path) -> None:
+    command = [sys.executable, str(EXAMPLES / "panel.py"), "--passes", "4", "--output", "panel.json"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    times = [
+        f"{feedplan.plan(tmp_path / 'panel.json', 'tarus', method).time:.1f} s by `{method}`"
+        for method in ("s-curve", "ruckig", "jerk-limited")
+    ]
+    text = (EXAMPLES.parent / "docs" / "methods.md").read_text("utf-8")
+    assert f"four passes take {times[0]}, {times[1]} and {times[2]}" in " ".join(text.split())
+
+
+def test_the_corner_of_the_documentation_takes_its_times() -> None:
+    machine = Machine("fast", tuple(feedplan.Axis(name, 250.0, 3000.0, 50_000.0) for name in "XY"))
+    text = "G21 G90 G64 F60000\nG1 X10\nG1 X10 Y10\nM2\n"
+    said = []
+    for tolerance in (0.01, 0.05):
+        options = {"tolerance": tolerance, "path": "as-fitted"}, {"tolerance": tolerance, "path": "fastest"}
+        said += [f"{feedplan.plan(text, machine, 'jerk-limited', **own).time:.3f}" for own in options]
+    words = "{} s as fitted and {} s at 0.01 mm, {} and {} s at 0.05 mm".format(*said)
+    assert words in " ".join((EXAMPLES.parent / "docs" / "methods.md").read_text("utf-8").split())
 
 
 def test_the_client_of_the_service_tells_a_file_that_is_missing(tmp_path: Path) -> None:
