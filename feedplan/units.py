@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 MM_PER_INCH = 25.4
 SECONDS_PER_MINUTE = 60.0
@@ -58,9 +59,20 @@ def difference_text(difference: float, of: float, word: str = "") -> str:
     return f"{seconds}, {part:.1f} %"
 
 
-def tolerance_text(least: float, greatest: float) -> str:
-    """`0.01 mm`, or the least and the greatest tolerance [mm] of a path that has several."""
-    return f"{greatest:g} mm" if least == greatest else f"{least:g} to {greatest:g} mm"
+def way_unit(summary: Mapping[str, Any]) -> str:
+    """The unit of distances from the path of a plan: that of its length, or where it only turns of angles."""
+    units: Mapping[str, str] = summary["units"]
+    return units["angle" if summary["turn"] > 0 and summary["length"] == 0 else "length"]
+
+
+def tolerance_text(least: float, greatest: float, unit: str = "mm") -> str:
+    """`0.01 mm`, or the least and the greatest tolerance of a path that has several."""
+    return f"{greatest:g} {unit}" if least == greatest else f"{least:g} to {greatest:g} {unit}"
+
+
+def distance_text(distance: float, unit: str = "mm", form: str = ".3g") -> str:
+    """A small distance: `9.39 µm` for millimetres, `0.00939 rad` for others."""
+    return f"{1e3 * distance:{form}} µm" if unit == "mm" else f"{distance:{form}} {unit}"
 
 
 def ratio_text(number: float, other: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import feedplan
 from feedplan.checking import check
+from feedplan.cli import main
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
@@ -141,3 +143,21 @@ def test_a_path_file_has_the_machines_own_axes_and_units(tmp_path: FilePath) -> 
         assert plan.path.axes == NAMES
     with pytest.raises(InputError, match="axes has j4 and the machine does not: use X, Y, Z"):
         feedplan.plan(file, "mill")
+
+
+def test_distances_from_the_path_are_told_in_its_unit(tmp_path: FilePath, capsys: Any) -> None:
+    (tmp_path / "arm.toml").write_text(arm("rad").to_toml())
+    curve = {"degree": 1, "control_points": [[0, 0], [1, 0], [1, 1]], "knots": [0, 0, 1, 2, 2]}
+    file = tmp_path / "arm.json"
+    file.write_text(json.dumps({"axes": NAMES[:2], "feed": 1.5, "curves": [curve]}))
+    command = ["plan", str(file), "-m", str(tmp_path / "arm.toml"), "--method", "jerk-limited"]
+    assert main([*command, "-o", str(tmp_path / "out"), "--format", "none"]) == 0
+    rows = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert rows["feed"].endswith(" s, 1.998 rad")
+    assert rows["tolerance"] == "0.01 rad"
+    assert rows["deviation"].endswith(" rad")
+    assert re.fullmatch(r"\S+ rad inside at most, \S+ rad outside, bends \S+ rad in the mean", rows["sides"])
+    assert rows["fit"].startswith("1 point as 1 spline (")
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert re.search(r"Tolerance asked for</td><td[^>]*>0.01 rad<", page)
+    assert re.search(r"Deviation from the program</td><td[^>]*>0.00\d+ rad<", page)

@@ -11,7 +11,16 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import LONGEST
-from feedplan.units import counted, difference_text, duration_text, mm_per_min, ratio_text, tolerance_text
+from feedplan.units import (
+    counted,
+    difference_text,
+    distance_text,
+    duration_text,
+    mm_per_min,
+    ratio_text,
+    tolerance_text,
+    way_unit,
+)
 
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
@@ -139,9 +148,9 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     rows.append(("limits", _limits_text(summary["limits"])))
     rows += step_rows(summary.get("one_step_more") or ())
     rows.append(("stops", _stops_text(summary["stops_by_cause"])))
-    rows.append(("tolerance", tolerance_text(**summary["tolerance"])))
+    rows.append(("tolerance", tolerance_text(**summary["tolerance"], unit=way_unit(summary))))
     rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))
-    rows += fit_rows(summary.get("fit") or {})
+    rows += fit_rows(summary.get("fit") or {}, way_unit(summary))
     if summary.get("gain"):
         rows.append(("faster path", gain_text(summary["gain"])))
     rows.append(("audit", audit_text(audit)))
@@ -178,7 +187,9 @@ def step_rows(steps: Sequence[Mapping[str, Any]]) -> Rows:
 
 
 def _total_text(total: Mapping[str, float], units: Mapping[str, str]) -> str:
-    """`1.2 s, 80 mm`, with degrees where rotary axes move alone."""
+    """`1.2 s, 80 mm`, with degrees where rotary axes move alone; `1.2 s, 90 deg` if nothing else moves."""
+    if total["length"] == 0 and total["turn"] > 0:
+        return f"{duration_text(total['time'])}, {total['turn']:.4g} {units['angle']}"
     turn = f", {total['turn']:.4g} {units['angle']} alone" if total["turn"] > 0 else ""
     return f"{duration_text(total['time'])}, {total['length']:.6g} {units['length']}{turn}"
 
@@ -199,15 +210,15 @@ def pieces_text(summary: Mapping[str, Any]) -> str:
     return f"{counted(summary['pieces'], 'piece')} in {counted(summary['runs'], 'run')}"
 
 
-def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Points, splines and deviation of a fit; empty if nothing was fitted."""
+def fit_rows(fit: Mapping[str, Any], unit: str = "mm") -> list[tuple[str, str]]:
+    """Points, splines and deviation of a fit, with the unit of its distances; empty if nothing was fitted."""
     points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
     if not points or not splines:
         return []
-    text = f"{points} points as {splines} splines ({ratio_text(points, splines)})"
+    text = f"{counted(points, 'point')} as {counted(splines, 'spline')} ({ratio_text(points, splines)})"
     if polynomials:
-        text += f" of {polynomials} polynomials ({ratio_text(points, polynomials)})"
-    return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} mm"), *_side_rows(fit)]
+        text += f" of {counted(polynomials, 'polynomial')} ({ratio_text(points, polynomials)})"
+    return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} {unit}"), *_side_rows(fit, unit)]
 
 
 def gain_text(gain: Mapping[str, Any]) -> str:
@@ -223,13 +234,13 @@ def gain_text(gain: Mapping[str, Any]) -> str:
     return text
 
 
-def _side_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _side_rows(fit: Mapping[str, Any], unit: str) -> list[tuple[str, str]]:
     """Offsets of a smooth path from the program by side; empty for other paths."""
     if fit.get("mean_offset") is None:
         return []
-    inside, outside, mean = (1e3 * float(fit[key]) for key in ("inside", "outside", "mean_offset"))
-    text = f"{inside:.3g} µm inside at most, {outside:.3g} µm outside, bends {mean:+.2g} µm in the mean"
-    return [("sides", text)]
+    inside, outside = (distance_text(float(fit[key]), unit) for key in ("inside", "outside"))
+    mean = distance_text(float(fit["mean_offset"]), unit, "+.2g")
+    return [("sides", f"{inside} inside at most, {outside} outside, bends {mean} in the mean")]
 
 
 def audit_text(audit: Audit) -> str:

@@ -11,7 +11,15 @@ from feedplan.audit import Audit, LimitCheck
 from feedplan.report.account import Account, Total
 from feedplan.report.losses import Share, SlowLine
 from feedplan.report.stops import Stops
-from feedplan.units import counted, duration_text, mm_per_min, ratio_text, tolerance_text
+from feedplan.units import (
+    counted,
+    distance_text,
+    duration_text,
+    mm_per_min,
+    ratio_text,
+    tolerance_text,
+    way_unit,
+)
 
 # Limits of the machine and the program; all other checks are checks of consistency.
 _OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
@@ -160,12 +168,13 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
             )
     else:
         rows.append(("Fit", "nothing to fit"))
-    rows.append(("Tolerance asked for", f"{tolerance_text(*tolerance)}"))
+    unit = way_unit(summary)
+    rows.append(("Tolerance asked for", tolerance_text(*tolerance, unit)))
     if fit.get("deviation") is not None:
-        rows.append(("Deviation from the program", f"{_short(fit['deviation'] * 1e3)} µm"))
+        rows.append(("Deviation from the program", _distance(fit["deviation"], unit)))
     if fit.get("mean_offset") is not None:
         rows += [
-            (name, f"{_short(fit[key] * 1e3)} µm")
+            (name, _distance(fit[key], unit))
             for name, key in (
                 ("… inside, at most", "inside"),
                 ("… outside, at most", "outside"),
@@ -285,6 +294,10 @@ def _percent(ratio: float) -> str:
 
 def _short(value: float) -> str:
     return "0" if abs(value) < 1e-9 else f"{value:.3g}"
+
+
+def _distance(value: float, unit: str) -> str:
+    return distance_text(0.0 if abs(value) < 1e-12 else value, unit)
 
 
 def _length(length: float, unit: str) -> tuple[str, str]:

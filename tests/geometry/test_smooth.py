@@ -276,4 +276,4 @@ def test_the_command_fit_tells_what_a_smooth_fit_makes_of_a_program(tmp_path: Fi
     assert main(["fit", str(file), "--smooth"]) == 0
     out, err = capsys.readouterr()
     assert "in 2 runs" in out
-    assert err.startswith("warning: line 4: the path turns back")
+    assert "warning: line 4: the path turns back" in err
