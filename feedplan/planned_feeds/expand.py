@@ -3,8 +3,8 @@
 Loops, calls, cycles and compensation become the lines and arcs that they make; drawings and path files become
 G-code. Coordinates are those of the machine in millimetres, less the work offset G54 of the machine file.
 Each polynomial or rational piece of a spline becomes a block: G1 for a line, else G5.2 in X and Y for
-LinuxCNC, or G6.2 for Fanuc. Spindle, coolant, tools, outputs, dwells, stops and messages keep their places;
-other comments are lost.
+LinuxCNC, or G6.2 for Fanuc. Spindle, coolant, tools, outputs, dwells, stops, messages and comments keep their
+places; brackets in a text become square ones.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from feedplan.errors import InputError
 from feedplan.machine.machine import Machine
 from feedplan.planned_feeds.dialects import DialectName
 from feedplan.planned_feeds.number import place_text
-from feedplan.program.events import MESSAGE, Events
+from feedplan.program.events import COMMENT, MESSAGE, Events
 from feedplan.program.program import PathControl, Program
 
 _HEADER = b"G21 G90 G17 G94 G40 G49 G80 G54"
@@ -198,6 +198,8 @@ def _events(events: Events) -> dict[int, list[bytes]]:
         letter, number = chr(events.letter[row]), float(events.number[row])
         if letter == MESSAGE:
             text = b"(MSG," + _plain(events.texts[int(number)]) + b")"
+        elif letter == COMMENT:
+            text = b"(" + _unbracketed(events.texts[int(number)]).encode() + b")"
         elif letter == "M" and number == 6.0:
             text = b"M6"
         elif letter == "M" and number in (67.0, 68.0):
@@ -210,4 +212,9 @@ def _events(events: Events) -> dict[int, list[bytes]]:
 
 def _plain(text: str) -> bytes:
     """The text without characters that a comment cannot have."""
-    return text.replace("(", "[").replace(")", "]").encode("ascii", "replace")
+    return _unbracketed(text).encode("ascii", "replace")
+
+
+def _unbracketed(text: str) -> str:
+    """The text with square brackets: those of a comment end it."""
+    return text.replace("(", "[").replace(")", "]")

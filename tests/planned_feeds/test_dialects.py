@@ -92,6 +92,13 @@ def test_loops_calls_and_cycles_become_plain_blocks() -> None:
     assert feedplan.plan(program, "mill").time == pytest.approx(plan.time, rel=1e-4)
 
 
+def test_brackets_in_a_comment_become_square_ones() -> None:
+    plan = planned("; gear, 3 mm (ply) for $32=1\nG21\nG1 X5 F3000\n;)(\nM2\n")
+    result = feedplan.planned_program(plan, expand=True)
+    said = feedplan.read_program(result.content, "mill").events.words()
+    assert said == ("(program, expanded)", "(gear, 3 mm [ply] for $32=1)", "(][)", "M2")
+
+
 def test_a_drawn_path_becomes_a_program() -> None:
     drawn = (
         b'{"unit": "mm", "feed": 80.0, "curves": ['
