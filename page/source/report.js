@@ -12,8 +12,10 @@ const USED = ["velocity", "acceleration", "jerk"];
 export function report(data) {
   const at = (id) => document.getElementById(id);
   const run = new Run(data.path), cursor = new Cursor();
-  const path = new PathView(at("path"), at("path-tools"), cursor);
-  path.show(run);
+  // Joints alone, as those of a robot, have no path in X, Y, Z.
+  const moves = [data.path.x, data.path.y, data.path.z].some((places) => places.some((place) => place !== places[0]));
+  if (moves) new PathView(at("path"), at("path-tools"), cursor).show(run);
+  else at("path").closest("section").hidden = true;
   const speed = new SpeedPlot(at("length"), data, run, cursor);
   const axes = new AxesPlot(at("time"), data, run, cursor);
   const parts = [speed, axes];

@@ -1,4 +1,5 @@
-/* Opens a report and prints, for each chart over time, its heading and whether the legend covers the heading, as JSON:
+/* Opens a report and prints as JSON whether a tool path is drawn, and for each chart over time its heading and whether
+   the legend covers the heading:
    node page/test/heads.mjs REPORT WIDTH */
 
 import { resolve } from "node:path";
@@ -18,5 +19,6 @@ const heads = await page.locator("#time .row").evaluateAll((rows) => rows.map((r
     own.left < entry.right && entry.left < own.right && own.top < entry.bottom && entry.top < own.bottom));
   return { text: words.toString(), covered };
 }));
+const drawn = await page.locator("#path").isVisible();
 await browser.close();
-process.stdout.write(JSON.stringify(heads));
+process.stdout.write(JSON.stringify({ drawn, heads }));

@@ -247,20 +247,28 @@ def test_the_legend_of_a_report_leaves_the_limits_readable(
 ) -> None:
     feedplan.write_plan(feedplan.plan(ROOT / "examples" / program, machine), tmp_path, formats=[])
     for width in (400, 1080, 1280):
-        command = [
-            "node",
-            str(ROOT / "page" / "test" / "heads.mjs"),
-            str(tmp_path / "report.html"),
-            str(width),
-        ]
-        done = subprocess.run(
-            command,
-            env={**os.environ, "CHROMIUM": str(CHROMIUM)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        heads = json.loads(done.stdout)
-        assert [head["text"] for head in heads if head["covered"]] == []
-        assert heads[1]["text"].endswith(f"limits {limits}")
+        seen = _seen(tmp_path / "report.html", width)
+        assert seen["drawn"]
+        assert [head["text"] for head in seen["heads"] if head["covered"]] == []
+        assert seen["heads"][1]["text"].endswith(f"limits {limits}")
+
+
+@in_a_browser
+def test_a_report_of_joints_alone_draws_no_tool_path(tmp_path: Path) -> None:
+    axes = tuple(feedplan.Axis(name, 2.0, 10.0, unit="rad") for name in ("j1", "j2"))
+    path = feedplan.Path.from_bezier([[0, 0], [1, 0], [1, 1]], axes=("j1", "j2"))
+    feedplan.write_plan(feedplan.plan(path, feedplan.Machine("arm", axes)), tmp_path, formats=[])
+    seen = _seen(tmp_path / "report.html", 1280)
+    assert not seen["drawn"]
+    assert seen["heads"][1]["text"].endswith("limits j1 2, j2 2 rad/s")
+
+
+def _seen(report: Path, width: int) -> dict[str, Any]:
+    """What a browser shows of a report in a window of this width [px]."""
+    command = ["node", str(ROOT / "page" / "test" / "heads.mjs"), str(report), str(width)]
+    done = subprocess.run(
+        command, env={**os.environ, "CHROMIUM": str(CHROMIUM)}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    seen: dict[str, Any] = json.loads(done.stdout)
+    return seen
