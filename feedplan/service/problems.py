@@ -49,7 +49,7 @@ def add_handlers(app: FastAPI) -> None:
             refusal = Refusal(METHOD, "the address does not take this method: /docs tells those it does")
         else:
             kind = Kind("input", error.status_code, INPUT.title)
-            refusal = Refusal(kind, f"{str(error.detail)[:200].lower()}: correct the request")
+            refusal = Refusal(kind, f"{str(error.detail)[:200].lower().rstrip('.')}: correct the request")
         return _problem(refusal, error.headers)
 
     @app.exception_handler(ClientDisconnect)

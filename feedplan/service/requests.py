@@ -213,16 +213,18 @@ def _title(given: str) -> str:
     return "".join(letter for letter in name if letter.isprintable()).strip()
 
 
-def parsed(model: type[Model], text: bytes | str) -> Model:
-    """A model from JSON. Raises Refusal for the first member that is wrong."""
+def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
+    """A model from JSON, which is the member `within` of the request. Raises Refusal for the first member
+    that is wrong."""
     try:
         return model.model_validate_json(text)
     except ValidationError as error:
-        raise Refusal(INPUT, sentence_of(error.errors(include_url=False, include_input=False)[0])) from None
+        wrong = error.errors(include_url=False, include_input=False)[0]
+        raise Refusal(INPUT, sentence_of({**wrong, "loc": (*within, *wrong["loc"])})) from None
 
 
 def sentence_of(error: Any) -> str:
     """An error of pydantic as one sentence."""
     member = ".".join(str(part)[:60] for part in error["loc"]) or "the request"
-    said = str(error["msg"])[:160]
+    said = str(error["msg"])[:220]
     return f"{member}: {said[:1].lower()}{said[1:]}: correct it as the documentation at /docs tells"

@@ -73,7 +73,7 @@ def _of_form(form: FormData, new: FilePath, limits: Limits) -> tuple[Upload, Pla
     if not isinstance(program, str):
         fields.setdefault("name", (program.filename or "")[-120:])
     given = fields.pop("options", None)
-    options = parsed(Options, given) if given else Options()
+    options = parsed(Options, given, "options") if given else Options()
     asked: PlanRequest = parsed(PlanRequest, json.dumps(fields))
     return _stored(stream, new, limits), asked.model_copy(update={"options": options})
 

@@ -159,13 +159,17 @@ def test_an_error_in_a_program_has_file_and_line(server: Server) -> None:
         ({"machine": "../../etc/passwd"}, "machine", "there is no machine of this name: use one of "),
         ({"machine": "/etc/machine.toml"}, "machine", "there is no machine of this name: use one of "),
         ({"machine": "name = 3"}, "machine", "machine file of the request: axes is "),
-        ({"method": "best"}, "input", "method: input should be 'arc-transition', "),
+        (
+            {"method": "best"},
+            "input",
+            f"method: input should be {', '.join(map(repr, feedplan.methods()[:-1]))} or 'toppra': ",
+        ),
         ({"options": '{"accuracy": 0.1}'}, "input", "the method bang-bang takes no accuracy: give "),
-        ({"options": '{"tolerance": -1}'}, "input", "tolerance: input should be greater than 0: "),
-        ({"options": '{"tolerance": NaN}'}, "input", "tolerance: input should be a finite number: "),
-        ({"options": '{"tolerance": "1"}'}, "input", "tolerance: input should be a valid number: "),
-        ({"options": '{"reading": {}}'}, "input", "reading: extra inputs are not permitted: "),
-        ({"options": "{"}, "input", "the request: invalid JSON: "),
+        ({"options": '{"tolerance": -1}'}, "input", "options.tolerance: input should be greater than 0: "),
+        ({"options": '{"tolerance": NaN}'}, "input", "options.tolerance: input should be a finite number: "),
+        ({"options": '{"tolerance": "1"}'}, "input", "options.tolerance: input should be a valid number: "),
+        ({"options": '{"reading": {}}'}, "input", "options.reading: extra inputs are not permitted: "),
+        ({"options": "{"}, "input", "options: invalid JSON: "),
         ({"name": "x" * 121}, "input", "name: string should have at most 120 characters: "),
         ({"subprograms": "/etc"}, "input", "the form has 'subprograms' too often or wrongly: give program, "),
     ],
@@ -190,6 +194,9 @@ def test_other_bodies_are_refused(server: Server) -> None:
     assert sent("application/json", b"[" * 100_000) == 422
     assert sent("application/json", b'{"program": {"curves": ' + b"1" * 5000 + b"}}") == 422
     assert sent("multipart/form-data", PART) == 400
+    headers = {"Content-Type": "multipart/form-data"}
+    said = server.send("POST", "/v1/jobs", PART, headers).detail
+    assert said == "missing boundary in multipart: correct the request"
     assert sent("multipart/form-data; boundary=x", b"--x\r\n" * 50) == 400
     assert server.submit(b"").detail == "the program is empty: give a part program"
     assert server.get("/v1/nothing").status == 404
