@@ -6,18 +6,19 @@ from pathlib import Path as FilePath
 
 from feedplan.errors import InputError, unreadable
 
-SHORTEST = 16
+SHORTEST, LONGEST = 16, 4096
 
 
 def read_token(file: FilePath) -> str:
-    """The first line of a file. Raises InputError if it is missing or too short for a token."""
+    """The first line of a file. Raises InputError if it is missing, or too short or too long for a token."""
     try:
-        token = file.read_text("ascii").partition("\n")[0].strip()
+        with file.open(encoding="ascii") as stream:
+            token = stream.readline(LONGEST + 2).strip()
     except (OSError, ValueError) as error:
         raise InputError(unreadable(f"the token file {file}", error, "a file of one line in ASCII")) from None
-    if len(token) < SHORTEST or not token.isprintable() or " " in token:
+    if not SHORTEST <= len(token) <= LONGEST or not token.isprintable() or " " in token:
         raise InputError(
-            f"{file}: the token has fewer than {SHORTEST} characters or a space: "
+            f"{file}: the token has fewer than {SHORTEST} characters, more than {LONGEST}, or a space: "
             f"make one by `openssl rand -hex 32 > {file}`"
         )
     return token

@@ -36,11 +36,13 @@ class Tool(NamedTuple):
 def read_tools(file: Path) -> tuple[Tool, ...]:
     """The tools of a table. Raises InputError naming file, line and word where it cannot be read."""
     try:
-        if file.stat().st_size > MAX_BYTES:
-            raise InputError(f"{file} has more than {MAX_BYTES} bytes: give a tool table")
-        lines = file.read_bytes().decode("utf-8-sig", "replace").splitlines()
+        with file.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
     except OSError as error:
         raise InputError(unreadable(f"the tool table {file}", error, "the path of a .tbl file")) from None
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{file} has more than {MAX_BYTES} bytes: give a tool table")
+    lines = content.decode("utf-8-sig", "replace").splitlines()
     tools: list[Tool] = []
     line_of: dict[int, int] = {}
     for number, line in enumerate(lines, 1):

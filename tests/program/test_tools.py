@@ -41,6 +41,12 @@ def test_what_is_no_tool_is_refused(text: str, words: str, tmp_path: Path) -> No
         read_tools(tmp_path / "none.tbl")
 
 
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no /dev/zero")
+def test_a_table_without_an_end_is_refused() -> None:
+    with pytest.raises(InputError, match="/dev/zero has more than 1048576 bytes: give a tool table"):
+        read_tools(Path("/dev/zero"))
+
+
 def test_programs_take_lengths_and_radii(tmp_path: Path) -> None:
     (tmp_path / "tool.tbl").write_text("T1 Z50 D2\n")
     text = "G21 F600\nT1 M6 G43\nG0 Z1\nG41\nG1 X5\nY8\nG40\nM2\n"

@@ -144,7 +144,7 @@ def test_the_service_accepts_any_axes_too(tmp_path: Path) -> None:
         (["--token-file", "none"], "the token file none cannot be read (No such file or directory): give"),
         (
             ["--token-file", "short"],
-            "short: the token has fewer than 16 characters or a space: make one by `openssl",
+            "short: the token has fewer than 16 characters, more than 4096, or a space: make one by `openssl",
         ),
         (
             ["--host", "192.0.2.1", "--token-file", "good"],
