@@ -23,8 +23,9 @@ from feedplan.profile import NO_AXIS
 # the path, of speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
 Rule = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 
-# A curved piece is cut into parts. On each the direction, and ln |C'|, change by about this at most.
-STEP = 0.1
+# A curved piece is cut into parts, evenly. Where the direction or ln |C'| changes by more than twice this on
+# a part, as beside a cusp, the part is cut again, this often at most.
+STEP, CUTS = 0.1, 20
 
 # Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
 # limits between two places differ from theirs by the order of STEP²/16 of themselves.
@@ -38,7 +39,7 @@ SURVEY = np.linspace(0.0, 1.0, 9)
 # Greatest speeds of parts of a piece that differ by less than this share are made equal.
 ONE_SPEED = 1e-9
 
-# A place is a cusp where |C'| is below this share of its greatest value on the piece.
+# A place is a cusp where |C'| is at most this share of its greatest value on the piece.
 CUSP = 1e-9
 
 # On a line edges between control points differ by at most this share of an edge, and this many roundings.
@@ -141,17 +142,18 @@ def _lines(problem: Problem, piece: Integers, acceleration: float) -> Segments:
 
 
 def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float) -> Segments:
-    count = _part_counts(problem, pieces)
-    piece = np.repeat(pieces, count)
-    number = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
-    whole, parts = problem.curve.width[piece], np.repeat(count, count)
-    # The end of a part is the start of the next to the last digit, that of the last the width itself.
-    u0, u1 = number / parts * whole, (number + 1) / parts * whole
-    u = np.clip(u0[:, None] + PLACES * (u1 - u0)[:, None], u0[:, None], u1[:, None])
+    piece, u0, u1 = pieces, np.zeros(len(pieces)), problem.curve.width[pieces]
+    fastest = np.zeros(len(problem.curve))
+    rate, tangent, second = _at(problem, (piece, u0, u1), SURVEY, fastest)
+    count = _counts(rate, tangent, STEP)
+    for _ in range(CUTS):
+        piece, u0, u1 = _cut(piece, u0, u1, count)
+        rate, tangent, second = _at(problem, (piece, u0, u1), PLACES, fastest)
+        count = _counts(rate, tangent, 2.0 * STEP)
+        if (count == 1).all():
+            break
     rows = np.repeat(piece, len(PLACES))
-    _, first, second = problem.curve.evaluate(rows, u.ravel(), 2)
-    rate = np.linalg.norm(first, axis=1)
-    tangent = first / rate[:, None]
+    rate, tangent = rate.ravel(), tangent.reshape(len(rows), -1)
     bend = second - (second * tangent).sum(axis=1)[:, None] * tangent
     size = np.linalg.norm(bend, axis=1)
     curvature = size / rate**2
@@ -167,7 +169,8 @@ def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float)
         # Between the places the axes that the feed counts along may have more of the speed.
         speed = np.minimum(speed, feed_between(problem, piece, u0, u1))
     # On a circle the parts differ by rounding only: they get one speed.
-    least = np.repeat(np.minimum.reduceat(speed, np.cumsum(count) - count), count)
+    first = np.flatnonzero(np.diff(piece, prepend=-1))
+    least = np.repeat(np.minimum.reduceat(speed, first), np.diff(first, append=len(piece)))
     speed = np.where(speed <= least * (1.0 + ONE_SPEED), least, speed)
     return Segments(
         piece=piece,
@@ -203,18 +206,37 @@ def _least(values: Floats) -> Floats:
     return reduce(np.minimum, np.moveaxis(values, -1, 0))
 
 
-def _part_counts(problem: Problem, piece: Integers) -> Integers:
-    """How many parts each curved piece is cut into."""
-    u = problem.curve.width[piece][:, None] * SURVEY
-    first = problem.curve.evaluate(np.repeat(piece, len(SURVEY)), u.ravel(), 1)[1]
-    first = first.reshape(len(piece), len(SURVEY), -1)
+def _at(
+    problem: Problem, parts: tuple[Integers, Floats, Floats], places: Floats, fastest: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """|C'| and unit tangents at places of parts (m, places), and C'' there, one place after the other.
+
+    `fastest` (n,) is the greatest |C'| seen on each piece. Raises SolverError at cusps.
+    """
+    piece, u0, u1 = parts
+    u = np.clip(u0[:, None] + places * (u1 - u0)[:, None], u0[:, None], u1[:, None])
+    _, first, second = problem.curve.evaluate(np.repeat(piece, len(places)), u.ravel(), 2)
+    first = first.reshape(len(piece), len(places), -1)
     rate = np.linalg.norm(first, axis=2)
-    cusp = rate.min(axis=1) <= CUSP * rate.max(axis=1)
+    np.maximum.at(fastest, piece, rate.max(axis=1))
+    cusp = rate.min(axis=1) <= CUSP * fastest[piece]
     _refuse(problem, piece[cusp], "the path has a cusp, where this method has no speed: plan with bang-bang")
-    tangent = first / rate[:, :, None]
+    return rate, first / rate[:, :, None], second
+
+
+def _counts(rate: Floats, tangent: Floats, most: float) -> Integers:
+    """Into how many parts each part is to be cut: 1 where it changes by no more than `most`."""
     turn = np.linalg.norm(np.diff(tangent, axis=1), axis=2).sum(axis=1)
-    change = np.abs(np.diff(np.log(rate), axis=1)).sum(axis=1)
-    return np.asarray(np.maximum(np.ceil(np.maximum(turn, change) / STEP), 1.0), dtype=np.int64)
+    change = np.maximum(turn, np.abs(np.diff(np.log(rate), axis=1)).sum(axis=1))
+    return np.where(change > most, np.ceil(change / STEP), 1.0).astype(np.int64)
+
+
+def _cut(piece: Integers, u0: Floats, u1: Floats, count: Integers) -> tuple[Integers, Floats, Floats]:
+    """Parts cut evenly. The end of a part is the start of the next to the last digit."""
+    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    start, end, parts = np.repeat(u0, count), np.repeat(u1, count), np.repeat(count, count)
+    at = start + np.stack([number, number + 1]) / parts * (end - start)
+    return np.repeat(piece, count), at[0], np.where(number + 1 == parts, end, at[1])
 
 
 def _speed(problem: Problem, piece: Integers, tangent: Floats) -> Floats:

@@ -222,6 +222,16 @@ def test_setpoints_from_and_to_rest_follow_a_speed_whose_square_is_linear() -> N
         )
 
 
+@pytest.mark.parametrize("method", [CVT, ARCS, "linuxcnc"])
+def test_a_curve_that_slows_beside_a_place_of_its_survey_keeps_all_limits(method: str) -> None:
+    # |C'| falls to 2 % of its greatest between two of nine places.
+    curve = CompositeCurve.from_bezier([[0, 0], [4, 4], [-0.18, 3.59], [4.2, 0]])
+    speed = np.linalg.norm(curve.evaluate(np.zeros(1001, int), np.linspace(0.0, 1.0, 1001), 1)[1], axis=1)
+    assert speed.min() < 0.03 * speed.max()
+    found = plan(Path.from_curve(curve, feed=20.0), PLANE, method).audit()
+    assert found.ok, found.failures
+
+
 def test_lines_are_told_from_curves_and_from_uneven_parametrisations() -> None:
     straight = [[0.0, 0.0], [1.0, 2.0]]
     pieces = [
