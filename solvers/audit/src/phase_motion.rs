@@ -247,11 +247,15 @@ impl<const M: usize> PhaseMotion<M> {
         match self.law {
             Law::Column { k, twice, .. } => {
                 let way = columns.way(&a.place, &b.place);
-                let (sum, errors) = (a.speed[0] + b.speed[0], a.speed[1] + b.speed[1]);
+                let errors = a.speed[1] + b.speed[1];
+                let (mut sum, mut change) = (a.speed[0] + b.speed[0], (b.speed[0] - a.speed[0]).abs());
+                // A phase begins at a turn of the column to rounding: the turn may be behind its first place.
+                if a.place.slope.value[k] * b.place.slope.value[k] < 0.0 {
+                    (sum, change) = (change, sum);
+                }
                 let by_way = way.value[k].abs();
                 let mut found = [2.0 * by_way / sum, rounding + way.rounding[k] / by_way + errors / sum];
                 // The change of the speed over the acceleration, where that has the smaller error.
-                let change = (b.speed[0] - a.speed[0]).abs();
                 if twice != 0.0 && errors / change < found[1] {
                     found = [2.0 * change / twice.abs(), errors / change];
                 }
@@ -397,6 +401,17 @@ mod tests {
         Phase::check((0, 0, -8.0), [[0.0, 10.0], [200.0, 0.0]], LINE, |phase| {
             assert!(phase.motion.anchored_at_end);
             assert!((phase.total() - 2.0_f64.sqrt()).abs() < 1e-14);
+        });
+    }
+
+    #[test]
+    fn a_turn_behind_the_first_place_takes_the_time_there_and_back() {
+        // x = 2tu − u² turns at t = 1e-6; at −8 mm/s² p is 4 all the way.
+        let rows = [[0.0, 0.0], [1e-6, 0.5], [2e-6 - 1.0, 1.0]];
+        Phase::check((0, 0, -8.0), [[0.0, 1.0], [4.0, 4.0]], (&rows, &[], 1.0), |phase| {
+            for to in [1.5e-6, 4e-6, 1e-3, 1.0] {
+                assert!((phase.time(0.0, to) / (0.5 * to) - 1.0).abs() < 1e-9, "{to}");
+            }
         });
     }
 
