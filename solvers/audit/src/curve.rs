@@ -381,16 +381,18 @@ pub fn sagitta(bend: f64, step: f64) -> f64 {
     0.125 * bend * step * step
 }
 
+#[inline(always)]
+fn scaled<const M: usize, T: Number>(mut derivative: [T; M], scale: f64) -> [T; M] {
+    for k in 0..M {
+        derivative[k] = derivative[k] * scale;
+    }
+    derivative
+}
+
 /// Derivatives by t to those by u.
 #[inline(always)]
 fn by_width<const M: usize, T: Number>([first, second, third]: [[T; M]; 3], per_width: f64) -> [[T; M]; 3] {
     let per_width_sq = per_width * per_width;
-    let scaled = |mut derivative: [T; M], scale: f64| {
-        for k in 0..M {
-            derivative[k] = derivative[k] * scale;
-        }
-        derivative
-    };
     [scaled(first, per_width), scaled(second, per_width_sq), scaled(third, per_width_sq * per_width)]
 }
 

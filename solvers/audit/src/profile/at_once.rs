@@ -9,7 +9,7 @@
 
 use fearless_simd::{dispatch, f64x8, mask64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
-use crate::bulge::{bulge, Known};
+use crate::bulge::{bulge, Bulge, Known};
 use crate::chord::chord_error;
 use crate::columns::{Columns, RATES};
 use crate::curve::Curve;
@@ -420,16 +420,17 @@ impl<const M: usize> Places<'_, '_, M> {
             find(verdict_of(&speed, |v| v * per, bulge.rates[0] * per, worst));
         }
         if self.limits.chord_tolerance.is_finite() {
-            let most = all(worst(Check::Chord) * self.limits.chord_tolerance);
-            let is_low = |fastest: f64x8<S>, curvature_sq: f64x8<S>| {
-                let fastest = (fastest + bulge.rates[0]).min(bulge.most_speed);
-                chord_error(fastest * self.limits.period, curvature_sq.sqrt() + bulge.curvature).simd_le(most)
-            };
-            let mut are_low = is_low(bulge.most_speed, joined(&second_sq, f64x8::max));
+            let (period, most) = (self.limits.period, all(worst(Check::Chord) * self.limits.chord_tolerance));
+            let mut are_low =
+                are_chords_low(bulge.most_speed, joined(&second_sq, f64x8::max), &bulge, period, most);
             if !are_all(are_low) {
                 // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
-                let step = |i: usize| is_low(v[i].max(v[i + 1]), second_sq[i].max(second_sq[i + 1]));
-                are_low = (1..PLACES - 1).fold(step(0), |low, i| low & step(i)) | are_low;
+                let mut are_steps_low = nothing.simd_eq(nothing);
+                for i in 0..PLACES - 1 {
+                    let (fastest, curvature_sq) = (v[i].max(v[i + 1]), second_sq[i].max(second_sq[i + 1]));
+                    are_steps_low &= are_chords_low(fastest, curvature_sq, &bulge, period, most);
+                }
+                are_low |= are_steps_low;
             }
             find(are_low.select(nothing, open));
         }
@@ -528,6 +529,19 @@ fn verdict_of<S: Simd>(
         are_low &= are_far_below | is_flat;
     }
     are_low.select(all(NOTHING), verdict)
+}
+
+/// Where chords at this speed and this square of the curvature, and at what lies between the places, are not above `most`.
+#[inline(always)]
+fn are_chords_low<S: Simd>(
+    fastest: f64x8<S>,
+    curvature_sq: f64x8<S>,
+    between: &Bulge<f64x8<S>>,
+    period: f64,
+    most: f64x8<S>,
+) -> mask64x8<S> {
+    let fastest = (fastest + between.rates[0]).min(between.most_speed);
+    chord_error(fastest * period, curvature_sq.sqrt() + between.curvature).simd_le(most)
 }
 
 /// The integral over the phase, its width being 1, and by how much each of three rules is in doubt of it.
