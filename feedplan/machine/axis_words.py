@@ -6,7 +6,7 @@ In the modes TIP and VECTOR the words are the tip itself: the reader leaves the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,13 +25,12 @@ DIRECTION = ("I", "J", "K")
 class AxisWords:
     """Moves in one coordinate mode: `kinematics` takes the columns `column` of the program's axes.
 
-    A column of −1 is an axis that the program does not use: it stays at `held` [mm, deg].
+    A column of −1 is an axis that the program does not use: it stays at 0.
     """
 
     coordinate_mode: CoordinateMode
     kinematics: Kinematics
     column: tuple[int, ...]
-    held: tuple[float, ...]
 
     @property
     def other_pose(self) -> AxisWords:
@@ -42,8 +41,7 @@ class AxisWords:
     def tip(self, points: Floats) -> Floats:
         """What `kinematics` takes (…, tip axes), from points or Bézier points (…, program axes)."""
         columns = [
-            points[..., column] if column >= 0 else np.full(points.shape[:-1], held)
-            for column, held in zip(self.column, self.held, strict=True)
+            points[..., column] if column >= 0 else np.zeros(points.shape[:-1]) for column in self.column
         ]
         return np.stack(columns, axis=-1)
 
@@ -54,14 +52,13 @@ def axis_words(
     coordinate_mode: CoordinateMode | None = None,
     *,
     tool_length: float | None = None,
-    held: Mapping[str, float] | None = None,
 ) -> AxisWords:
     """The program axes `axes` on a machine; MachineError names a letter the machine does not have.
 
     Letters of other modes are left out: I, J, K, or rotary joints beside a direction.
 
     Without a `coordinate_mode` it is the machine's own before any G43.4. `tool_length` [mm] replaces the
-    machine file's; `held` gives positions of axes that the program never moves, 0 by default.
+    machine file's.
     """
     axes = tuple(axes)
     kinematics = machine.inverse
@@ -90,9 +87,7 @@ def axis_words(
     column = tuple(axes.index(letter) if letter in axes else -1 for letter in known)
     if coordinate_mode is CoordinateMode.VECTOR and -1 in column[3:]:
         raise MachineError("a tool direction needs all of I, J and K: give the missing words")
-    return AxisWords(
-        coordinate_mode, kinematics, column, tuple((held or {}).get(letter, 0.0) for letter in known)
-    )
+    return AxisWords(coordinate_mode, kinematics, column)
 
 
 def _joint_positions(machine: Machine) -> Kinematics:

@@ -29,17 +29,12 @@ def test_joint_positions_of_a_cylindrical_machine_can_be_programmed() -> None:
     assert positions(words.kinematics, words.tip(np.array([[30.0, 4.0, 90.0]]))).tolist() == [[90, 30, 4]]
 
 
-def test_a_tip_stretch_has_its_own_tool_and_holds_what_is_not_programmed() -> None:
-    words = axis_words(
-        Machine.load("trunnion-ac"),
-        ("X", "Y", "Z", "C"),
-        CoordinateMode.TIP,
-        tool_length=77.0,
-        held={"A": -90.0},
-    )
-    # A−90 about (y, z) = (0, 50): the part's face point (0, 0) comes to (50, 50).
-    joints = positions(words.kinematics, words.tip(np.array([[0.0, 0.0, 0.0, 0.0]])))
-    assert joints == pytest.approx(np.array([[0, 50, 127, -90, 0]]))
+def test_a_run_by_the_tip_has_its_own_tool_and_axes_that_are_not_programmed_stay_at_0() -> None:
+    letters = ("X", "Y", "Z", "C")
+    words = axis_words(Machine.load("trunnion-ac"), letters, CoordinateMode.TIP, tool_length=77.0)
+    # The table turns the part's point (10, 0) to (0, −10).
+    joints = positions(words.kinematics, words.tip(np.array([[10.0, 0.0, 0.0, 90.0]])))
+    assert joints == pytest.approx(np.array([[0, -10, 77, 0, 90]]))
 
 
 def test_a_direction_points_the_tool_at_any_piece() -> None:

@@ -22,7 +22,6 @@ use feedplan_audit::kernels::PlanKernels;
 struct WordArrays<'py> {
     kinematics: KinematicsArrays<'py>,
     column: Vec<i64>,
-    held: Vec<f64>,
     coordinate_mode: i64,
 }
 
@@ -44,20 +43,14 @@ impl WordArrays<'_> {
         let column: Vec<Option<usize>> =
             self.column.iter().map(|&column| usize::try_from(column).ok()).collect();
         let good = column.len() == recorded.inputs
-            && self.held.len() == recorded.inputs
             && column.iter().flatten().all(|&column| column < axes)
             && outputs.len() == joints
             && recorded.turning.len() == joints;
         require(good, "the arrays of the kinematics differ in length")?;
         let formula = formula
             .ok_or_else(|| PyValueError::new_err("the operations of the kinematics are not in order"))?;
-        Ok(Words {
-            formula,
-            turning: recorded.turning.clone(),
-            column,
-            held: self.held.clone(),
-            directed: self.coordinate_mode == VECTOR,
-        })
+        let (turning, directed) = (recorded.turning.clone(), self.coordinate_mode == VECTOR);
+        Ok(Words { formula, turning, column, directed })
     }
 }
 

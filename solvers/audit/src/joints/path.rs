@@ -17,9 +17,8 @@ pub struct Words {
     pub formula: Formula,
     /// Which joints are known up to whole turns only.
     pub turning: Vec<bool>,
-    /// For each coordinate of the tip the axis of the path, if it has one, and where it stays if not.
+    /// For each coordinate of the tip the axis of the path; one without stays at 0.
     pub column: Vec<Option<usize>>,
-    pub held: Vec<f64>,
     /// Whether the tip's coordinates end with a direction I, J, K.
     pub directed: bool,
 }
@@ -202,8 +201,8 @@ impl<const M: usize> Piece<'_, M> {
         table: &mut [Jet<N, ROUNDED>],
         jet: impl Fn(usize) -> Jet<N, ROUNDED>,
     ) {
-        for (i, (column, &held)) in self.words.column.iter().zip(&self.words.held).enumerate() {
-            table[i] = column.map_or(Jet::constant(held), &jet);
+        for (entry, column) in table.iter_mut().zip(&self.words.column) {
+            *entry = column.map_or(Jet::constant(0.0), &jet);
         }
         self.words.formula.evaluate(table);
     }
