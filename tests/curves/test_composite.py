@@ -286,7 +286,10 @@ def test_corners_and_pieces_of_no_length_are_found() -> None:
         (([[0.0]] * 3, [0, 0, 0, 1, 1, np.inf], 2), "knot 5 is inf: knots must be finite"),
         (([[0.0], [np.nan], [1]], [0, 0, 0, 1, 1, 1], 2), "control point 1, axis 0, is NaN"),
         (([[0.0]] * 2, [0, 0, 0, 1, 1], 2), "2 control points for degree 2: at least 3 are needed"),
-        (([[0.0]] * 3, [0, 0, 0, 1, 1, 1], 2, [1, 0, 1]), "weight 1 is 0: weights must be positive"),
+        (
+            ([[0.0]] * 3, [0, 0, 0, 1, 1, 1], 2, [1, 0, 1]),
+            "weight 1 is 0: weights must be positive, from 1e-30 to 1e30",
+        ),
         (([[0.0]] * 3, [0, 0, 0, 1, 1, 1], 2, [1, 1]), "2 weights for 3 control points"),
         (([[0.0]] * 3, [0, 0, 0, 0, 0, 0], 2), "the knot 0 stands 6 times from knot 0 on: at most 3"),
         (([[0.0]] * 3, [0, 1, 2, 2, 2, 3], 2), "knots 2 and 3, where the curve starts and ends, are both 2"),

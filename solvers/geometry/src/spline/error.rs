@@ -6,8 +6,9 @@ use super::MAX_DEGREE;
 
 /// Greatest coordinate in mm, far beyond any machine: the square of a hodograph must not overflow.
 pub const MAX_COORDINATE: f64 = 1e60;
-/// Greatest weight, and the inverse of the least one: fourth powers must not overflow.
+/// Greatest and least weight: fourth powers must not overflow.
 pub const MAX_WEIGHT: f64 = 1e30;
+pub const MIN_WEIGHT: f64 = 1e-30;
 
 /// Why a spline cannot be used.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,9 +99,8 @@ impl fmt::Display for SplineError {
             ),
             Self::Weight { index, value } => write!(
                 f,
-                "weight {index} is {value}: weights must be positive, from {:e} to {MAX_WEIGHT:e}; correct it or \
-                 scale all by one factor",
-                1.0 / MAX_WEIGHT
+                "weight {index} is {value}: weights must be positive, from {MIN_WEIGHT:e} to {MAX_WEIGHT:e}; \
+                 correct it or scale all by one factor"
             ),
             Self::Helix { tolerance, pieces } => write!(
                 f,

@@ -3,7 +3,7 @@
 //!
 //! n control points of degree d have knots t₀ … t_{n+d}; the curve is on [t_d, t_n]. Knots may be clamped or not.
 
-use super::error::{SplineError, MAX_COORDINATE, MAX_WEIGHT};
+use super::error::{SplineError, MAX_COORDINATE, MAX_WEIGHT, MIN_WEIGHT};
 use super::MAX_DEGREE;
 use crate::tolerance::KNOT_SPAN;
 
@@ -106,7 +106,7 @@ pub fn check_points<const M: usize>(
     if !weights.is_empty() && weights.len() != control.len() {
         return Err(SplineError::WeightCount { weights: weights.len(), points: control.len() });
     }
-    match weights.iter().position(|weight| !(1.0 / MAX_WEIGHT..=MAX_WEIGHT).contains(weight)) {
+    match weights.iter().position(|weight| !(MIN_WEIGHT..=MAX_WEIGHT).contains(weight)) {
         Some(index) => Err(SplineError::Weight { index, value: weights[index] }),
         None => Ok(()),
     }

@@ -20,7 +20,7 @@ use feedplan_planner::problem::Problem;
 /// Bounds that are computed closely exceed the derivatives by about this part, …
 const ACCURACY: f64 = 0.2;
 /// … except where looser ones leave this part of acceleration and jerk for changes of speed.
-const EASY: f64 = 0.6;
+const EASY: f64 = 0.8;
 /// A stretch that is planned goes on at the held feed for this many lengths over which r doubles at its greatest slope:
 /// the optimum may slow down to gain acceleration before the feed rises, and the first plan is smoothed over as much.
 const MARGIN: f64 = 1.5;
