@@ -20,7 +20,7 @@ from feedplan.cli.ending import BROKEN, DONE
 from feedplan.cli.reading_options import reading_options
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading, checked_reading
-from feedplan.program.subprograms import require_folder
+from feedplan.program.subprograms import readable_folder
 from feedplan.program.tools import read_tools
 from feedplan.units import counted, duration_text
 
@@ -139,7 +139,7 @@ def batch(
     if table is not None:
         read_tools(FilePath(table))
     for name in folders:
-        require_folder(FilePath(name))
+        readable_folder(FilePath(name))
     sweep = Sweep(
         [FilePath(program) for program in programs],
         [machine_text(name) for name in dict.fromkeys(machines)],

@@ -23,8 +23,8 @@ from feedplan.profile import NO_AXIS
 # the path, of speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
 Rule = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 
-# A curved piece is cut into parts, evenly. Where the direction or ln |C'| changes by more than twice this on
-# a part, as beside a cusp, the part is cut again, this often at most.
+# A curved piece is cut into even parts: on each the direction, and ln |C'|, change by STEP in the mean. Parts
+# on which one of them changes by more than 2 STEP, as beside a cusp, are cut again, CUTS times at most.
 STEP, CUTS = 0.1, 20
 
 # Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
@@ -144,7 +144,7 @@ def _lines(problem: Problem, piece: Integers, acceleration: float) -> Segments:
 def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float) -> Segments:
     piece, u0, u1 = pieces, np.zeros(len(pieces)), problem.curve.width[pieces]
     fastest = np.zeros(len(problem.curve))
-    rate, tangent, second = _at(problem, (piece, u0, u1), SURVEY, fastest)
+    rate, tangent, _ = _at(problem, (piece, u0, u1), SURVEY, fastest)
     count = _counts(rate, tangent, STEP)
     for _ in range(CUTS):
         piece, u0, u1 = _cut(piece, u0, u1, count)

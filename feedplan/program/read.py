@@ -17,7 +17,7 @@ from feedplan.program.gcode import MAX_MOVES, read_gcode
 from feedplan.program.path_file import read_path_file
 from feedplan.program.program import Program
 from feedplan.program.source import MAX_BYTES, Source, content_of
-from feedplan.program.subprograms import require_folder
+from feedplan.program.subprograms import readable_folder
 from feedplan.program.tools import read_tools
 from feedplan.progress import Listener
 
@@ -100,7 +100,7 @@ def read_program(
         if isinstance(subprograms, (str, bytes)) or not isinstance(subprograms, Iterable):
             raise refuse("subprograms", subprograms, "a list of folders")
         folders = [
-            require_folder(file_path(folder, "a folder of subprograms", _FOLDER)) for folder in subprograms
+            readable_folder(file_path(folder, "a folder of subprograms", _FOLDER)) for folder in subprograms
         ]
         folders = [*([text.parent] if isinstance(text, Path) else []), *folders]
         again: Mapping[str, Any] = {

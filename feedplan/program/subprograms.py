@@ -49,7 +49,7 @@ def numbered_files(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> dict[
     return dict(file for number in sorted(numbers) if (file := find(number)) is not None)
 
 
-def require_folder(folder: Path) -> Path:
+def readable_folder(folder: Path) -> Path:
     """The folder, if its files can be listed. Raises InputError."""
     try:
         next(folder.iterdir(), None)

@@ -249,7 +249,7 @@ impl<const M: usize> PhaseMotion<M> {
                 let way = columns.way(&a.place, &b.place);
                 let errors = a.speed[1] + b.speed[1];
                 let (mut sum, mut change) = (a.speed[0] + b.speed[0], (b.speed[0] - a.speed[0]).abs());
-                // A phase begins at a turn of the column to rounding: the turn may be behind its first place.
+                // Where a phase begins at a turn of the column, rounding may put the turn after its first place.
                 if a.place.slope.value[k] * b.place.slope.value[k] < 0.0 {
                     (sum, change) = (change, sum);
                 }

@@ -87,11 +87,11 @@ pub fn audit_profile<'a, const M: usize>(
             if !is_known {
                 of.at_once(&group, &mut columns, &mut looks, tally);
             }
-            for (number, i) in group.enumerate() {
+            for (member, i) in group.enumerate() {
                 tell(seen, i);
                 let found = match is_known {
                     true => good(i),
-                    false => of.phase((i, looks.times[number]), &mut columns, &mut last, tally),
+                    false => of.phase((i, looks.times[member]), &mut columns, &mut last, tally),
                 };
                 let was_good = std::mem::replace(&mut is_good, found);
                 // Of runs without a phase several begin at once.
