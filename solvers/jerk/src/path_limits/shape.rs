@@ -235,7 +235,8 @@ impl<const M: usize> Part<M> {
         }
     }
 
-    /// Includes the samples of this part in `seen`, and bounds on it that are met by what was seen in `bound`.
+    /// Includes the middle of this part in `seen`, and bounds on the part in `bound`: those of both halves where `is_met` does
+    /// not accept those of the whole part, beside what was seen.
     fn enclose(
         &self,
         is_met: &impl Fn(&Shape<M>, &Shape<M>) -> bool,
