@@ -1,8 +1,18 @@
-"""`python -m feedplan` runs the command `feedplan`."""
+"""The command `feedplan`, and `python -m feedplan`: imports the command line, and ends as that does where
+Ctrl-C interrupts the imports."""
 
 import sys
 
-from feedplan.cli import main
+
+def main() -> int:
+    """Runs the command line and returns the exit code."""
+    try:
+        from feedplan import cli
+    except KeyboardInterrupt:
+        print("error: interrupted", file=sys.stderr)
+        return 130
+    return cli.main()
+
 
 if __name__ == "__main__":
     sys.exit(main())

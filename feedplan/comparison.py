@@ -22,9 +22,9 @@ from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.planners import MethodName, limits_jerk, options_of
 from feedplan.planners import methods as all_methods
-from feedplan.planning import OF_ALL_METHODS, Plan, plan
+from feedplan.planning import OF_ALL_METHODS, Plan, plan, reading_of
 from feedplan.program.program import Program
-from feedplan.program.read import checked_reading, read_program
+from feedplan.program.read import read_program
 from feedplan.program.source import Source
 from feedplan.progress import Progress
 from feedplan.today import Today
@@ -126,8 +126,8 @@ def compare(
             raise InputError(f"no method of these takes {name}: give {', '.join(known)}, or leave it out")
     callback(progress)
     machine = Machine.of(machine)
+    reading = reading_of(source, options.pop("reading", None))
     if not isinstance(source, (Program, Path)):
-        reading = checked_reading(options.pop("reading", None))
         source = read_program(source, machine, feed=options.get("feed"), **reading)
     given = options.pop("controller", None)
     rival = machine.controller if given is None else Controller.of(given)

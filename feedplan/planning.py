@@ -336,9 +336,9 @@ def plan(
     neighbouring passes may differ by up to twice the tolerance. Methods that follow the lines themselves
     know one path only, and warn where "fastest" is asked for. `feed` [mm/s] replaces the programmed feeds
     (it is refused where a Path has none), `feed_override` multiplies them. `reading` are keywords of
-    `read_program`, such as a tool table. `period` [s] replaces the machine's servo period; `start_speed` and
-    `end_speed` [mm/s] hold at the ends.
-    `interpolator` makes the setpoints: "sarfraz" or "newton".
+    `read_program`, such as a tool table, for a source that is read here. `period` [s] replaces the machine's
+    servo period; `start_speed` and `end_speed` [mm/s] hold at the ends. `interpolator` makes the setpoints:
+    "sarfraz" or "newton".
     `controller`: what `Plan.today` compares with, the machine file's unless given: "linuxcnc", "grbl",
     "grblhal", "klipper" or "marlin", or a table as in a machine file.
     A plan of more than `max_setpoints` gives none, and is not audited, before it is asked for so many or a
@@ -407,6 +407,7 @@ def plan(
     def stated(path: Path) -> Problem:
         return build_problem(path, machine, **speeds)
 
+    reading = reading_of(source, reading)
     if isinstance(source, Path):
         if tolerance is not None:
             raise refuse("the tolerance", tolerance, "it where the path is made: a Path has its own")
@@ -426,7 +427,7 @@ def plan(
                     machine,
                     feed=feed,
                     progress=of_stage(progress, "read"),
-                    **checked_reading(reading),
+                    **reading,
                 )
         report("read", 1.0)
         report("fit", 0.0)
@@ -535,6 +536,16 @@ def plan(
 
 # What every method takes.
 OF_ALL_METHODS: tuple[str, ...] = tuple(plan.__kwdefaults__ or ())
+
+
+def reading_of(source: object, reading: object) -> Reading:
+    """The keywords of `read_program` for a source; raises InputError for anything else, and for any where the
+    source has been read."""
+    given = checked_reading(reading)
+    if given and isinstance(source, (Program, Path)):
+        kind = type(source).__name__
+        raise refuse("reading", ", ".join(given), f"it where the program is read: this {kind} has been read")
+    return given
 
 
 def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> None:

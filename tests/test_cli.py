@@ -360,6 +360,25 @@ def test_the_package_runs_as_a_module() -> None:
     assert (done.returncode, done.stdout.split()[0]) == (0, "feedplan")
 
 
+def test_an_interrupt_during_the_imports_is_told_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "click.py").write_text("raise KeyboardInterrupt")
+    done = subprocess.run(
+        [sys.executable, "-m", "feedplan", "machines"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "error: interrupted\n")
+
+
+def test_a_token_needs_a_service(program: Path, tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "token").write_text("0123456789abcdef\n")
+    assert main(["plan", str(program), "--token-file", str(tmp_path / "token")]) == 2
+    assert "--token-file needs a service that asks for it: give --server URL" in capsys.readouterr().err
+
+
 MAIN = "import sys; from feedplan.cli import main; sys.exit(main())"
 
 

@@ -158,6 +158,9 @@ def test_distances_from_the_path_are_told_in_its_unit(tmp_path: FilePath, capsys
     assert rows["deviation"].endswith(" rad")
     assert re.fullmatch(r"\S+ rad inside at most, \S+ rad outside, bends \S+ rad in the mean", rows["sides"])
     assert rows["fit"].startswith("1 point as 1 spline (")
+    assert main(["fit", *command[1:4], "--smooth"]) == 0
+    rows = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert rows["deviation"].endswith(" rad")
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert re.search(r"Tolerance asked for</td><td[^>]*>0.01 rad<", page)
     assert re.search(r"Deviation from the program</td><td[^>]*>0.00\d+ rad<", page)

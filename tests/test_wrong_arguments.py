@@ -352,6 +352,17 @@ def test_a_path_has_its_own_tolerance_and_size() -> None:
         feedplan.plan(path, "mill", tolerance=0.1)
 
 
+def test_what_has_been_read_is_read_no_other_way() -> None:
+    reading: Any = {"block_delete": False}
+    for source in (feedplan.read_program(PROGRAM), Path.from_points(POINTS, 0.01)):
+        kind = type(source).__name__
+        sentence = f"reading is 'block_delete': give it where the program is read: this {kind} has been read"
+        with pytest.raises(feedplan.InputError, match=sentence):
+            feedplan.plan(source, "mill", reading=reading)
+        with pytest.raises(feedplan.InputError, match=sentence):
+            feedplan.compare(source, "mill", ["bang-bang"], reading=reading)
+
+
 @pytest.mark.parametrize("columns", [7, 8, 9])
 def test_more_columns_than_axis_names_are_refused(columns: int) -> None:
     points = np.zeros((3, columns))

@@ -70,7 +70,7 @@ def compare(
         require_folder(FilePath(output))
     names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
     with terminal.progress_bar(quiet) as progress, terminal.silenced():
-        known, source = machine_for(machine, program, reading, options["feed"])
+        known, source, reading = machine_for(machine, program, reading, options["feed"])
         rows = make_comparison(
             source,
             known,

@@ -77,7 +77,7 @@ def filter_(
     if machine is None and own:
         known, source = _without_travel(import_machine(own)), program
     else:
-        known, source = machine_for(machine or "mill", program, reading)
+        known, source, reading = machine_for(machine or "mill", program, reading)
     result = plan(source, known, method=method, tolerance=tolerance, reading=reading, progress=tell)
     audit = result.audit(tell)
     if not audit.ok:

@@ -31,6 +31,7 @@ def fit(
     """Fit PROGRAM's points by splines, without planning; PROGRAM is as for plan."""
     from dataclasses import asdict
 
+    from feedplan.constraints.problem import build_problem
     from feedplan.geometry.build import build_path
     from feedplan.geometry.corners import Corners
     from feedplan.plan_folder import summary_text
@@ -38,7 +39,7 @@ def fit(
     from feedplan.program.read import read_program
     from feedplan.progress import of_stage
 
-    known, source = machine_for(machine, program, reading)
+    known, source, reading = machine_for(machine, program, reading)
     choice = Corners.SMOOTH if smooth else Corners.ROUNDED
     with terminal.progress_bar(quiet=False) as progress:
         moves = source
@@ -52,5 +53,6 @@ def fit(
     if as_json:
         sys.stdout.write(summary_text(summary))
     else:
+        unit = build_problem(path, known).unit
         path_row = ("path", terminal.pieces_text(summary))
-        terminal.print_rows([("program", name_of(program)), *terminal.fit_rows(summary), path_row])
+        terminal.print_rows([("program", name_of(program)), *terminal.fit_rows(summary, unit), path_row])

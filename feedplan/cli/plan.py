@@ -10,6 +10,7 @@ from pathlib import Path as FilePath
 from typing import IO, Any
 
 import click
+from click.core import ParameterSource
 
 from feedplan import outputs
 from feedplan.cli import options as option
@@ -104,6 +105,9 @@ def plan(
             "a service gives no program with planned feeds, no pvt table and nothing of --one-step-more: "
             "leave them out, or --server"
         )
+    given = click.get_current_context().get_parameter_source("token_file")
+    if given is ParameterSource.COMMANDLINE and not server:
+        raise click.UsageError("--token-file needs a service that asks for it: give --server URL as well")
     if server and cluster:
         raise click.UsageError(
             "a service plans where its own --cluster says: leave --server or --cluster out"
@@ -115,7 +119,7 @@ def plan(
         terminal.progress_bar(quiet) as progress,
         terminal.silenced(),
     ):
-        known, source = machine_for(machine, program, reading, options["feed"])
+        known, source, reading = machine_for(machine, program, reading, options["feed"])
         make_plan, write = _place(server, token_file)
         result = make_plan(
             source,

@@ -44,11 +44,14 @@ reading_options = as_one(
 
 def machine_for(
     name: str, source: str | IO[bytes], reading: Reading, feed: float | None = None
-) -> tuple[Machine, str | IO[bytes] | Program]:
-    """The machine of that name or file, and the source; for `auto` the smallest machine that the program
-    fits, and the program, which has then been read."""
+) -> tuple[Machine, str | IO[bytes] | Program, Reading]:
+    """The machine of that name or file, the source and how it is to be read; for `auto` the smallest machine
+    that the program fits, and the program, which has then been read."""
     if name != AUTO:
-        return Machine.load(name), source
+        return Machine.load(name), source, reading
     given = source if isinstance(source, str) else source.read()
     title = None if isinstance(source, str) else source.name
-    return smallest_machine(lambda machine: read_program(given, machine, name=title, feed=feed, **reading))
+    machine, program = smallest_machine(
+        lambda machine: read_program(given, machine, name=title, feed=feed, **reading)
+    )
+    return machine, program, Reading()

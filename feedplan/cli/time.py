@@ -60,7 +60,7 @@ def time(
     from feedplan.planning import plan
 
     with terminal.progress_bar(quiet=False) as progress, terminal.silenced():
-        known, source = machine_for(machine, program, reading, options["feed"])
+        known, source, reading = machine_for(machine, program, reading, options["feed"])
         result = plan(
             source,
             known,

@@ -213,7 +213,7 @@ impl Moves {
         }
         if self.splines.len() + curve.len() > self.limit {
             return fault!(
-                "the splines of the program have more than {} pieces: split it, or raise max_moves",
+                "the splines of the program have more than {} pieces: split it",
                 self.limit
             );
         }
@@ -284,7 +284,7 @@ impl Moves {
     #[inline(always)]
     fn row(&mut self, kind: Kind, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
         if self.kind.len() >= self.limit {
-            return fault!("the program has more than {} moves: split it, or raise max_moves", self.limit);
+            return fault!("the program has more than {} moves: split it", self.limit);
         }
         if self.control.last().is_none_or(|(_, last)| !last.same(control)) {
             self.control.push((self.kind.len(), *control));

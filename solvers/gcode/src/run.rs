@@ -241,8 +241,8 @@ impl<'a> Runner<'a> {
         match self.left.checked_sub(u64::from(REPORTED)) {
             Some(left) => self.left = left,
             None => return fault!(
-                "the loops and calls of the program run more lines than {} moves take: check their conditions, or raise \
-                 max_moves",
+                "the loops and calls of the program run more lines than {} moves take: check their conditions, or \
+                 split it",
                 self.options.max_moves
             ),
         }
