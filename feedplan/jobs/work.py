@@ -71,6 +71,7 @@ def work_on(
             machine, source = smallest_machine(
                 lambda known: read_program(content, known, name=order.name, feed=feed, **reading)
             )
+            reading = Reading()  # the program has been read
         else:
             machine = Machine.from_toml(order.machine, "of the order")
         made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
