@@ -212,10 +212,7 @@ impl Moves {
             return Ok(());
         }
         if self.splines.len() + curve.len() > self.limit {
-            return fault!(
-                "the splines of the program have more than {} pieces: split it",
-                self.limit
-            );
+            return fault!("the splines of the program have more than {} pieces: split it", self.limit);
         }
         self.spline_rows.push((self.kind.len(), self.splines.len()));
         for (i, &width) in curve.width.iter().enumerate() {

@@ -5,6 +5,7 @@ pub mod bisection;
 pub mod conic;
 pub mod elementary;
 mod instances;
+pub mod interval;
 pub mod inverse_length;
 pub mod lanes;
 pub mod newton;

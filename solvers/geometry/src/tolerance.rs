@@ -33,3 +33,5 @@ pub const LAST_STEP: f64 = 3e-9;
 pub const TABLE: f64 = 1e-13;
 /// C'' that changes |C'|² by less than this fraction along a piece counts as 0. [below rounding of |C'|]
 pub const NO_CURVATURE: f64 = 1e-40;
+/// The least number that covers one rounding of any product that underflows: 2⁻¹⁰⁷².
+pub const UNDERFLOW: f64 = f64::from_bits(4);

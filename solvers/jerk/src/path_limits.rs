@@ -17,12 +17,10 @@
 //!
 //! | module | what it computes |
 //! |---|---|
-//! | `interval` | interval arithmetic, and the operations that numbers and intervals share |
 //! | `chain_rule` | derivatives by arc length from those by the parameter |
 //! | `shape` | bounds on these derivatives over a segment, sampled or proven |
 
 mod chain_rule;
-mod interval;
 mod shape;
 
 use crate::s_curve::Limits;

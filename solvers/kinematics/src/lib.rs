@@ -14,7 +14,7 @@
 
 pub mod accuracy;
 pub mod expression;
-pub mod interval;
+mod interval;
 pub mod joint_interpolants;
 pub mod number;
 pub mod path_derivatives;

@@ -9,10 +9,10 @@
 use rayon::prelude::*;
 
 use super::expression::{Expression, Table};
-use super::interval::Interval;
 use super::number::Number;
 use super::series::MOST_ORDER;
 use super::tip::{binomial, Polygons, Tips};
+use feedplan_geometry::interval::Interval;
 
 pub const TURN: f64 = 360.0;
 const HALF_TURN: f64 = 180.0;

@@ -9,11 +9,10 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::interval::Interval;
-use super::number::Number;
 use super::path_derivatives::{turns_between, Machine, PartWork, PointWork, BLOCK, TURN};
 use super::tip::Tips;
 use super::tolerance::{DEEPEST, INTERVAL_DEPTH, INTERVAL_PARTS, TRAVEL};
+use feedplan_geometry::interval::Interval;
 
 /// The order of the series over parts: the second makes the bounds of positions and slopes narrow.
 const ORDER: usize = 2;

@@ -1,9 +1,9 @@
 //! Taylor series of a tip path, at a point or as bounds over a part, from its pieces in Bernstein form.
 
 use super::expression::Table;
-use super::interval::Interval;
 use super::number::Number;
 use super::series::quotient;
+use feedplan_geometry::interval::Interval;
 
 /// The most control points of a piece.
 pub const MOST_POINTS: usize = 16;

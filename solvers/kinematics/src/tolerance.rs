@@ -21,8 +21,6 @@ pub const DEEPEST: usize = 30;
 pub const INTERVAL_DEPTH: usize = 10;
 pub const INTERVAL_PARTS: usize = 64;
 
-/// The least number that covers one rounding of any product that underflows: 2⁻¹⁰⁷².
-pub const UNDERFLOW: f64 = f64::from_bits(4);
 /// Units in the last place that cover the error of sine, cosine and arc tangent. [libraries promise less than 4]
 pub const ELEMENTARY_ULPS: f64 = 8.0;
 /// An angle between two corners of a box beyond this may be the other way round, in radians. [the rounding of a difference

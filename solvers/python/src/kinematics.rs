@@ -7,9 +7,9 @@ use pyo3::types::PyTuple;
 
 use super::arrays::{require, Column, Cube, Table};
 use super::work::run;
+use feedplan_geometry::interval::Interval;
 use feedplan_kinematics::accuracy::{Accuracy, Motion, SpeedNodes, Square, Tolerance};
 use feedplan_kinematics::expression::Expression;
-use feedplan_kinematics::interval::Interval;
 use feedplan_kinematics::joint_interpolants::{interpolants, Nodes};
 use feedplan_kinematics::path_derivatives::{self, Machine};
 use feedplan_kinematics::series::MOST_ORDER;

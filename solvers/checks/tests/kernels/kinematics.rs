@@ -2,9 +2,8 @@
 
 use feedplan_audit::joints::formula::{Formula, Jet};
 use feedplan_audit::EPS;
+use feedplan_geometry::interval::Interval;
 use feedplan_kinematics::expression::Expression;
-use feedplan_kinematics::interval::Interval;
-use feedplan_kinematics::number::Number;
 use proptest::prelude::*;
 
 /// Codes of operations with one operand, and with two.

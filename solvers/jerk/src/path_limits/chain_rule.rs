@@ -9,7 +9,64 @@
 //! thesis's form q''u_S² + … cancels. The thesis takes S' = |q'|, which is right only where the tool's axes are the
 //! joints.
 
-use super::interval::Number;
+use feedplan_geometry::interval::Interval;
+use std::ops::{Add, Mul, Sub};
+
+/// A number, or an interval that contains it.
+pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    fn scale(self, factor: f64) -> Self;
+    fn square(self) -> Self;
+    /// 1/x of a positive number; infinite where x may not be positive.
+    fn reciprocal(self) -> Self;
+    /// √x of a number ≥ 0.
+    fn root(self) -> Self;
+    fn range(self) -> Interval;
+}
+
+impl Number for f64 {
+    fn scale(self, factor: f64) -> Self {
+        factor * self
+    }
+    fn square(self) -> Self {
+        self * self
+    }
+    fn reciprocal(self) -> Self {
+        if self > 0.0 {
+            1.0 / self
+        } else {
+            f64::INFINITY
+        }
+    }
+    fn root(self) -> Self {
+        self.max(0.0).sqrt()
+    }
+    fn range(self) -> Interval {
+        Interval::exactly(self)
+    }
+}
+
+impl Number for Interval {
+    fn scale(self, factor: f64) -> Self {
+        self * Interval::exactly(factor)
+    }
+    fn square(self) -> Self {
+        Interval::square(self)
+    }
+    fn reciprocal(self) -> Self {
+        if self.lo > 0.0 {
+            Interval::reciprocal(self)
+        } else {
+            Interval { lo: 0.0, hi: f64::INFINITY }
+        }
+    }
+    fn root(self) -> Self {
+        let root = Interval { lo: self.lo.max(0.0), ..self }.sqrt();
+        Interval { lo: root.lo.max(0.0), ..root }
+    }
+    fn range(self) -> Interval {
+        self
+    }
+}
 
 /// The terms of one axis, at a point or over an interval.
 #[derive(Clone, Copy, Debug)]

@@ -5,8 +5,8 @@
 //! `chain_rule` by their Bernstein coefficients and the derivatives by interval arithmetic, and halves the segment
 //! until the enclosure is close to the values at samples.
 
-use super::chain_rule::{Shared, Terms};
-use super::interval::{Interval, Number};
+use super::chain_rule::{Number, Shared, Terms};
+use feedplan_geometry::interval::Interval;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_planner::problem::{greater, Both};
 
@@ -88,7 +88,7 @@ impl<const M: usize> Shape<M> {
         let [first, second] = [first, second].map(|q| {
             let (mut high, mut low) = ([0.0; M], [0.0; M]);
             for k in 0..M {
-                [high[k], low[k]] = sizes([q[k], q[k]]);
+                [high[k], low[k]] = sizes(Interval::exactly(q[k]));
             }
             [high, low]
         });
@@ -127,8 +127,8 @@ impl<const M: usize> Shape<M> {
 }
 
 /// The sizes of positive and of negative values in a range.
-fn sizes([least, greatest]: [f64; 2]) -> [f64; 2] {
-    [greatest, -least].map(|size| if size > 0.0 { size } else { 0.0 })
+fn sizes(range: Interval) -> [f64; 2] {
+    [range.hi, -range.lo].map(|size| if size > 0.0 { size } else { 0.0 })
 }
 
 /// A polynomial, and the error of its coefficients.
@@ -151,7 +151,9 @@ impl Rounded {
 
     fn range(&self) -> Interval {
         let (low, high) = self.function.range();
-        Interval::around(low, high, self.error)
+        // The coefficients have a few roundings of numbers of this size.
+        let margin = 4.0 * f64::EPSILON * self.error + f64::MIN_POSITIVE;
+        Interval { lo: low - margin, hi: high + margin }
     }
 }
 
@@ -198,9 +200,9 @@ impl<const M: usize> Part<M> {
         for (k, axis) in self.joints.iter().enumerate() {
             let terms = Terms { x: of(&axis.x), n: of(&axis.n), n_rate: of(&axis.n_rate) };
             let [first, second, third] = shared.by_length(&terms);
-            [shape.first[0][k], shape.first[1][k]] = sizes(first.ends());
-            [shape.second[0][k], shape.second[1][k]] = sizes(second.ends());
-            shape.third[k] = third.most();
+            [shape.first[0][k], shape.first[1][k]] = sizes(first.range());
+            [shape.second[0][k], shape.second[1][k]] = sizes(second.range());
+            shape.third[k] = third.range().magnitude();
         }
         let bends = match &self.tip {
             // |q_S| ≤ 1 where the axes are those of the tool.
@@ -211,7 +213,7 @@ impl<const M: usize> Part<M> {
             Some(tip) => {
                 let bend = |n: &Rounded| {
                     let n = of(n);
-                    shared.by_length(&Terms { x: n, n, n_rate: n })[1].most().powi(2)
+                    shared.by_length(&Terms { x: n, n, n_rate: n })[1].range().magnitude().powi(2)
                 };
                 tip.iter().map(bend).sum()
             }
