@@ -144,16 +144,18 @@ def _lines(problem: Problem, piece: Integers, acceleration: float) -> Segments:
 def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float) -> Segments:
     piece, u0, u1 = pieces, np.zeros(len(pieces)), problem.curve.width[pieces]
     fastest = np.zeros(len(problem.curve))
-    rate, tangent, _ = _at(problem, (piece, u0, u1), SURVEY, fastest)
+    rate, tangent = _at(problem, (piece, u0, u1), SURVEY, fastest)
+    fastest[pieces] = rate.max(axis=1)
     count = _counts(rate, tangent, STEP)
     for _ in range(CUTS):
         piece, u0, u1 = _cut(piece, u0, u1, count)
-        rate, tangent, second = _at(problem, (piece, u0, u1), PLACES, fastest)
+        rate, tangent = _at(problem, (piece, u0, u1), PLACES, fastest)
         count = _counts(rate, tangent, 2.0 * STEP)
         if (count == 1).all():
             break
     rows = np.repeat(piece, len(PLACES))
     rate, tangent = rate.ravel(), tangent.reshape(len(rows), -1)
+    second = problem.curve.evaluate(rows, _places(u0, u1, PLACES).ravel(), 2)[2]
     bend = second - (second * tangent).sum(axis=1)[:, None] * tangent
     size = np.linalg.norm(bend, axis=1)
     curvature = size / rate**2
@@ -206,22 +208,25 @@ def _least(values: Floats) -> Floats:
     return reduce(np.minimum, np.moveaxis(values, -1, 0))
 
 
+def _places(u0: Floats, u1: Floats, places: Floats) -> Floats:
+    """u at places of parts (m, places)."""
+    return np.clip(u0[:, None] + places * (u1 - u0)[:, None], u0[:, None], u1[:, None])
+
+
 def _at(
     problem: Problem, parts: tuple[Integers, Floats, Floats], places: Floats, fastest: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """|C'| and unit tangents at places of parts (m, places), and C'' there, one place after the other.
+) -> tuple[Floats, Floats]:
+    """|C'| and unit tangents at places of parts (m, places).
 
-    `fastest` (n,) is the greatest |C'| seen on each piece. Raises SolverError at cusps.
+    Raises SolverError at cusps, where |C'| is 0 or far below `fastest` (n,), that of each piece.
     """
     piece, u0, u1 = parts
-    u = np.clip(u0[:, None] + places * (u1 - u0)[:, None], u0[:, None], u1[:, None])
-    _, first, second = problem.curve.evaluate(np.repeat(piece, len(places)), u.ravel(), 2)
+    _, first = problem.curve.evaluate(np.repeat(piece, len(places)), _places(u0, u1, places).ravel(), 1)
     first = first.reshape(len(piece), len(places), -1)
     rate = np.linalg.norm(first, axis=2)
-    np.maximum.at(fastest, piece, rate.max(axis=1))
-    cusp = rate.min(axis=1) <= CUSP * fastest[piece]
+    cusp = rate.min(axis=1) <= CUSP * np.maximum(fastest[piece], rate.max(axis=1))
     _refuse(problem, piece[cusp], "the path has a cusp, where this method has no speed: plan with bang-bang")
-    return rate, first / rate[:, :, None], second
+    return rate, first / rate[:, :, None]
 
 
 def _counts(rate: Floats, tangent: Floats, most: float) -> Integers:

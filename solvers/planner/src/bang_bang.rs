@@ -52,6 +52,10 @@
 //! | `quadratic` | polynomials of degree 2 in the tool's own axes | closed forms, and roots of quartics |
 //! | `curve` | all others: any degree, rational, joints | roots of Bernstein polynomials |
 //!
+//! The kernel of curves could plan the other pieces too. It takes three times the time of `quadratic` on the same
+//! pieces, and where axes turn so close to a cusp that tangents have no digits left, it treats the turns as one point;
+//! `quadratic` keeps every limit there, since W is exact.
+//!
 //! | file | content |
 //! |---|---|
 //! | `run` | both passes over a run, from piece to piece |
