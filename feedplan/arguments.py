@@ -125,7 +125,7 @@ def instance(value: object, wanted: type[Wanted], what: str, remedy: str) -> Wan
 def file_path(value: object, what: str, remedy: str) -> FilePath:
     """The value as a path; raises InputError for other values."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
-    if not isinstance(text, str):
+    if not isinstance(text, str) or not text:
         raise refuse(what, value, remedy)
     try:
         os.fsencode(text)

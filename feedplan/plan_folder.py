@@ -201,7 +201,8 @@ def write_comparison(
 ) -> tuple[FilePath, ...]:
     """Writes a comparison's numbers (`summary`) and its page; returns the files.
 
-    Both appear whole or not at all. Raises InputError if the folder or the file system refuses.
+    Both appear whole or not at all. Raises InputError if the folder or the file system refuses, or if the
+    program would be written over.
     """
     from feedplan.comparison import LIMITS
     from feedplan.report.comparison import FILE as PAGE_FILE
@@ -209,6 +210,9 @@ def write_comparison(
     from feedplan.report.tool_path import ToolPath
 
     folder = _folder(folder)
+    for row in rows:
+        if row.plan is not None and row.plan.program is not None:
+            require_other(row.plan.program.text, folder / COMPARISON_FILE)
     paths, shown = [], []
     for number, row in enumerate(rows):
         entry: dict[str, Any] = {"method": row.method, "time": row.time, "error": row.error}

@@ -20,6 +20,7 @@ from feedplan.cli.ending import BROKEN, DONE
 from feedplan.cli.reading_options import reading_options
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading, checked_reading
+from feedplan.program.source import require_other
 from feedplan.program.subprograms import readable_folder
 from feedplan.program.tools import read_tools
 from feedplan.units import counted, duration_text
@@ -68,7 +69,14 @@ _SWEPT = "may be given several times"
 @option.FEED_OVERRIDE
 @option.PERIOD
 @option.MOST_SETPOINTS
-@click.option("--output", "-o", required=True, metavar="DIR", help="A folder for each plan is made there.")
+@click.option(
+    "--output",
+    "-o",
+    type=option.Place(),
+    required=True,
+    metavar="DIR",
+    help="A folder for each plan is made there.",
+)
 @click.option(
     "--format",
     "formats",
@@ -129,7 +137,7 @@ def batch(
     """
     from feedplan.batch.run import run_batch
     from feedplan.batch.summary import HEADER, summary_of, table_rows, write_summary
-    from feedplan.batch.sweep import Sweep, machine_text
+    from feedplan.batch.sweep import JOURNAL, SUMMARY, TABLE, Sweep, machine_text
     from feedplan.plan_folder import summary_text
 
     if cluster is not None and jobs is not None:
@@ -152,6 +160,8 @@ def batch(
         tuple(FilePath(folder).absolute() for folder in folders),
     )
     folder, start = FilePath(output).absolute(), time.monotonic()
+    for program in programs:
+        require_other(program, *(folder / name for name in (JOURNAL, TABLE, SUMMARY)))
     with _executor(cluster, jobs, max_time, max_memory) as executor, terminal.progress_bar(quiet) as progress:
         rows, kept = run_batch(sweep, folder, executor, progress)
     summary = summary_of(rows, kept, time.monotonic() - start)

@@ -41,7 +41,13 @@ if TYPE_CHECKING:
 @option.PATH
 @option.FEED
 @option.PERIOD
-@click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
+@click.option(
+    "--output",
+    "-o",
+    type=option.Place(),
+    metavar="DIR",
+    help="Write comparison.json and comparison.html there.",
+)
 @option.JSON
 @option.QUIET
 def compare(

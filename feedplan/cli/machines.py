@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from feedplan.cli import terminal
-from feedplan.cli.options import by_name
+from feedplan.cli.options import Place, by_name
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis, Limit
 from feedplan.machine.machine import Machine, bundled_machines, bundled_text, template
@@ -33,7 +33,9 @@ def show(name: str) -> None:
     terminal.print_table(names, [_axis_row(axis) for axis in Machine.load(name).axes])
 
 
-_OUTPUT = click.option("--output", "-o", metavar="FILE", help="Write it there.  [default: standard output]")
+_OUTPUT = click.option(
+    "--output", "-o", type=Place(), metavar="FILE", help="Write it there.  [default: standard output]"
+)
 
 
 @machines.command()

@@ -18,8 +18,9 @@ from feedplan.setpoints import MAX_SETPOINTS
 
 if TYPE_CHECKING:
     NumberType = click.ParamType[float]
+    TextType = click.ParamType[str]
 else:
-    NumberType = click.ParamType  # generic only in the newest click
+    NumberType = TextType = click.ParamType  # generic only in the newest click
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Value = TypeVar("Value")
@@ -41,6 +42,17 @@ class Number(NumberType):
         if math.isfinite(number) and (number > 0 or (self._or_zero and number == 0)):
             return number
         self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
+
+
+class Place(TextType):
+    """The path of a file or a folder to write to."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if value:
+            return str(value)
+        self.fail("it is empty: give a path", param, ctx)
 
 
 MACHINE = click.option(

@@ -47,7 +47,13 @@ from feedplan.setpoints import INTERPOLATORS
 )
 @click.option("--end-speed", type=option.ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
 @click.option("--one-step-more", is_flag=True, help="Plan again with each limit raised, and tell the gain.")
-@click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
+@click.option(
+    "--output",
+    "-o",
+    type=option.Place(),
+    metavar="DIR",
+    help="Write plan.json, setpoints and report.html there.",
+)
 @click.option(
     "--format",
     "formats",
@@ -112,6 +118,7 @@ def plan(
         raise click.UsageError(
             "a service plans where its own --cluster says: leave --server or --cluster out"
         )
+    wanted.require_other(machine)
     if output:
         require_folder(FilePath(output))
     with (

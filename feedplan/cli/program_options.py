@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from feedplan.cli.options import as_one
+from feedplan.cli.options import Place, as_one
 from feedplan.planned_feeds.dialects import DIALECTS
+from feedplan.program.source import require_other
 
 if TYPE_CHECKING:
     from feedplan.planned_feeds.rewrite import PlannedProgram
@@ -22,6 +24,11 @@ class ProgramWanted:
     file: str | None
     in_folder: bool
     options: dict[str, Any]
+
+    def require_other(self, machine: str) -> None:
+        """Raises InputError if the file is the machine's: it would be lost."""
+        if self.file is not None:
+            require_other(machine, FilePath(self.file), what="machine file")
 
     def make(self, plan: Plan) -> PlannedProgram | None:
         """Makes the program if it is wanted, and writes it to the file if one is given; else returns None."""
@@ -49,6 +56,11 @@ def _wanted(
             "--feed-step, --inverse-time, --dialect and --expand are for the program with planned feeds: "
             "give --program-out FILE as well"
         )
+    if program_out == "-":
+        raise click.UsageError(
+            "standard output is for the result: give --program-out a file, or use feedplan filter, which "
+            "writes the program there"
+        )
     return ProgramWanted(program_out, in_folder, given)
 
 
@@ -57,7 +69,9 @@ program_options = as_one(
     "wanted",
     _wanted,
     (
-        click.option("--program-out", metavar="FILE", help="Write the program with planned feeds there."),
+        click.option(
+            "--program-out", type=Place(), metavar="FILE", help="Write the program with planned feeds there."
+        ),
         click.option(
             "--program",
             "in_folder",

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from feedplan.cli.cluster_options import cluster_options
-from feedplan.cli.options import as_one
+from feedplan.cli.options import Place, as_one
 from feedplan.errors import MissingPackageError
 from feedplan.jobs.address import ClusterAddress
 from feedplan.service.limits import Limits
@@ -46,7 +46,12 @@ limit_options = as_one("limits", Limits, [_limit_option(own) for own in fields(L
     "--port", type=click.IntRange(0, 65_535), default=8000, show_default=True, help="0: a free one."
 )
 @click.option(
-    "--store", default="feedplan-jobs", show_default=True, metavar="DIR", help="Where jobs are kept."
+    "--store",
+    type=Place(),
+    default="feedplan-jobs",
+    show_default=True,
+    metavar="DIR",
+    help="Where jobs are kept.",
 )
 @TOKEN_FILE
 @click.option(

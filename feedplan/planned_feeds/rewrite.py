@@ -68,20 +68,26 @@ class PlannedProgram:
         return hashlib.sha256(self.content).hexdigest()
 
     def write(self, file: str | os.PathLike[str]) -> None:
-        """Writes the text to a file, whole or not at all. Raises InputError where it cannot be written."""
-        place = file_path(file, "the file", "the path of a file")
+        """Writes the text to a file, whole or not at all; a device or a pipe gets it as it is.
+
+        Raises InputError where it cannot be written.
+        """
+        given = file_path(file, "the file", "the path of a file")
         try:
+            # A link stays, and what it points to is replaced.
+            place = given.resolve()
+            if place.exists() and not place.is_file():
+                place.write_bytes(self.content)
+                return
             beside = place.with_name(f".feedplan-{secrets.token_hex(6)}")
             try:
                 beside.write_bytes(self.content)
                 os.replace(beside, place)
             finally:
                 beside.unlink(missing_ok=True)
-        except (OSError, ValueError) as error:  # a name that no file can have, or none
-            reason = (
-                (getattr(error, "strerror", None) or str(error)).lower() if place.name else "is a directory"
-            )
-            raise InputError(f"{place} cannot be written ({reason}): choose another file") from error
+        except (OSError, RuntimeError, ValueError) as error:  # also a ring of links, a name no file can have
+            reason = (getattr(error, "strerror", None) or str(error)).lower()
+            raise InputError(f"{given} cannot be written ({reason}): choose another file") from error
 
     def to_json(self) -> dict[str, Any]:
         """Its entry in plan.json."""
@@ -198,11 +204,12 @@ def write_program(
 ) -> PlannedProgram:
     """Writes the program of a plan with planned feeds to a file, whole or not at all; see `planned_program`.
 
-    Raises InputError also where the file cannot be written, or is the one that the program was read from.
+    Raises InputError also where the file cannot be written, or is the program or tool table that was read.
     """
     place = file_path(file, "the file", "the path of a file")
     if isinstance(plan, Plan) and plan.program is not None:
         require_other(plan.program.text, place)
+        require_other((plan.program.reading or {}).get("tool_table"), place, what="tool table")
     planned = planned_program(
         plan, feed_step=feed_step, inverse_time=inverse_time, dialect=dialect, expand=expand
     )

@@ -30,12 +30,12 @@ class Content(NamedTuple):
     text: Path | bytes
 
 
-def require_other(text: Path | bytes | None, *places: Path) -> None:
-    """Raises InputError if one of the places is the file that a program was read from: it would be lost."""
+def require_other(own: object, *places: Path, what: str = "program") -> None:
+    """Raises InputError if one of the places is a file that was read, as the program: it would be lost."""
     for place in places:
         with suppress(OSError, ValueError):  # no such file, or a name that no file can have
-            if isinstance(text, Path) and place.samefile(text):
-                raise InputError(f"{place} is the program itself, which would be lost: choose another file")
+            if isinstance(own, (str, os.PathLike)) and place.samefile(own):
+                raise InputError(f"{place} is the {what} itself, which would be lost: choose another file")
 
 
 def content_of(source: Source, name: str | None = None, max_bytes: int = MAX_BYTES) -> Content:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,76 @@ def test_a_program_is_not_written_over_itself(part: Path, tmp_path: Path, capsys
     assert main(["plan", str(own), "-o", str(tmp_path), "-q"]) == 0
     assert main(["plan", str(own), "--program-out", ".", "-q"]) == 2
     assert capsys.readouterr().err == "error: . cannot be written (is a directory): choose another file\n"
+
+
+def test_files_that_were_read_are_not_written_over(part: Path, tmp_path: Path, capsys: Any) -> None:
+    machine, table = tmp_path / "own.toml", tmp_path / "tools.tbl"
+    assert main(["machines", "new", "-o", str(machine)]) == 0
+    table.write_text("T1 P1 D5 Z-20\n")
+    before = [file.read_bytes() for file in (machine, table)]
+    read = ["-m", str(machine), "--tool-table", str(table)]
+    for file, what in ((machine, "machine file"), (table, "tool table")):
+        capsys.readouterr()
+        assert main(["plan", str(part), *read, "--program-out", str(file)]) == 2
+        told = f"error: {file} is the {what} itself, which would be lost: choose another file\n"
+        assert capsys.readouterr() == ("", told)
+    assert [file.read_bytes() for file in (machine, table)] == before
+
+
+@pytest.mark.parametrize("command", ["compare", "batch"])
+def test_a_path_file_is_not_written_over_by_tables(command: str, tmp_path: Path, capsys: Any) -> None:
+    own = tmp_path / ("comparison.json" if command == "compare" else "batch.json")
+    own.write_text('{"unit": "mm", "feed": 9, "curves": [{"degree": 1, "control_points": [[0, 0], [5, 0]]}]}')
+    before = own.read_bytes()
+    methods = ["--methods", "bang-bang"] if command == "compare" else []
+    assert main([command, str(own), *methods, "-o", str(tmp_path)]) == 2
+    assert "is the program itself, which would be lost" in capsys.readouterr().err
+    assert own.read_bytes() == before
+
+
+def test_a_device_stays_and_a_link_leads_to_the_file(part: Path, tmp_path: Path) -> None:
+    device, place, link = tmp_path / "pipe", tmp_path / "out.ngc", tmp_path / "link.ngc"
+    os.mkfifo(device)
+    place.write_text("before")
+    link.symlink_to(place)
+    reader = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        result = feedplan.write_program(feedplan.plan(part, "mill"), device)
+        assert os.read(reader, 1 << 16) == result.content
+    finally:
+        os.close(reader)
+    assert device.is_fifo()
+    result.write(link)
+    assert link.is_symlink()
+    assert place.read_bytes() == result.content
+    ring = tmp_path / "ring.ngc"
+    ring.symlink_to(ring)
+    with pytest.raises(InputError, match=r"ring\.ngc cannot be written \(.*\): choose another file"):
+        result.write(ring)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["plan", "-o", ""], "'-o': it is empty: give a path"),
+        (["compare", "-o", ""], "'-o': it is empty: give a path"),
+        (["batch", "-o", ""], "'-o': it is empty: give a path"),
+        (["plan", "--program-out", ""], "'--program-out': it is empty: give a path"),
+        (["plan", "--program-out", "-"], "use feedplan filter, which writes the program there"),
+    ],
+)
+def test_a_place_without_a_name_is_refused(
+    arguments: list[str], told: str, part: Path, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([arguments[0], str(part), *arguments[1:]]) == 2
+    printed, error = capsys.readouterr()
+    assert (printed, list(tmp_path.iterdir())) == ("", [part])
+    assert told in error
+    with pytest.raises(InputError, match="the folder is '': give the path of a folder"):
+        feedplan.write_plan(feedplan.plan(part, "mill"), "")
+    with pytest.raises(InputError, match="the program is '': give the path of a file"):
+        feedplan.read_program("")
 
 
 def test_a_path_file_is_not_written_over_itself(tmp_path: Path) -> None:
