@@ -200,7 +200,9 @@ def test_a_path_has_no_events_and_a_plan_can_be_pickled_with_its_own() -> None:
     made = planned("M3\nG1 X10\nM5\nM2")
     assert "4 events" not in repr(made.events)
     assert repr(made.events) == "<3 events: 2 spindle, 1 stop>"
+    assert made.account is not None  # its table of lengths is made again
     again = pickle.loads(pickle.dumps(made))
+    assert again.account.to_json() == made.account.to_json()
     assert again.events.sha256() == made.events.sha256()
     points = pickle.loads(pickle.dumps(made.setpoints()))
     assert points.events.sha256() == made.setpoints().events.sha256()

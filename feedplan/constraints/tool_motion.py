@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +32,12 @@ _ROUNDINGS = 64.0
 
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
-    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0, and `table`
-    their lengths; `turns` (n,) is true for pieces on which only rotary axes and joints move. `share`
+    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0;
+    `turns` (n,) is true for pieces on which only rotary axes and joints move. `share`
     (n, axes) is the weight of each axis, None if all are 1. `units` are those of the length if the tool
     moves, and if it turns alone."""
 
     curve: CompositeCurve
-    table: CurveLength | None
     share: Floats | None
     turns: Flags
     units: tuple[str, str]
@@ -51,7 +51,16 @@ class ToolMotion:
             share, turns = _counted(path)
             weights = np.repeat(share, np.diff(curve.offsets), axis=0)
             curve = replace(curve, control_points=curve.control_points * weights)
-        return cls(curve, CurveLength(curve) if len(curve) else None, share, turns, units)
+        return cls(curve, share, turns, units)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The copy makes its own table of lengths.
+        return {name: value for name, value in vars(self).items() if name != "_table"}
+
+    @cached_property
+    def _table(self) -> CurveLength | None:
+        """The lengths along the curve; None for a curve without pieces."""
+        return CurveLength(self.curve) if len(self.curve) else None
 
     @property
     def unit(self) -> str:
@@ -82,7 +91,7 @@ class ToolMotion:
         return np.cumsum(np.where(self.drawn, 0.0, self.lengths))
 
     def _way(self, piece: NDArray[np.integer], u: Floats) -> Floats:
-        return np.zeros(len(u)) if self.table is None else self.table.length(piece, u)
+        return np.zeros(len(u)) if self._table is None else self._table.length(piece, u)
 
 
 def _counted(path: Path) -> tuple[Floats, Flags]:
