@@ -41,10 +41,20 @@ def test_progress_rises_from_0_to_100_in_lines_that_linuxcnc_reads() -> None:
     code, out, error = run(str(EXAMPLES / "part.ngc"), "--machine", "mill")
     assert code == 0
     told = [int(match[1]) for match in re.finditer(r"^FILTER_PROGRESS=(\d+)$", error, re.MULTILINE)]
-    assert len(told) == error.count("\n")
+    assert len(told) == error.count("\n") - error.count("warning: ")
     assert told == sorted(set(told))
     assert (told[0], told[-1]) == (0, 100)
     assert len(read_gcode(out)) == len(read_gcode(EXAMPLES / "part.ngc"))
+
+
+def test_warnings_are_told_beside_the_progress(tmp_path: Path) -> None:
+    file = tmp_path / "units.ngc"
+    file.write_text("G1 X10 F100\nM2\n")
+    code, _, error = run(str(file), "--machine", "mill")
+    assert code == 0
+    assert re.findall(r"^warning: .*$", error, re.MULTILINE) == [
+        "warning: the program gives no units (G20 or G21): millimetres are assumed"
+    ]
 
 
 def test_the_machine_is_that_of_the_ini_file_without_its_travel(tmp_path: Path) -> None:

@@ -168,6 +168,8 @@ def batch(
     files = write_summary(summary, folder)
     if not quiet:
         for row in rows:
+            for warning in row["warnings"]:
+                print(f"{row['folder']}: warning: {warning}", file=sys.stderr)
             if row["error"] is not None:
                 print(f"{row['folder']}: {row['error']}", file=sys.stderr)
             for failure in row["failures"]:

@@ -83,6 +83,8 @@ def filter_(
     if not audit.ok:
         raise InfeasibleError(terminal.failure_sentence(audit))
     content = planned_program(result, dialect="linuxcnc").content
+    for warning in result.warnings:
+        write(f"warning: {warning}\n")
     tell("write", 1.0)
     sys.stdout.buffer.write(content)
 

@@ -59,6 +59,14 @@ def test_a_sweep_has_a_folder_and_a_row_for_each_plan(tmp_path: Path) -> None:
     assert "12 plans in " in done.said
 
 
+def test_warnings_are_told_with_the_folder_of_their_plan(tmp_path: Path) -> None:
+    [program] = write(tmp_path, 1)
+    program.write_text("G1 X10 F100\nM2\n")
+    warning = "part0: warning: the program gives no units (G20 or G21): millimetres are assumed\n"
+    for _ in ("planned", "kept"):
+        assert run(program, "-o", tmp_path / "out", "--format", "none").told.count(warning) == 1
+
+
 def test_a_folder_is_what_plan_writes(tmp_path: Path) -> None:
     [program] = write(tmp_path, 1)
     code = main(["plan", str(program), "-q", "-o", str(tmp_path / "alone")])
