@@ -367,8 +367,12 @@ def test_the_check_from_python_takes_machines_too(folder: Any) -> None:
     assert not check(out / "setpoints.npz", "tarus", jerk=True).ok
     weak = Machine("weak", tuple(Axis(name, 100, 100) for name in "XYZ"), period=0.002)
     assert not check(out, weak).ok
+    with pytest.raises(InputError, match=r"none does not exist: give the setpoints or the folder of a plan"):
+        check(out / "none")
     with pytest.raises(InputError, match="does not exist"):
         check(out / "none.npz")
+    with pytest.raises(InputError, match=r"plan\.json is not a file of setpoints.*or the folder of a plan"):
+        check(out / "plan.json")
 
 
 def change_setpoints(folder: Path, change: Any) -> None:

@@ -135,6 +135,8 @@ def load_setpoints(place: str | os.PathLike[str], progress: Listener | None = No
     endings = {FilePath(format_named(name).FILE).suffix: name for name in formats()}
     if file.suffix in endings:
         return _load(endings[file.suffix], file, progress)
+    if not file.exists():
+        raise _missing(file)
     known = ", ".join(sorted(endings))
     raise InputError(f"{file}: setpoints cannot be read from this kind of file: give a file in {known}")
 
@@ -149,6 +151,10 @@ def _load(name: str, file: FilePath, progress: Listener | None) -> SetpointFile:
     try:
         return format_named(name).load(file, progress)
     except FileNotFoundError:
-        raise InputError(f"{file} does not exist: give the setpoints or the folder of a plan") from None
+        raise _missing(file) from None
     except OSError as error:
         raise InputError(unreadable(file, error, "the setpoints or the folder of a plan")) from None
+
+
+def _missing(file: FilePath) -> InputError:
+    return InputError(f"{file} does not exist: give the setpoints or the folder of a plan")

@@ -76,8 +76,11 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
         table = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file} is not valid JSON ({error}): plan again") from None
-    if not isinstance(table, dict):
-        raise InputError(f"{file} is not a file of setpoints: give an object with t, position, …")
+    if not isinstance(table, dict) or "t" not in table:
+        raise InputError(
+            f"{file} is not a file of setpoints, an object with t, position, …: give setpoints.json, or the "
+            "folder of a plan"
+        )
     try:
         arrays: dict[str, Any] = {
             name: np.array(table[name], dtype=np.float64) for name in ("t", *QUANTITIES) if name in table

@@ -96,6 +96,7 @@ def test_an_interrupted_write_raises_the_interrupt(name: str, tmp_path: Path) ->
 
 
 def test_an_unknown_ending_and_an_empty_folder_name_the_remedy(tmp_path: Path) -> None:
+    (tmp_path / "setpoints.txt").touch()
     with pytest.raises(
         InputError, match=r"give a file in \.csv, \.halstream, \.json, \.npz, \.parquet, \.pvt"
     ):
