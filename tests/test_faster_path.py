@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from feedplan.cli.terminal import gain_text
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planning import Plan, plan
@@ -149,6 +150,15 @@ def test_a_method_with_one_path_says_so(method: str) -> None:
     assert says in made(turn, method=method, path="fastest").warnings
     assert says not in made(turn, method=method).warnings
     assert not any("as-fitted" in own for own in made(turn, path="fastest").warnings)
+
+
+def test_the_gain_is_told_in_words() -> None:
+    told = {"times": [2.0, 1.5], "promised": [], "sections": 4, "faster": 1}
+    start = "2.000 s → 1.500 s; the last fit is faster in 1 of 4 sections"
+    assert gain_text(told) == start
+    assert gain_text(told | {"promised": [0.1]}) == f"{start}; a step along the gradient promises 100.0 ms"
+    steps = "the steps promised 200.0 ms, one more promises 100.0 ms"
+    assert gain_text(told | {"promised": [0.2, 0.1]}) == f"{start}; {steps}"
 
 
 @pytest.mark.parametrize("seed", range(seeds(6)))

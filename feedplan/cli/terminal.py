@@ -230,7 +230,8 @@ def gain_text(gain: Mapping[str, Any]) -> str:
     promised = [duration_text(float(seconds)) for seconds in gain["promised"]]
     if promised:
         *taken, following = promised
-        text += f"; the steps promised {', '.join(taken)}, one more promises {following}"
+        steps = f"the steps promised {', '.join(taken)}, one more" if taken else "a step along the gradient"
+        text += f"; {steps} promises {following}"
     return text
 
 
