@@ -21,6 +21,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from feedplan.arguments import shown
 from feedplan.arrays import Floats
 from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError, ProgramError
@@ -139,8 +140,16 @@ class _PathFile:
         def refuse(word: str) -> None:
             self._fail(f"the number {word} is not finite: give a number")
 
+        def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+            table = dict(pairs)
+            if len(table) < len(pairs):
+                keys = [key for key, _ in pairs]
+                twice = next(key for key in keys if keys.count(key) > 1)
+                self._fail(f"{shown(twice)} is given twice in one table: give it once")
+            return table
+
         try:
-            table = json.loads(content, parse_constant=refuse)
+            table = json.loads(content, parse_constant=refuse, object_pairs_hook=once)
         except RecursionError:
             self._fail("its lists are nested too deep: give a path file")
         except UnicodeDecodeError:

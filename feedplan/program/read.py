@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypedDict, cast
 
 from feedplan.arguments import callback, file_path, flag, is_text, number, positive, refuse, whole
+from feedplan.errors import InputError
 from feedplan.machine.machine import Machine
 from feedplan.program import path_file
 from feedplan.program.dxf import read_dxf
@@ -128,6 +129,10 @@ def read_program(
         program = program.with_others(reading=again)
     else:
         content_of(content, name, min(max_bytes, most))
+        given = {"tool_table": tool_table, "whole_step": whole_step, "block_delete": block_delete}
+        for option, usual in {"tool_table": None, "whole_step": 1.0, "block_delete": True}.items():
+            if given[option] != usual:
+                raise InputError(f"{name} is no G-code, which alone takes {option}: leave it out")
         program = reader(content, known, name)
     return program.with_others(sha256=hashlib.sha256(content).hexdigest(), text=text)
 

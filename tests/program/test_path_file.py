@@ -164,6 +164,7 @@ def test_what_is_wrong_names_its_place(table: Any, words: str) -> None:
         (b"{", "it is not valid JSON"),
         (b"\xff\xfe\x00", "it is no text"),
         (b"[" * 100_000, "nested too deep"),
+        (b'{"curves": [], "unit": "mm", "curves": []}', "'curves' is given twice in one table: give it once"),
         (
             b'{"curves": [{"degree": 1, "control_points": [[0, 0], [NaN, 1]]}]}',
             "the number NaN is not finite",

@@ -1,10 +1,11 @@
 """Programs from files: what is no program is one sentence."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from feedplan.errors import ProgramError
+from feedplan.errors import InputError, ProgramError
 from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 from feedplan.program.read import read_program
@@ -39,6 +40,16 @@ def test_an_empty_file_is_an_error(tmp_path: Path) -> None:
     path.touch()
     with pytest.raises(ProgramError, match=r"part\.ngc is empty: give a part program$"):
         read_program(path)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("tool_table", "tools.tbl"), ("whole_step", 0.001), ("block_delete", False)]
+)
+def test_what_only_gcode_takes_is_refused_for_a_path_file(option: str, value: Any) -> None:
+    path = b'{"feed": 9, "curves": [{"degree": 1, "control_points": [[0, 0], [5, 0]]}]}'
+    sentence = rf"^part\.json is no G-code, which alone takes {option}: leave it out$"
+    with pytest.raises(InputError, match=sentence):
+        read_program(path, name="part.json", **{option: value})
 
 
 def test_a_binary_file_is_an_error(tmp_path: Path) -> None:
