@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.named import EXAMPLES
 from feedplan.cli import main
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
 from feedplan.outputs import KNOTS, format_named
@@ -163,6 +164,9 @@ def test_a_defect_is_named_as_one_and_the_traceback_is_there_for_the_asking(
         main(["plan", "a.ngc"])
 
 
+EXAMPLE = str(EXAMPLES / "part.ngc")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -179,6 +183,15 @@ def test_a_defect_is_named_as_one_and_the_traceback_is_there_for_the_asking(
         (["plan", "a", "-o", __file__], "test_cli.py is a file, not a folder"),
         (["machines", "show", "toaster"], "there is no bundled machine 'toaster'"),
         (["plna"], "No such command 'plna'"),
+        (
+            ["plan", EXAMPLE, "--accuracy", "0.1"],
+            "takes no accuracy: leave it out, or choose a method that takes it (casadi, clarabel, jerk-lim",
+        ),
+        (["plan", EXAMPLE, "--time-limit", "1"], "bang-bang takes no --time-limit: leave it out, or choose"),
+        (["plan", EXAMPLE, "--max-setpoints", "9"], "or ask for so many by --max-setpoints"),
+        (["plan", EXAMPLE, "--path-rounds", "2"], "--path-rounds is 2: give it with the path fastest"),
+        (["fit", EXAMPLE, "--whole-step", "-1"], "--whole-step is -1: give a positive number"),
+        (["plan", "/none/path_rounds.nc"], "error: /none/path_rounds.nc cannot be read"),
     ],
 )
 def test_bad_usage_is_one_sentence_and_exits_2(arguments: list[str], words: str, capsys: Any) -> None:

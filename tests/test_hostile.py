@@ -283,7 +283,7 @@ def test_more_setpoints_than_asked_for(tmp_path: Path) -> None:
     code, error = _alone("plan", str(program))
     assert code == cli.BAD_INPUT, error
     _is_a_sentence(error)
-    assert "max_setpoints" in error
+    assert "--max-setpoints" in error
 
 
 def _is_a_sentence(error: str) -> None:

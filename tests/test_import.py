@@ -137,7 +137,7 @@ def test_help_tells_the_options_of_every_method_with_their_defaults() -> None:
         (
             "clarabel",
             {"scheme": 3},
-            r"clarabel takes no scheme: give accuracy, cells, time_limit, tolerance,",
+            r"clarabel takes no scheme: leave it out, or choose a method that takes it \(toppra\)$",
         ),
         ("jerk-limited", {"reserve": len}, r"jerk-limited takes no reserve: give accuracy, time_limit, tol"),
         ("bang-bang", {"tollerance": None}, r"bang-bang takes no tollerance: give tolerance, "),

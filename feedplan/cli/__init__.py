@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -74,12 +75,26 @@ def _explained(error: Exception) -> tuple[str, int]:
     if isinstance(error, (InfeasibleError, SolverError)):
         return str(error), BROKEN
     if isinstance(error, FeedplanError):
-        return str(error), BAD_INPUT
+        return _by_option(str(error)), BAD_INPUT
     if isinstance(error, MemoryError):
         return "the memory of this computer does not suffice: split the program", BAD_INPUT
     what = f"this is a defect in feedplan ({type(error).__name__}: {error})"
     remedy = f"please report it with the command and the program; {_TRACEBACK}=1 shows where it happened"
     return f"{what}: {remedy}", DEFECT
+
+
+def _by_option(sentence: str) -> str:
+    """The sentence with `--feed-step` for the argument `feed_step` of Python, and so on."""
+    options = (
+        option.name
+        for command in _PLANNING
+        for option in command.params
+        if option.name and "_" in option.name and f"--{option.name.replace('_', '-')}" in option.opts
+    )
+    names = "|".join(dict.fromkeys(options))
+    # Not within the name of a file.
+    alone = rf"(?<![\w./-])({names})(?![\w/-]|\.\w)"
+    return re.sub(alone, lambda found: f"--{found[0].replace('_', '-')}", sentence)
 
 
 def _usage(error: click.ClickException) -> str:
@@ -101,5 +116,6 @@ def cli(context: click.Context) -> int:
     return DONE
 
 
-for command in (plan, compare, fit, check, batch, time, machines, filter_, serve):
+_PLANNING = (plan, compare, fit, check, batch, time, filter_)
+for command in (*_PLANNING, machines, serve):
     cli.add_command(command)

@@ -69,7 +69,8 @@ def planner(method: str, **options: Any) -> Callable[[Problem], SpeedProfile]:
 def given_options(method: str, options: Mapping[str, Any], others: Iterable[str] = ()) -> dict[str, Any]:
     """Those options of a method that are not None; one that only other methods take may be None.
 
-    Raises as `planner`; `others` may be given as well.
+    Raises as `planner`, naming the methods that take the option if there are any; `others` may be given as
+    well.
     """
     known = options_of(method)
     for name, value in options.items():
@@ -77,6 +78,8 @@ def given_options(method: str, options: Mapping[str, Any], others: Iterable[str]
             continue
         some = ", ".join((*known, *others))
         remedy = f"give {some}, or leave it out" if some else "leave it out"
+        if takers := [other for other in methods() if name in options_of(other)]:
+            remedy = f"leave it out, or choose a method that takes it ({', '.join(takers)})"
         raise InputError(f"the method {method} takes no {name}: {remedy}")
     return {name: value for name, value in options.items() if value is not None}
 

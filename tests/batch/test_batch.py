@@ -162,7 +162,10 @@ def test_one_batch_at_a_time_works_on_a_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (("--method", "bang-bang", "--accuracy", "0.1"), "the method bang-bang takes no accuracy: give "),
+        (
+            ("--method", "bang-bang", "--accuracy", "0.1"),
+            "the method bang-bang takes no accuracy: leave it ",
+        ),
         (
             ("--format", "npz", "--format", "npz-compressed"),
             "npz and npz-compressed are both setpoints.npz: ask for one of them",

@@ -172,7 +172,7 @@ def test_options_that_belong_together_are_asked_for(part: Path, capsys: Any) -> 
     assert main(["plan", str(part), "--feed-step", "10"]) == 2
     assert "give --program-out FILE as well" in capsys.readouterr().err
     assert main(["plan", str(part), "--program-out", "x", "--feed-step", "-1"]) == 2
-    assert "feed_step is -1 mm/s" in capsys.readouterr().err
+    assert "--feed-step is -1 mm/s" in capsys.readouterr().err
 
 
 def test_only_a_planned_program_is_written_beside_a_plan(tmp_path: Path) -> None:

@@ -164,7 +164,7 @@ def test_an_error_in_a_program_has_file_and_line(server: Server) -> None:
             "input",
             f"method: input should be {', '.join(map(repr, feedplan.methods()[:-1]))} or 'toppra': ",
         ),
-        ({"options": '{"accuracy": 0.1}'}, "input", "the method bang-bang takes no accuracy: give "),
+        ({"options": '{"accuracy": 0.1}'}, "input", "the method bang-bang takes no accuracy: leave it out"),
         ({"options": '{"tolerance": -1}'}, "input", "options.tolerance: input should be greater than 0: "),
         ({"options": '{"tolerance": NaN}'}, "input", "options.tolerance: input should be a finite number: "),
         ({"options": '{"tolerance": "1"}'}, "input", "options.tolerance: input should be a valid number: "),
