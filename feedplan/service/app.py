@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 
-from fastapi import APIRouter, FastAPI, Header, Query
+from fastapi import APIRouter, Depends, FastAPI, Header, Query
 from fastapi.responses import (
     FileResponse,
     HTMLResponse,
@@ -29,7 +29,7 @@ from feedplan.plan_folder import DRAWING_FILE, SUMMARY_FILE
 from feedplan.report.page import FILE as REPORT_FILE
 from feedplan.service import answers, events, exports, front, openapi, page, problems, uploads, views
 from feedplan.service.limits import Limits
-from feedplan.service.refusals import UNKNOWN, Refusal
+from feedplan.service.refusals import INPUT, UNKNOWN, Refusal
 from feedplan.service.requests import MachineRequest, machine_of, order_of
 from feedplan.service.runner import Runner
 from feedplan.service.store import ENDED, Store
@@ -53,6 +53,17 @@ Key = Annotated[
     ),
 ]
 Time = Annotated[float | None, Query(allow_inf_nan=False)]
+
+
+def _known_query(request: Request) -> None:
+    """Raises Refusal for a parameter in the address that it does not take."""
+    known = [own.alias for own in request.scope["route"].dependant.query_params]
+    for name in request.query_params:
+        if name not in known:
+            raise Refusal(INPUT, f"query.{name[:60]}: there is no such parameter: give {', '.join(known)}")
+
+
+QUERY = Depends(_known_query)
 
 
 class Service:
@@ -144,6 +155,7 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         "/v1/jobs",
         response_model=answers.Jobs,
         summary="List jobs, the newest first",
+        dependencies=[QUERY],
         responses=openapi.problems(422),
     )
     def listed(
@@ -231,6 +243,7 @@ def _add_results(app: FastAPI, service: Service) -> None:
     @router.get(
         "/v1/jobs/{job}/setpoints",
         summary="Setpoints, by time and axis",
+        dependencies=[QUERY],
         response_class=FileResponse,
         responses={
             200: openapi.contents({exports.media_type(name) for name in exports.formats()}),
@@ -297,6 +310,7 @@ def _add_results(app: FastAPI, service: Service) -> None:
         "/v1/compare",
         response_model=answers.Comparison,
         summary="Compare jobs in one table",
+        dependencies=[QUERY],
         responses=openapi.problems(404, 422),
     )
     def compare(

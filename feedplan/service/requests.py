@@ -225,6 +225,8 @@ def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
 
 def sentence_of(error: Any) -> str:
     """An error of pydantic as one sentence."""
-    member = ".".join(str(part)[:60] for part in error["loc"]) or "the request"
+    # A program is a text or an object: pydantic adds which of them it tried.
+    parts = [str(part)[:60] for part in error["loc"] if part != "str" and "[" not in str(part)]
+    member = ".".join(parts) or "the request"
     said = str(error["msg"])[:220]
     return f"{member}: {said[:1].lower()}{said[1:]}: correct it as the documentation at /docs tells"

@@ -193,6 +193,8 @@ def test_other_bodies_are_refused(server: Server) -> None:
     assert sent("application/json", b'{"program": "\\ud800"}') == 422
     assert sent("application/json", b"[" * 100_000) == 422
     assert sent("application/json", b'{"program": {"curves": ' + b"1" * 5000 + b"}}") == 422
+    number = server.send("POST", "/v1/jobs", b'{"program": 5}', {"Content-Type": "application/json"})
+    assert number.detail.startswith("program: input should be a valid string: ")
     assert sent("multipart/form-data", PART) == 400
     headers = {"Content-Type": "multipart/form-data"}
     said = server.send("POST", "/v1/jobs", PART, headers).detail
@@ -243,6 +245,7 @@ def test_setpoints_by_time_and_axis_in_every_format(server: Server, tmp_path: Pa
         ({"from": 0.5, "to": 0.2}, "there are no setpoints from 0.5 to 0.2 s: give times within 0 to "),
         ({"from": "nan"}, "query.from: input should be a finite number"),
         ({"format": "xls"}, "query.format: input should be "),
+        ({"form": "csv"}, "query.form: there is no such parameter: give from, to, axes, format"),
         ({"format": "pvt"}, "pvt has no rows at servo periods: give one of csv, "),
     ):
         answer = server.get(done["links"]["setpoints"], **query)
