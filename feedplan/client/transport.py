@@ -11,6 +11,7 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from http import HTTPStatus
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode, urlsplit
@@ -145,6 +146,10 @@ def _error(response: HTTPResponse) -> FeedplanError:
         return InputError(
             f"the address answers with the status {response.status} and no word of feedplan: "
             "is a feedplan service there?"
+        )
+    if response.status == HTTPStatus.UNAUTHORIZED:
+        detail = (
+            "the token is missing or wrong: give the service's by --token-file, or Client(address, token)"
         )
     return error_of(kind, detail, line)
 

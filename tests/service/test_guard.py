@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from feedplan import Client, InputError
 from feedplan.cli import main
 from feedplan.service.guard import Guard
 from feedplan.service.limits import Limits
@@ -120,6 +121,10 @@ def test_the_service_accepts_any_axes_too(tmp_path: Path) -> None:
         ):
             assert server.send("GET", address, headers={"Authorization": ""}).status == status
         assert server.get("/v1/jobs").status == 200
+        with pytest.raises(
+            InputError, match=r"^the token is missing or wrong: give the service's by --token-"
+        ):
+            Client(server.url).plan("G1 X1 F9\n", "mill")
         assert server.send("GET", "/v1/jobs", headers={"Host": "evil.example"}).status == 403
         assert server.send("GET", "/v1/jobs", headers={"Origin": "http://evil.example"}).status == 403
         answer = server.send("OPTIONS", "/v1/jobs", headers={"Access-Control-Request-Method": "POST"})
