@@ -28,10 +28,16 @@ Rule = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 STEP, CUTS = 0.1, 20
 
 # Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
-# limits between two places differ from theirs by the order of STEP²/16 of themselves.
+# limits of acceleration and chord error between two places differ from theirs by the order of STEP²/16 of
+# themselves. Those of the velocity are followed between the places (`_between`).
 PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 # Those of Boole's rule, for a mean over a part.
 WEIGHTS = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0
+
+# Values at finer places of the polynomial through the values at PLACES, and the least share by which a speed
+# is lowered for what happens between the places: rounding of the polynomial on a circle is less.
+FINER = np.vander(np.linspace(0.0, 1.0, 17), 5) @ np.linalg.inv(np.vander(PLACES, 5))
+LOWERED = 2e-7
 
 # Places at which the turn of a whole piece is measured.
 SURVEY = np.linspace(0.0, 1.0, 9)
@@ -166,7 +172,7 @@ def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float)
         speed = np.minimum(speed, np.sqrt(across * radius))
     speed = np.minimum(speed, _chord_speed(problem, radius))
     shape = (-1, len(PLACES))
-    speed = _least(speed.reshape(shape))
+    speed = _between(problem, tangent.reshape(*shape, tangent.shape[1]), _least(speed.reshape(shape)))
     if problem.feed_share is not None:
         # Between the places the axes that the feed counts along may have more of the speed.
         speed = np.minimum(speed, feed_between(problem, piece, u0, u1))
@@ -260,6 +266,27 @@ def _chord_speed(problem: Problem, radius: Floats) -> Floats:
         return np.full(len(radius), np.inf)
     radius = np.maximum(radius, tolerance)
     return np.asarray(2.0 / problem.period * np.sqrt(2.0 * radius * tolerance - tolerance**2))
+
+
+def _between(problem: Problem, tangent: Floats, speed: Floats) -> Floats:
+    """The speeds (m,) of parts, lower where a velocity of an axis is greatest between the places.
+
+    `tangent` (m, places, axes) has the directions at the places. The greatest part of a direction along an
+    axis is that of parabolas through three finer places.
+    """
+    limits = problem.limits("velocity")
+    with np.errstate(divide="ignore"):
+        at_places = 1.0 / np.maximum(tangent / limits[0], -tangent / limits[1]).max(axis=(1, 2))
+    near = np.flatnonzero(at_places <= speed * (1.0 + STEP**2))
+    fine = FINER @ tangent[near]
+    bend, rise = np.diff(fine, 2, axis=1), fine[:, 2:] - fine[:, :-2]
+    peak = fine[:, 1:-1].copy()
+    np.subtract(peak, _over(rise**2, 8.0 * bend), out=peak, where=np.abs(rise) < 2.0 * np.abs(bend))
+    use = np.maximum(peak / limits[0], -peak / limits[1]).max(axis=(1, 2))
+    within = _over(np.ones(len(use)), use)
+    lower = speed.copy()
+    lower[near] = np.where(within < speed[near] * (1.0 - LOWERED), within, speed[near])
+    return lower
 
 
 def _over(top: Floats, bottom: Floats, otherwise: float = np.inf) -> Floats:

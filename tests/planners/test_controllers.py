@@ -232,6 +232,20 @@ def test_a_curve_that_slows_beside_a_place_of_its_survey_keeps_all_limits(method
     assert found.ok, found.failures
 
 
+@pytest.mark.parametrize("method", [CVT, ARCS, "linuxcnc"])
+def test_an_axis_keeps_its_velocity_between_the_places_of_a_curve(method: str) -> None:
+    limits = zip("XYZ", (300.0, 200.0, 100.0), (2000.0, 3000.0, 1000.0), strict=True)
+    machine = Machine("uneven", [Axis(*own) for own in limits], period=T)
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        points, weights = 60.0 * random.normal(size=(9, 3)), random.uniform(0.5, 2.0, 9)
+        knots = [0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 6, 6, 6]
+        made = plan(Path.from_nurbs(points, knots, 3, weights), machine, method)
+        checks = [check for check in made.audit().checks if check.name == "velocity"]
+        assert all(check.ok for check in checks), checks
+        assert max(check.ratio for check in checks) > 0.9999
+
+
 def test_lines_are_told_from_curves_and_from_uneven_parametrisations() -> None:
     straight = [[0.0, 0.0], [1.0, 2.0]]
     pieces = [
