@@ -56,6 +56,10 @@ _LACKS: dict[DialectName, tuple[tuple[bytes, str], ...]] = {
         (_g(r"61\.1|38\.\d|33\.1|43\.1|59\.\d|17\.1|18\.1|19\.1"), "these codes"),
         (_m(r"6[2-8]|7\d"), "digital outputs and saved modes by these M codes"),
         (rb"[@^]", "polar words by @ and ^"),
+        (
+            rb"[Gg][ \t]*0*(?:4|8[2689])(?![\d.])[^\r\n]*[Pp][ \t]*[.\d]",
+            "seconds of a dwell by P, which it takes as milliseconds",
+        ),
         (rb"[a-z]", "lower-case words"),
         (
             rb"[XYZABCUVWIJKR][ \t]*[-+]?\d+(?![\d.])",
@@ -66,6 +70,14 @@ _LACKS: dict[DialectName, tuple[tuple[bytes, str], ...]] = {
 # The most characters of a line, without blanks and comments where these are not stored.
 _LONGEST: dict[DialectName, int] = {"linuxcnc": 255, "grbl": 70, "fanuc": 250}
 _NAMES_OF: dict[DialectName, str] = {"linuxcnc": "LinuxCNC", "grbl": "grbl", "fanuc": "Fanuc"}
+# Words whose effect is in the coordinates of a program that was written anew, and what the effect is.
+_IN_COORDINATES = (
+    (_g(r"43|43\.1|43\.2"), "tool lengths that are known, 0 for others (a tool table gives them)"),
+    (
+        _g(r"5[5-9]|59\.[1-3]|54\.1|154|10|52|92"),
+        "work offsets that are known, 0 for others (the machine file gives them)",
+    ),
+)
 _COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*")
 
 
@@ -76,8 +88,7 @@ def writes_points(dialect: DialectName) -> bool:
 
 def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
     """Sentences on the words of a program that the control lacks, each with its first line."""
-    # Comments become blanks, so that places stay.
-    code = _COMMENT.sub(lambda found: b" " * len(found[0]), content)
+    code = _without_comments(content)
     sentences = []
     for pattern, what in _LACKS[dialect]:
         first = re.search(pattern, code)
@@ -91,6 +102,24 @@ def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
         line = _line_of(content, content.index(b";"))
         sentences.append(f"line {line}: Fanuc ends a block at ;: write comments in ( )")
     return tuple(sentences)
+
+
+def in_coordinates(content: bytes) -> tuple[str, ...]:
+    """Sentences on the words of a program that it has not any more when it is written anew, each with its
+    first line."""
+    code = _without_comments(content)
+    found = ((re.search(pattern, code), what) for pattern, what in _IN_COORDINATES)
+    return tuple(
+        f"line {_line_of(code, first.start())}: {first[0].decode('ascii', 'replace')} is left out: the "
+        f"coordinates have the {what}"
+        for first, what in found
+        if first is not None
+    )
+
+
+def _without_comments(content: bytes) -> bytes:
+    """The code with blanks for comments, so that places stay."""
+    return _COMMENT.sub(lambda found: b" " * len(found[0]), content)
 
 
 def _long_lines(dialect: DialectName, code: bytes) -> list[str]:

@@ -63,10 +63,10 @@ def expanded(program: Program, machine: Machine | None, dialect: DialectName) ->
     ends = program.target - zero
     arcs = {int(m): row for row, m in enumerate(program.arc_move)}
     splines = {int(m): row for row, m in enumerate(program.spline_move)}
-    events = _events(program.events)
+    events = _events(program.events, dialect)
     of: list[int] = []
     if program.start_dwell and 0 not in events:
-        out.add(b"G4 P" + place_text(program.start_dwell))
+        out.add(_dwell(program.start_dwell, dialect))
     for m in range(len(program)):
         out.lines += events.pop(m, [])
         out.add(out.changed("control", _control(program, m)))
@@ -89,7 +89,7 @@ def expanded(program: Program, machine: Machine | None, dialect: DialectName) ->
             of.append(m)
         if program.stop[m] and m + 1 < len(program) and m + 1 not in events:
             # A stop without a word of its own, for example at a change of the tool length.
-            out.add(b"G4 P" + place_text(float(program.dwell[m])))
+            out.add(_dwell(float(program.dwell[m]), dialect))
     for lines in events.values():
         out.lines += lines
     if not out.lines[-1].startswith((b"M2", b"M30")):
@@ -190,7 +190,12 @@ def _g62(
     out.changed("motion", b"G6.2")
 
 
-def _events(events: Events) -> dict[int, list[bytes]]:
+def _dwell(seconds: float, dialect: DialectName) -> bytes:
+    """G4 in seconds, which are P; for Fanuc X, since its P is in milliseconds."""
+    return (b"G4 X" if dialect == "fanuc" else b"G4 P") + place_text(seconds)
+
+
+def _events(events: Events, dialect: DialectName) -> dict[int, list[bytes]]:
     """The blocks before each move, by its number."""
     before: dict[int, list[bytes]] = {}
     words = events.words()
@@ -200,6 +205,8 @@ def _events(events: Events) -> dict[int, list[bytes]]:
             text = b"(MSG," + _plain(events.texts[int(number)]) + b")"
         elif letter == COMMENT:
             text = b"(" + _unbracketed(events.texts[int(number)]).encode() + b")"
+        elif letter == "G" and number == 4.0:
+            text = _dwell(float(events.p[row]), dialect)
         elif letter == "M" and number == 6.0:
             text = b"M6"
         elif letter == "M" and number in (67.0, 68.0):

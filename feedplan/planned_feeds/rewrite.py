@@ -16,7 +16,7 @@ from feedplan.arguments import file_path, flag, number, one_of, positive, refuse
 from feedplan.arrays import Floats, Integers
 from feedplan.errors import InputError
 from feedplan.planned_feeds.blocks import Blocks, Exclusion, blocks_of
-from feedplan.planned_feeds.dialects import DIALECTS, DialectName, lacks, writes_points
+from feedplan.planned_feeds.dialects import DIALECTS, DialectName, in_coordinates, lacks, writes_points
 from feedplan.planned_feeds.expand import expanded
 from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, exclusions_of, line_speeds, planned_feeds
 from feedplan.planned_feeds.inverse_time import inverse_feeds, require_no_splines
@@ -41,7 +41,7 @@ class PlannedProgram:
 
     `content` is its text; `lines` how many lines the program has; `changes` those with another F; `split` how
     many became several; `left` (line, reason) those whose F could not be changed; `notes` what the control of
-    the `dialect` lacks; `time` [s] the plan's.
+    the `dialect` lacks, and what a program written anew leaves out; `time` [s] the plan's.
     """
 
     name: str
@@ -151,7 +151,10 @@ def planned_program(
     if not isinstance(program, Program):
         raise refuse("the plan", plan, "the plan of a program, as feedplan.plan returns it")
     along = speeds_along(plan.problem, plan.profile, program)
+    left_out: tuple[str, ...] = ()
     if expand:
+        if program.reading is not None:
+            left_out = in_coordinates(_text_of(program))
         content, program, along, source_lines = _expanded(program, along, dialect)
     else:
         content, source_lines = _text_of(program), program.line
@@ -187,7 +190,7 @@ def planned_program(
         changes=feeds.changes,
         split=len(parts),
         left=tuple((line + 1, why) for line, why in sorted(feeds.left.items())),
-        notes=lacks(dialect, result),
+        notes=(*left_out, *lacks(dialect, result)),
         dialect=dialect,
         time=plan.time,
     )

@@ -62,6 +62,31 @@ def test_splines_are_written_as_nurbs(dialect: str) -> None:
         assert np.ptp(ratio) < 1e-9
 
 
+@pytest.mark.parametrize(("dialect", "word"), [("linuxcnc", "P"), ("grbl", "P"), ("fanuc", "X")])
+def test_a_dwell_written_anew_is_in_seconds(dialect: str, word: str) -> None:
+    plan = planned("G21\nG1 X5 F600\nG4 P0.123456789\nG1 X9\nM2\n")
+    result = feedplan.planned_program(plan, expand=True, dialect=dialect)  # type: ignore[arg-type]
+    assert f"G4 {word}0.123456789\n" in result.content.decode()
+    assert feedplan.read_program(result.content, "mill").dwell.max() == 0.123456789
+
+
+def test_fanuc_takes_a_dwell_by_p_in_milliseconds() -> None:
+    told = lacks("fanuc", b"G4 X0.5\nG04 P0.5\nG82 X1. Z1. R1. P2.\nG40 P1\n")
+    sentence = "seconds of a dwell by P, which it takes as milliseconds (G04 P0, 2 in all)"
+    assert told == (f"line 2: Fanuc lacks {sentence}",)
+
+
+def test_what_the_coordinates_of_a_program_written_anew_have_is_told() -> None:
+    plan = planned("G21 (G43)\nG54 G1 X5 F600\nG43 H1 Z5\nG55 X9\nM2\n")
+    lengths, offsets = feedplan.planned_program(plan, expand=True).notes
+    assert lengths == (
+        "line 3: G43 is left out: the coordinates have the tool lengths that are known, 0 for others (a tool "
+        "table gives them)"
+    )
+    assert offsets.startswith("line 4: G55 is left out: the coordinates have the work offsets that are known")
+    assert feedplan.planned_program(plan).notes == ()
+
+
 def test_grbl_has_no_splines() -> None:
     with pytest.raises(InputError, match="line 3: grbl has no splines: take another dialect"):
         feedplan.planned_program(planned(NURBS), expand=True, dialect="grbl")
