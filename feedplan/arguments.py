@@ -52,6 +52,11 @@ def is_text(value: object) -> bool:
     return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
+def printable(text: str) -> str:
+    """The text with a replacement character for each byte of a file's name that is not UTF-8."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
 def is_whole(value: object, least: int = 1, most: float = math.inf) -> bool:
     """Whether a value is a whole number, of any type, from `least` to `most`."""
     return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most

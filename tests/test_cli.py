@@ -16,6 +16,7 @@ import pytest
 from benchmarks.named import EXAMPLES
 from feedplan.cli import main
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
+from feedplan.machine.machine import Machine
 from feedplan.outputs import KNOTS, format_named
 from tests.outputs.parquet import FORMATS
 from tests.sentences import assert_one_sentence
@@ -270,6 +271,28 @@ def test_fit_prints_splines_and_deviation(program: Path, capsys: Any) -> None:
     assert "4 pieces in 4 runs" in capsys.readouterr().out
     assert main(["fit", str(program), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["pieces"] == 4
+
+
+@pytest.mark.parametrize("command", ["plan", "compare", "time", "fit", "batch"])
+def test_names_of_files_may_be_bytes_that_are_no_utf_8(
+    command: str, program: Path, tmp_path: Path, capsys: Any
+) -> None:
+    odd = tmp_path / os.fsdecode(b"Geh\xe4use.nc")
+    try:
+        program.rename(odd)
+    except OSError:
+        pytest.skip("the file system has names in UTF-8 only")
+    machine, out = tmp_path / os.fsdecode(b"Fr\xe4se.TOML"), tmp_path / "out"
+    machine.write_text(Machine.load("mill").to_toml())
+    options = {
+        "compare": ["--methods", "bang-bang", "-o", str(out)],
+        "plan": ["-o", str(out)],
+        "batch": ["-o", str(out)],
+    }
+    assert main([command, str(odd), "-m", str(machine), "--json", *options.get(command, [])]) == 0
+    said = capsys.readouterr()
+    assert command == "fit" or "Geh\ufffduse.nc" in json.dumps(json.loads(said.out), ensure_ascii=False)
+    assert main([command, str(odd), "-m", str(machine), *options.get(command, [])]) == 0
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan import __version__
+from feedplan.arguments import printable
 from feedplan.batch.names import Names, safe_name
 from feedplan.errors import InputError
 from feedplan.jobs.order import Job, Order
@@ -66,11 +67,11 @@ class Sweep:
             options = {key: value for key, value in self.options.items() if self._takes(method, key)}
             if tolerance is not None:
                 options["tolerance"] = tolerance
-            order = Order(program.name, text, method, options, self.reading, self.formats)
+            order = Order(printable(program.name), text, method, options, self.reading, self.formats)
             job = Job(
                 order, program, folder / name, self.tool_table, (program.absolute().parent, *self.subprograms)
             )
-            yield Item(str(program), machine, tolerance, method, job)
+            yield Item(printable(str(program)), machine, tolerance, method, job)
 
     @staticmethod
     def _takes(method: str, name: str) -> bool:

@@ -149,7 +149,7 @@ def batch(
     for name in folders:
         readable_folder(FilePath(name))
     sweep = Sweep(
-        [FilePath(program) for program in programs],
+        list(dict.fromkeys(map(FilePath, programs))),
         [machine_text(name) for name in dict.fromkeys(machines)],
         tuple(dict.fromkeys(tolerances)) or (None,),
         tuple(dict.fromkeys(methods)),

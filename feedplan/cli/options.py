@@ -12,6 +12,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import click
 
 from feedplan import planners
+from feedplan.arguments import printable
 from feedplan.faster_path import MAX_ROUNDS
 from feedplan.geometry.corners import PATHS
 from feedplan.setpoints import MAX_SETPOINTS
@@ -161,7 +162,7 @@ def require_one_or_formats(formats: Sequence[str]) -> None:
 
 
 def name_of(program: str | IO[bytes]) -> str:
-    return program if isinstance(program, str) else program.name
+    return printable(program) if isinstance(program, str) else program.name
 
 
 def given_only(**options: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from feedplan.arguments import shown
+from feedplan.arguments import printable, shown
 from feedplan.errors import MachineError, unreadable
 from feedplan.lazy import cached_property
 from feedplan.machine.axis import Axis, size_of, sizes_of
@@ -146,7 +146,7 @@ class Machine:
         require(isinstance(source, (str, os.PathLike)), "the machine", source, remedy)
         text = os.fspath(source)
         require(isinstance(text, str), "the machine", source, remedy)
-        if text.endswith(".toml") or "/" in text or "\\" in text:
+        if text.lower().endswith(".toml") or "/" in text or "\\" in text:
             path = FilePath(text)
             try:
                 with path.open(encoding="utf-8") as file:
@@ -154,7 +154,7 @@ class Machine:
             except (OSError, ValueError) as error:
                 remedy = "the path of a .toml file in UTF-8"
                 raise MachineError(unreadable(f"machine file {text}", error, remedy)) from None
-            return cls.from_toml(content, text)
+            return cls.from_toml(content, printable(text))
         return cls.from_toml(bundled_text(text), text)
 
     @classmethod

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from feedplan.arguments import file_path, shown
+from feedplan.arguments import file_path, printable, shown
 from feedplan.errors import InputError, ProgramError, unreadable
 
 Source = str | bytes | os.PathLike[str] | IO[str] | IO[bytes]
@@ -56,7 +56,7 @@ def content_of(source: Source, name: str | None = None, max_bytes: int = MAX_BYT
         file = file_path(source, "the program", _REMEDY)
     except InputError as error:
         raise ProgramError(str(error)) from None
-    return Content(_of_file(file, max_bytes), name or file.name, file.absolute())
+    return Content(_of_file(file, max_bytes), name or printable(file.name), file.absolute())
 
 
 def _of_file(path: Path, max_bytes: int) -> bytes:

@@ -226,6 +226,12 @@ def test_hostile_and_equal_names_have_folders_of_their_own(tmp_path: Path) -> No
     assert len({row["time"] for row in rows(tmp_path / "out")}) == 3
 
 
+def test_a_program_that_is_given_twice_is_planned_once(tmp_path: Path) -> None:
+    [program] = write(tmp_path, 1)
+    done = run(program, tmp_path / "." / program.name, program, "-o", tmp_path / "out", "--format", "none")
+    assert (done.code, [row["folder"] for row in rows(tmp_path / "out")]) == (0, ["part0"])
+
+
 def test_small_jobs_are_packed_and_large_ones_are_not() -> None:
     packing = Packing()
     assert packing.count(1000, 2) == 1
