@@ -242,7 +242,9 @@ def _expanded(
     """
     machine = (program.reading or {}).get("machine")
     content, of = expanded(program, machine, dialect)
-    again = read_program(content, machine, name=program.name)
+    # Its text is G-code, whatever the name of a drawing or a path file ends with.
+    name = program.name if program.reading is not None else f"{program.name}.ngc"
+    again = read_program(content, machine, name=name)
     again = again.with_others(reading={"machine": machine})
     if len(again) != len(of):
         raise InputError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,15 @@ def test_what_the_coordinates_of_a_program_written_anew_have_is_told() -> None:
     )
     assert offsets.startswith("line 4: G55 is left out: the coordinates have the work offsets that are known")
     assert feedplan.planned_program(plan).notes == ()
+
+
+def test_a_path_file_is_written_as_gcode(tmp_path: Path) -> None:
+    file, out = tmp_path / "curve.json", tmp_path / "curve.ngc"
+    curves = '[{"degree": 2, "control_points": [[0, 0], [10, 0], [10, 10]], "weights": [1, 0.7, 1]}]'
+    file.write_text(f'{{"feed": 80, "curves": {curves}}}')
+    made = feedplan.plan(file, "mill")
+    feedplan.write_program(made, out, expand=True)
+    assert feedplan.plan(out, "mill").time == pytest.approx(made.time, rel=1e-6)
 
 
 def test_grbl_has_no_splines() -> None:
