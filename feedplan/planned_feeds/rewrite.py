@@ -246,6 +246,13 @@ def _expanded(
     name = program.name if program.reading is not None else f"{program.name}.ngc"
     again = read_program(content, machine, name=name)
     again = again.with_others(reading={"machine": machine})
+    begin = dict(zip(program.axes, program.start.tolist(), strict=True))
+    if any(abs(begin.get(axis, 0.0) - at) > SAME for axis, at in zip(again.axes, again.start, strict=True)):
+        place = " ".join(f"{axis}{value:.6g}" for axis, value in begin.items())
+        raise InputError(
+            f"{program.name} begins at {place}, and G-code where the tool is: let it begin at 0, or leave "
+            "out --expand"
+        )
     if len(again) != len(of):
         raise InputError(
             f"{program.name} is not the same when its moves are written anew ({len(again)} moves, "

@@ -29,7 +29,7 @@ import numpy as np
 from feedplan.arrays import Floats
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, MissingPackageError, ProgramError
-from feedplan.program.moves import NO_FEED, TOUCHING, Moves
+from feedplan.program.moves import TOUCHING, Moves
 from feedplan.program.program import Program
 
 Point = Floats
@@ -54,7 +54,7 @@ class _Line:
         return _Line(self.end, self.start)
 
     def add(self, moves: Moves, line: int) -> None:
-        moves.line(self.end, NO_FEED, line)
+        moves.line(self.end, None, line)
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class _Arc:
         return _Arc(self.end, self.start, self.centre, -self.angle)
 
     def add(self, moves: Moves, line: int) -> None:
-        moves.arc(self.end, self.centre, self.angle, NO_FEED, line)
+        moves.arc(self.end, self.centre, self.angle, None, line)
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class _Curve:
         return _Curve(self.curve.reversed())
 
     def add(self, moves: Moves, line: int) -> None:
-        moves.spline(self.curve, NO_FEED, line)
+        moves.spline(self.curve, None, line)
 
 
 _Segment = _Line | _Arc | _Curve
@@ -110,11 +110,11 @@ class _UnsupportedError(Exception):
     """Why an entity is left out."""
 
 
-def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
+def read_dxf(content: bytes, name: str = "drawing.dxf", feed: float | None = None) -> Program:
     """The moves of a drawing; `line` is the number of the entity in its model space, from 1.
 
-    Feeds are `NO_FEED`: the plan's `feed` sets one. Raises ProgramError in one sentence, MissingPackageError
-    without ezdxf.
+    All moves have the `feed` [mm/s]; without one, only the machine limits them. Raises ProgramError in one
+    sentence, MissingPackageError without ezdxf.
     """
     try:
         from ezdxf import recover
@@ -139,7 +139,7 @@ def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
         raise ProgramError(f"{name} has more than {MAX_ENTITIES} entities: split it")
     warnings = [] if units else [f"{name} gives no unit ($INSUNITS): millimetres are assumed"]
     skipped: Counter[str] = Counter()
-    moves = Moves(("X", "Y", "Z"))
+    moves = Moves(("X", "Y", "Z"), feed)
     for number, entity in enumerate(entities, 1):
         if _hidden(document, entity):
             skipped["on layers that are off or frozen"] += 1
@@ -156,7 +156,8 @@ def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
         raise ProgramError(f"{name} has no line, arc or curve in its model space: draw some there")
     for kind, count in sorted(skipped.items()):
         warnings.append(f"{name}: {count} {'entity' if count == 1 else 'entities'} left out: {kind}")
-    warnings.append("a drawing has no feed: only the machine limits it; give --feed to set one")
+    if feed is None:
+        warnings.append("a drawing has no feed: only the machine limits it; give --feed to set one")
     return moves.program(name, tuple(warnings))
 
 

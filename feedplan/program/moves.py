@@ -18,10 +18,14 @@ NO_FEED = 1e6
 
 
 class Moves:
-    """Moves of a program in `axes`, which are in the order XYZABCUVW and include X, Y and Z."""
+    """Moves of a program in `axes`, which are in the order XYZABCUVW and include X, Y and Z.
 
-    def __init__(self, axes: tuple[str, ...]) -> None:
+    `feed` [mm/s, deg/s] is that of moves without one, by default none.
+    """
+
+    def __init__(self, axes: tuple[str, ...], feed: float | None = None) -> None:
         self.axes = axes
+        self._feed = NO_FEED if feed is None else feed
         self._start: Floats | None = None
         self._position: Floats = np.zeros(len(axes))
         self._rows: list[tuple[MoveKind, float, int]] = []
@@ -40,17 +44,17 @@ class Moves:
         elif self.gap(point) > TOUCHING:
             self._move(MoveKind.RAPID, point, np.inf, line)
 
-    def line(self, target: Floats, feed: float, line: int) -> None:
+    def line(self, target: Floats, feed: float | None, line: int) -> None:
         """Adds a straight move, unless it has no length."""
         if self.gap(target) > 0.0:
             self._move(MoveKind.LINE, target, feed, line)
 
-    def arc(self, target: Floats, centre: ArrayLike, angle: float, feed: float, line: int) -> None:
+    def arc(self, target: Floats, centre: ArrayLike, angle: float, feed: float | None, line: int) -> None:
         """Adds an arc in XY about `centre` (3,) through `angle` [rad], positive counter-clockwise."""
         self._arcs.append((len(self._rows), np.asarray(centre, dtype=np.float64), angle))
         self._move(MoveKind.ARC, target, feed, line)
 
-    def spline(self, curve: CompositeCurve, feed: float, line: int) -> None:
+    def spline(self, curve: CompositeCurve, feed: float | None, line: int) -> None:
         """Adds a curve in all axes from where the tool is, to rounding, unless all its points coincide."""
         control = curve.control_points.copy()
         control[0] = self._position
@@ -61,8 +65,8 @@ class Moves:
         )
         self._move(MoveKind.SPLINE, control[-1], feed, line)
 
-    def _move(self, kind: MoveKind, target: Floats, feed: float, line: int) -> None:
-        self._rows.append((kind, feed, line))
+    def _move(self, kind: MoveKind, target: Floats, feed: float | None, line: int) -> None:
+        self._rows.append((kind, self._feed if feed is None else feed, line))
         self._targets.append(target)
         self._position = target
 

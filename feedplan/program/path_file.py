@@ -27,7 +27,7 @@ from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.machine.axis import AXIS_LETTERS, AXIS_NAME, ROTARY_LETTERS
 from feedplan.machine.machine import Machine
-from feedplan.program.moves import NO_FEED, TOUCHING, Moves, program_axes
+from feedplan.program.moves import TOUCHING, Moves, program_axes
 from feedplan.program.program import Program
 from feedplan.units import MM_PER_INCH
 
@@ -43,19 +43,27 @@ _ABSENT = object()
 
 
 def read_path_file(
-    content: bytes, machine: Machine | None = None, name: str = "path.json", *, max_points: int = MAX_POINTS
+    content: bytes,
+    machine: Machine | None = None,
+    name: str = "path.json",
+    feed: float | None = None,
+    *,
+    max_points: int = MAX_POINTS,
 ) -> Program:
     """The curves of a path file as spline moves; `line` is the number of the curve, from 1.
 
+    `feed` [mm/s, or the unit of the axes per second] is that of curves without one.
+
     Raises ProgramError in one sentence that names the place in the file.
     """
-    return _PathFile(name, machine, max_points).read(content)
+    return _PathFile(name, machine, feed, max_points).read(content)
 
 
 class _PathFile:
-    def __init__(self, name: str, machine: Machine | None, max_points: int) -> None:
+    def __init__(self, name: str, machine: Machine | None, feed: float | None, max_points: int) -> None:
         self.name = name
         self.machine = machine
+        self.feed = feed
         self.max_points = max_points
         self.curve: int | None = None
 
@@ -78,7 +86,7 @@ class _PathFile:
         linear = np.array([lettered and name not in ROTARY_LETTERS for name in names])
         scales, reach = np.where(linear, scale, 1.0), np.where(linear, _FARTHEST, _FARTHEST_TURN)
 
-        moves = Moves(axes)
+        moves = Moves(axes, self.feed)
         count, unlimited = 0, 0
         for i, row in enumerate(curves):
             self.curve = i + 1
@@ -97,9 +105,9 @@ class _PathFile:
             wide[:, columns] = points
             curve = self._curve(row, place, wide)
             own = self._feed(row, f"{place}.feed", feed)
-            unlimited += own is None
+            unlimited += own is None and self.feed is None
             self._join(moves, curve, rapid, place, i + 1)
-            moves.spline(curve, NO_FEED if own is None else own * scale, i + 1)
+            moves.spline(curve, None if own is None else own * scale, i + 1)
         self.curve = None
         if not len(moves):
             self._fail("curves move nothing: give curves of some length")

@@ -43,12 +43,12 @@ def checked_reading(reading: object) -> Reading:
     raise refuse("reading", reading, f"a dictionary with {', '.join(known)}")
 
 
-Reader = Callable[[bytes, Machine | None, str], Program]
+Reader = Callable[[bytes, Machine | None, str, float | None], Program]
 
 # Readers by the ending of the name, with the greatest size [bytes]; everything else is G-code.
 READERS: dict[str, tuple[Reader, int]] = {
     ".json": (read_path_file, path_file.MAX_BYTES),
-    ".dxf": (lambda content, machine, name: read_dxf(content, name), path_file.MAX_BYTES),
+    ".dxf": (lambda content, machine, name, feed: read_dxf(content, name, feed), path_file.MAX_BYTES),
 }
 _FOLDER = "the path of a folder"
 _TABLE = "the path of a tool table (.tbl)"
@@ -81,9 +81,9 @@ def read_program(
     work offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete`
     leaves out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and
     diameters of tools; `subprograms` are folders of files that the program calls, after its own; `feed`
-    [mm/s, deg/s] is that of moves before the first F; `whole_step` is the unit of lengths without a decimal
-    point, in units of the program; G-code of more than `max_moves`, loops and calls counted, is refused.
-    `progress` gets the part done.
+    [mm/s, deg/s] is that of moves before the first F, or without one; `whole_step` is the unit of lengths
+    without a decimal point, in units of the program; G-code of more than `max_moves`, loops and calls
+    counted, is refused. `progress` gets the part done.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.
@@ -95,6 +95,8 @@ def read_program(
     max_bytes = whole(max_bytes, "max_bytes", "a whole number from 1")
     max_moves = whole(max_moves, "max_moves", f"a whole number from 1 to {MAX_MOVES}", most=MAX_MOVES)
     callback(progress, "the part done")
+    if feed is not None:
+        feed = number(feed, "the feed", "a positive number", positive, "mm/s")
     content, name, text = content_of(source, name, max_bytes)
     reader, most = READERS.get(_language(content, name), (None, max_bytes))
     if reader is None:
@@ -120,7 +122,7 @@ def read_program(
             block_delete=block_delete,
             tools=None if tool_table is None else read_tools(file_path(tool_table, "the tool table", _TABLE)),
             subprograms=folders,
-            feed=None if feed is None else number(feed, "the feed", "a positive number", positive, "mm/s"),
+            feed=feed,
             whole_step=number(whole_step, "whole_step", "a positive number", positive),
             max_bytes=max_bytes,
             max_moves=max_moves,
@@ -133,7 +135,7 @@ def read_program(
         for option, usual in {"tool_table": None, "whole_step": 1.0, "block_delete": True}.items():
             if given[option] != usual:
                 raise InputError(f"{name} is no G-code, which alone takes {option}: leave it out")
-        program = reader(content, known, name)
+        program = reader(content, known, name, feed)
     return program.with_others(sha256=hashlib.sha256(content).hexdigest(), text=text)
 
 

@@ -96,6 +96,11 @@ def test_a_path_file_is_written_as_gcode(tmp_path: Path) -> None:
     made = feedplan.plan(file, "mill")
     feedplan.write_program(made, out, expand=True)
     assert feedplan.plan(out, "mill").time == pytest.approx(made.time, rel=1e-6)
+    file.write_text(file.read_text().replace("[0, 0]", "[0, 5]"))
+    with pytest.raises(
+        InputError, match=r"curve\.json begins at X0 Y5 Z0, and G-code where the tool is: let"
+    ):
+        feedplan.planned_program(feedplan.plan(file, "mill"), expand=True)
 
 
 def test_grbl_has_no_splines() -> None:

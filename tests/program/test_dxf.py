@@ -38,6 +38,12 @@ def read(draw: Callable[[Any], object], units: int = MILLIMETRES) -> Program:
     return read_dxf(drawing(draw, units), "part.dxf")
 
 
+def test_a_feed_is_that_of_all_moves_of_a_drawing() -> None:
+    content = drawing(lambda space: space.add_line((0, 0), (10, 0)), 4)
+    program = feedplan.read_program(content, name="part.dxf", feed=20.0)
+    assert (program.feed.tolist(), program.warnings) == ([20.0], ())
+
+
 def test_lines_that_touch_are_one_path_in_either_direction() -> None:
     def draw(space: Any) -> None:
         space.add_line((1, 2, 3), (10, 2, 3))

@@ -102,6 +102,12 @@ def test_curves_without_a_feed_are_warned_about() -> None:
     assert program.warnings == ("1 of 2 curves have no feed: only the machine limits them; give feed",)
 
 
+def test_a_given_feed_is_that_of_curves_without_one() -> None:
+    content = json.dumps({"curves": [LINE, AFTER]}).encode()
+    program = read_program(content, name="path.json", feed=7.0)
+    assert (program.feed.tolist(), program.warnings) == ([7, 2], ())
+
+
 @pytest.mark.parametrize(
     ("table", "words"),
     [
