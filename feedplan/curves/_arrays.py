@@ -63,8 +63,11 @@ def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> Float
     try:
         given = np.asarray(values)
         # Objects may be numbers, such as fractions. NumPy alone would accept texts and truth values too.
-        if given.dtype.kind not in "iufO" or (
-            given.dtype.kind == "O" and not all(map(is_number, given.flat))
+        # The hidden numbers of a masked array are none.
+        if (
+            given.dtype.kind not in "iufO"
+            or (given.dtype.kind == "O" and not all(map(is_number, given.flat)))
+            or np.ma.is_masked(values)
         ):
             raise TypeError
         array = np.ascontiguousarray(given, dtype=np.float64)

@@ -29,6 +29,7 @@ import numpy as np
 from feedplan.arguments import number, one_of, positive, refuse, whole
 from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
+from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import end_edges, tangent_jumps
 from feedplan.planners._junctions import Junctions, ShortLines
@@ -74,6 +75,8 @@ def plan(
     ):
         if value is not None:
             number(value, f"the {name}", f"a positive number [{unit}]", positive, unit)
+    if square_corner_velocity is not None and axis_jumps is not None:
+        raise InputError("square_corner_velocity and axis_jumps are rules for the same corners: give one")
     if blocks is not None:
         whole(blocks, "the number of blocks", "a whole number from 2", 2)
     one_of(short_lines, "rule for short_lines", get_args(ShortLines))

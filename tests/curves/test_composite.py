@@ -298,6 +298,10 @@ def test_corners_and_pieces_of_no_length_are_found() -> None:
         (([[0.0] * 10] * 3, range(6), 2), r"shape \(3, 10\): give \(points, axes\) with 1 to 9 axes"),
         (([[0.0], [1j]], [0, 0, 1, 1], 1), "control points are not all real numbers"),
         (([["a"], ["b"]], [0, 0, 1, 1], 1), "control points are not all real numbers"),
+        (
+            (np.ma.masked_less([[0.0], [1.0]], 0.5), [0, 0, 1, 1], 1),
+            "control points are not all real numbers",
+        ),
         (([[0.0], [1], [5], [6]], [0, 0, 1, 1, 2, 2], 1), "a gap of 4 mm at the knot 1"),
     ],
 )

@@ -331,6 +331,13 @@ def test_start_and_end_speeds_are_met_or_refused(write: Write) -> None:
         plan(file, PLANE, JUNCTION, end_speed=90.0)
 
 
+def test_corners_have_one_rule(write: Write) -> None:
+    with pytest.raises(
+        InputError, match="square_corner_velocity and axis_jumps are rules for the same corners"
+    ):
+        plan(write(SQUARE), PLANE, JUNCTION, square_corner_velocity=5.0, axis_jumps=[1.0, 1.0, 1.0])
+
+
 def test_what_cannot_be_planned_is_refused_in_a_sentence(write: Write, tmp_path: FilePath) -> None:
     cusp = Path.from_curve(CompositeCurve.from_bezier([[0, 0], [0, 0], [3, 0], [4, 4]]))
     with pytest.raises(SolverError, match=r"cusp.*bang-bang"):
