@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import threading
 import time
@@ -187,6 +188,9 @@ class _Run:
         sentence = failure.sentence.replace(f"{self._folder}/", "")
         if failure.kind in ("worker", "defect"):
             return Refusal(KINDS[failure.kind], sentence)
+        # The reader does not name its bound, of which others than the service's users know nothing.
+        bound = rf"than {self._limits.max_moves} (?:moves|pieces)(?: take)?"
+        sentence = re.sub(bound, lambda found: f"{found[0]} (max_moves)", sentence)
         limit = replace(self._limits, max_setpoints=self._options["max_setpoints"]).named_in(sentence)
         file = self._record["name"] if failure.line is not None or failure.kind == "program" else None
         kind = LIMIT if limit else KINDS[failure.kind]
