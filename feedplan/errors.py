@@ -21,11 +21,16 @@ class FeedplanError(Exception):
     kind: ClassVar[ErrorKind] = "input"
 
     def __init__(self, message: str = "", line: int | None = None) -> None:
-        self.line = line
+        self.line = line or None
         text = " ".join(message.splitlines())
         if len(text) > LONGEST:
             text = " ".join(_shortened(word, LONGEST_WORD) for word in text.split(" "))
         super().__init__(_shortened(text, LONGEST))
+
+
+def at_line(line: int) -> str:
+    """`line 7: `, the beginning of a sentence about a source line; empty for 0, a path without a program."""
+    return f"line {line}: " if line else ""
 
 
 def _shortened(text: str, most: int) -> str:

@@ -21,7 +21,7 @@ from feedplan.accuracy import estimate, shortfalls
 from feedplan.arguments import callback, not_negative, number, one_of, refuse, whole
 from feedplan.audit import CHUNK, Audit, audit
 from feedplan.constraints.problem import Problem, build_problem, speed_square
-from feedplan.errors import InputError, SolverError
+from feedplan.errors import InputError, SolverError, at_line
 from feedplan.event_places import PlannedEvents
 from feedplan.events import PlacedEvents, TimedEvents
 from feedplan.faster_path import MAX_ROUNDS, Followed, Gain, faster
@@ -573,8 +573,8 @@ def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
     """A sentence for each line on which rounding makes the plan stop."""
     lines = dict.fromkeys(int(line) for line in problem.path.line[profile.slowed])
     return tuple(
-        f"line {line}: rounding hides how the path goes on next to a cusp: the plan stops there, slower than "
-        "it need be; a corner in place of the cusp is exact"
+        f"{at_line(line)}rounding hides how the path goes on next to a cusp: the plan stops there, slower "
+        "than it need be; a corner in place of the cusp is exact"
         for line in lines
     )
 
@@ -591,8 +591,9 @@ def curvature_jumps(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
     count = len(profile.kinked)
     joints = "1 joint" if count == 1 else f"{count} joints, here the most"
     return (
-        f"line {line}: the tool slows to {math.sqrt(speed_sq[slowest]):.3g} mm/s where the curvature jumps, "
-        f"as it does at {joints}: limits of jerk hold it there; a path of continuous curvature is faster",
+        f"{at_line(line)}the tool slows to {math.sqrt(speed_sq[slowest]):.3g} mm/s where the curvature "
+        f"jumps, as it does at {joints}: limits of jerk hold it there; a path of continuous curvature is "
+        "faster",
     )
 
 

@@ -6,25 +6,25 @@ import math
 
 from feedplan._solvers import PlanError
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InfeasibleError, InputError, SolverError
+from feedplan.errors import InfeasibleError, InputError, SolverError, at_line
 
 
 def error_of(problem: Problem, fault: PlanError) -> InfeasibleError | InputError | SolverError:
     """The planner's fault in our words: with the source line, and a speed that will do."""
     kind, piece, reachable, sentence = fault.args
     line = None if piece is None else int(problem.path.line[piece])
-    place = "" if line is None else f"line {line}: "
+    place = at_line(line or 0)
     if reachable is not None:
         shown, unit = _rounded_down(reachable), f"{problem.unit}/s"
         if kind == "start":
             sentence = (
                 f"{place}no profile starts at {problem.start_speed:g} {unit}: "
-                f"the limits ahead allow at most {shown} {unit}"
+                f"the limits ahead allow at most {shown} {unit}: give a lower speed"
             )
         else:
             sentence = (
                 f"{place}no profile ends at {problem.end_speed:g} {unit}: "
-                f"at most {shown} {unit} can be reached"
+                f"at most {shown} {unit} can be reached: give a lower speed"
             )
         return InfeasibleError(sentence, line, reachable)
     if kind == "stuck":

@@ -16,7 +16,7 @@ import numpy as np
 from feedplan._solvers import look_ahead as native_look_ahead
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square, speed_square
-from feedplan.errors import InfeasibleError
+from feedplan.errors import InfeasibleError, at_line
 from feedplan.planners._queue import Queue
 from feedplan.planners._segments import Rule, Segments, segments
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
@@ -100,8 +100,9 @@ def _check_ends(problem: Problem, speed: Floats) -> None:
             line = int(problem.path.line[place])
             shown = math.floor(reached * 1e6) / 1e6
             raise InfeasibleError(
-                f"line {line}: no profile of this method {name} at {wanted:g} {problem.unit}/s: "
-                f"at most {shown:.9g} {problem.unit}/s is possible",
+                f"{at_line(line)}no profile of this method {name} at {wanted:g} {problem.unit}/s: "
+                f"at most {shown:.9g} {problem.unit}/s is possible: give "
+                "a lower speed",
                 line,
                 reached,
             )

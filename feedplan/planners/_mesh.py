@@ -18,7 +18,7 @@ from numpy.polynomial import legendre
 
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InfeasibleError
+from feedplan.errors import InfeasibleError, at_line
 
 # Places of a cell in [0, 1]: both ends, and the extremes of the Legendre polynomial between them.
 _DEGREE = 10
@@ -219,7 +219,7 @@ def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | No
     known = "" if reachable is None else f" at most {reachable:.6g} {problem.unit}/s is allowed there:"
     which = "starts" if side == 0 else "ends"
     return InfeasibleError(
-        f"line {line}: no profile {which} at {speed:g} {problem.unit}/s:{known} give a lower speed",
+        f"{at_line(line)}no profile {which} at {speed:g} {problem.unit}/s:{known} give a lower speed",
         line,
         reachable,
     )

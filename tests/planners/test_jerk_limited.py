@@ -261,9 +261,7 @@ def test_jumps_of_curvature_hold_the_speed_and_are_told() -> None:
     speed = np.linalg.norm(tangent, axis=1) * np.sqrt(profile.p0[first])
     assert speed == pytest.approx(allowed, rel=2e-3)
     (sentence,) = made.warnings
-    assert sentence.startswith(
-        "line 0: the tool slows to 20.8 mm/s where the curvature jumps, as it does at 2 "
-    )
+    assert sentence.startswith("the tool slows to 20.8 mm/s where the curvature jumps, as it does at 2 ")
 
 
 def test_an_axis_without_a_limit_of_jerk_is_named_unless_it_rests() -> None:
