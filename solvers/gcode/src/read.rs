@@ -17,7 +17,7 @@ pub struct ReadError {
 pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Columns, ReadError> {
     let whole = |message: &str| ReadError { line: None, message: message.into() };
     if source.contains(&0) {
-        return Err(whole("the file is binary or UTF-16, not a text of single bytes: give a G-code program"));
+        return Err(whole("the file is binary or UTF-16, not a text of single bytes: save it as UTF-8, or give a G-code program"));
     }
     if source.len() > i32::MAX as usize {
         return Err(whole("the program is larger than 2 GiB: split it"));
