@@ -5,7 +5,7 @@
 use std::rc::Rc;
 
 use super::hodographs::Hodographs;
-use super::number::Number;
+use super::number::{self, Number};
 use super::polygon::Polygon;
 use super::vectors::{curvature, length, vector, vector_of};
 
@@ -234,9 +234,9 @@ impl<const M: usize> Curve<M> {
     }
 
     /// u as parts of the width from both ends.
-    #[inline]
-    fn parts(&self, u: f64) -> (f64, f64) {
-        (u * self.per_width, (self.width - u) * self.per_width)
+    #[inline(always)]
+    fn parts<T: Number>(&self, u: T) -> (T, T) {
+        (u * self.per_width, (u.filled(self.width) - u) * self.per_width)
     }
 
     /// C(u).
@@ -301,8 +301,16 @@ impl<const M: usize> Curve<M> {
     /// The same of a piece without weights, at one u or at several.
     #[inline(always)]
     pub fn polynomial_derivatives<T: Number>(&self, u: T) -> [[T; M]; 3] {
-        let (t, rest) = (u * self.per_width, (u.filled(self.width) - u) * self.per_width);
+        let (t, rest) = self.parts(u);
         by_width(self.hodographs.polynomial_rates(t, rest), self.per_width)
+    }
+
+    /// The length of C' on a piece without weights, at one u or at several.
+    #[inline(always)]
+    pub fn polynomial_speed<T: Number>(&self, u: T) -> T {
+        let (t, rest) = self.parts(u);
+        let slope = scaled(self.hodographs.polynomial_slope(t, rest), self.per_width);
+        number::inner(&slope, &slope).root()
     }
 
     /// What the rounding of the first three derivatives is relative to.

@@ -145,7 +145,7 @@ impl<const M: usize> Hodographs<M> {
         if self.weights.is_some() {
             self.local::<2>(t, rest)[1]
         } else {
-            with_degree!(self.degree, n, sum(&self.rows[1][..n], t, rest))
+            self.polynomial_slope(t, rest)
         }
     }
 
@@ -166,6 +166,12 @@ impl<const M: usize> Hodographs<M> {
         dispatch!(Level::new(), _simd => {
             with_degree!(self.degree, n, lengths(&self.rows[1][..n], t, rest, factors))
         })
+    }
+
+    /// dC/dt of a piece without weights, at one t or at several.
+    #[inline(always)]
+    pub fn polynomial_slope<T: Number>(&self, t: T, rest: T) -> [T; M] {
+        with_degree!(self.degree, n, sum(&self.rows[1][..n], t, rest))
     }
 
     /// The first three derivatives by t.

@@ -36,6 +36,14 @@ pub struct Passage<const M: usize> {
     pub acceleration: Option<Rounded<M>>,
 }
 
+impl<const M: usize> Passage<M> {
+    /// Where it is at u, but not when and how.
+    pub fn unknown(u: f64) -> Self {
+        let velocity = Rounded { value: [f64::NAN; M], rounding: [0.0; M] };
+        Self { u, since: f64::NAN, doubt: f64::NAN, velocity, acceleration: None }
+    }
+}
+
 impl<const M: usize> Motion<M> {
     /// Of phase `i`, whose numbers must be good.
     pub fn new(phases: &Phases, i: usize, columns: &mut Columns<M>) -> Self {

@@ -75,3 +75,13 @@ impl<S: Simd> Number for f64x8<S> {
         self.sqrt()
     }
 }
+
+/// Inner product of two vectors of numbers.
+#[inline(always)]
+pub fn inner<const M: usize, T: Number>(a: &[T; M], b: &[T; M]) -> T {
+    let mut sum = a[0] * b[0];
+    for k in 1..M {
+        sum = sum + a[k] * b[k];
+    }
+    sum
+}

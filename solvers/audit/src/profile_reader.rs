@@ -1,8 +1,11 @@
-//! Reads a speed profile along setpoints: when it is at a place, and what it does there.
+//! Reads a speed profile along setpoints: when it is at a place, and what it does there. `at_once` reads it at several places.
+
+mod at_once;
 
 use super::columns::Columns;
 use super::motion::{Motion, Passage};
 use super::nearest::Place;
+use super::phases::SPEED_CUBIC;
 use super::profile_clock::ProfileClock;
 use super::station::Rounded;
 use super::vectors::{length, vector_of};
@@ -23,25 +26,36 @@ pub struct Reader<'a, const M: usize> {
     phase: usize,
     run: usize,
     pub columns: Columns<'a, M>,
-    motion: Motion<M>,
+    /// A phase, not always the one that it is on, and the motion on it.
+    motion: (usize, Motion<M>),
     /// Where it was last.
     last: Option<(Place, Passage<M>)>,
+    /// Where it goes next, the last of these places first, and on which phases these are.
+    ahead: Vec<(Place, usize, Passage<M>)>,
 }
 
 impl<'a, const M: usize> Reader<'a, M> {
     /// On the first phase; there must be one, and a run of the path for it.
     pub fn new(clock: &ProfileClock<'a>, mut columns: Columns<'a, M>) -> Self {
-        let motion = Motion::new(&clock.phases, 0, &mut columns);
-        let mut reader = Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None };
+        let motion = (0, Motion::new(&clock.phases, 0, &mut columns));
+        let mut reader = Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None, ahead: vec![] };
         reader.enter(0);
         reader
     }
 
     fn enter(&mut self, phase: usize) {
-        let phases = &self.clock.phases;
         self.phase = phase;
-        self.run = phases.runs.partition_point(|&first| first <= phase as i64) - 1;
-        self.motion = self.motion_of(phase);
+        if !self.clock.phases_of(self.run).contains(&phase) {
+            self.run = self.clock.phases.runs.partition_point(|&first| first <= phase as i64) - 1;
+        }
+    }
+
+    /// The motion on the phase that it is on.
+    fn motion(&mut self) -> (&Motion<M>, &mut Columns<'a, M>) {
+        if self.motion.0 != self.phase {
+            self.motion = (self.phase, self.motion_of(self.phase));
+        }
+        (&self.motion.1, &mut self.columns)
     }
 
     fn motion_of(&mut self, phase: usize) -> Motion<M> {
@@ -58,18 +72,51 @@ impl<'a, const M: usize> Reader<'a, M> {
         if let Some((_, passage)) = self.last.filter(|(last, _)| *last == place) {
             return passage;
         }
-        if !self.holds(self.phase, place) {
-            let next = (self.phase + 1).min(self.clock.phases.len() - 1);
-            let phase = if self.holds(next, place) { next } else { self.find(place) };
-            if phase != self.phase {
-                self.enter(phase);
-            }
-        }
+        while self.ahead.pop_if(|(ahead, ..)| *ahead < place).is_some() {}
+        let known = self.ahead.pop_if(|(ahead, ..)| *ahead == place);
+        self.enter(known.map_or_else(|| self.phase_from(self.phase, place), |(_, phase, _)| phase));
         let (phases, phase) = (&self.clock.phases, self.phase);
         let u = if phases.piece[phase] as usize == place.piece { place.u } else { phases.u0[phase] };
-        let passage = self.motion.passage(u, &mut self.columns);
+        let passage = known.map_or_else(
+            || {
+                let (motion, columns) = self.motion();
+                motion.passage(u, columns)
+            },
+            |(.., passage)| passage,
+        );
         self.last = Some((place, passage));
         passage
+    }
+
+    /// Reads the profile at once at places of one piece, in their order, which it will be asked for.
+    pub fn look_ahead(&mut self, places: impl Iterator<Item = Place>) {
+        self.ahead.clear();
+        let (phases, mut phase) = (self.clock.phases, self.phase);
+        for place in places {
+            phase = self.phase_from(phase, place);
+            if phases.kind[phase] == SPEED_CUBIC && phases.piece[phase] as usize == place.piece {
+                self.ahead.push((place, phase, Passage::unknown(place.u)));
+            }
+        }
+        let Some((place, ..)) = self.ahead.first() else { return };
+        let curve = self.columns.curve(place.piece).clone();
+        match self.columns.are_axes() && !curve.polygon.is_rational() {
+            true => at_once::read(&curve, &phases, &mut self.ahead),
+            false => self.ahead.clear(),
+        }
+        self.ahead.reverse();
+    }
+
+    /// The phase that holds a place; as a rule this one or the next.
+    fn phase_from(&self, phase: usize, place: Place) -> usize {
+        let next = (phase + 1).min(self.clock.phases.len() - 1);
+        if self.holds(phase, place) {
+            phase
+        } else if self.holds(next, place) {
+            next
+        } else {
+            self.find(place)
+        }
     }
 
     /// When the profile is at a place, pauses of runs included, in s.
@@ -82,11 +129,10 @@ impl<'a, const M: usize> Reader<'a, M> {
     pub fn phase_at(&mut self, time: f64) -> (usize, [f64; 2], f64) {
         let found = self.clock.phase_of(self.clock.run_of(time), time);
         let (phase, since) = found.unwrap_or((self.phase, 0.0));
-        if phase != self.phase {
-            self.enter(phase);
-        }
+        self.enter(phase);
         let ends = self.ends(phase);
-        let u = self.motion.place_at(since, &mut self.columns).clamp(ends[0], ends[1]);
+        let (motion, columns) = self.motion();
+        let u = motion.place_at(since, columns).clamp(ends[0], ends[1]);
         (self.clock.phases.piece[phase] as usize, ends, u)
     }
 
@@ -214,7 +260,10 @@ impl<'a, const M: usize> Reader<'a, M> {
                 range[k] = [range[k][0].min(value[k] - rounding[k]), range[k][1].max(value[k] + rounding[k])];
             }
         };
-        include(self.motion.acceleration(here, &mut self.columns));
+        include(here.acceleration.unwrap_or_else(|| {
+            let (motion, columns) = self.motion();
+            motion.acceleration(here, columns)
+        }));
         let switch = SWITCH_SHARE * period;
         let ProfileClock { phases, starts, .. } = self.clock;
         let time = time - self.clock.shift(self.run);

@@ -1,4 +1,7 @@
 //! Numerical integration: Kronrod's rule of 7 points (Kronrod 1965), Gauss's of 3 points inside it, and halving where they differ.
+//! The rules themselves are for one function as well as for eight at once; see `number`.
+
+use super::number::Number;
 
 /// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last; the weights of two rules inside it, Gauss's
 /// of 3 points, which is good to degree 5, and that of the outermost two and the middle, good to degree 3.
@@ -28,27 +31,26 @@ pub const MOST_HALVINGS: u32 = 400;
 /// The nodes of Kronrod's rule from a to b: below the middle, the middle, above it, and the middle once more, as eight numbers fill
 /// a vector.
 #[inline(always)]
-fn nodes(middle: f64, half: f64) -> [f64; 8] {
+pub fn nodes<T: Number>(middle: T, half: T) -> [T; 8] {
     let mut nodes = [middle; 8];
-    for (i, node) in NODES.into_iter().enumerate() {
-        nodes[i] -= half * node;
-        nodes[i + 4] += half * node;
+    for i in 0..NODES.len() {
+        nodes[i] = middle - half * NODES[i];
+        nodes[i + 4] = middle + half * NODES[i];
     }
     nodes
 }
 
-/// Sums or differences of the values at each pair of nodes.
+/// Those of Gauss's rule.
 #[inline(always)]
-fn pairs(values: &[f64; 8], join: fn(f64, f64) -> f64) -> [f64; 3] {
-    [0, 1, 2].map(|i| join(values[i], values[i + 4]))
+pub fn gauss_nodes<T: Number>(middle: T, half: T) -> [T; 3] {
+    [middle - half * NODES[1], middle, middle + half * NODES[1]]
 }
 
 /// The integral of f from a to b by Kronrod's rule, and how far the others are from it. f is asked for all nodes at once.
 #[inline(always)]
 pub fn kronrod(mut f: impl FnMut([f64; 8]) -> [f64; 8], a: f64, b: f64) -> [f64; 2] {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let values = f(nodes(middle, half));
-    by_rules(pairs(&values, |before, after| before + after), values[3], half)
+    by_rules(&f(nodes(middle, half)), half)
 }
 
 /// The integral of f from a to b by Gauss's rule of 3 points; f is asked for all of them at once, and for the middle twice, as
@@ -56,8 +58,15 @@ pub fn kronrod(mut f: impl FnMut([f64; 8]) -> [f64; 8], a: f64, b: f64) -> [f64;
 #[inline(always)]
 pub fn gauss(f: impl Fn([f64; 4]) -> [f64; 4], a: f64, b: f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let [before, centre, after, _] = f([middle - half * NODES[1], middle, middle + half * NODES[1], middle]);
-    half * (INNER_WEIGHTS[1] * centre + INNER_WEIGHTS[0] * (before + after))
+    let [before, centre, after] = gauss_nodes(middle, half);
+    let [before, centre, after, _] = f([before, centre, after, middle]);
+    by_gauss([before, centre, after], half)
+}
+
+/// That integral from the values at the nodes.
+#[inline(always)]
+pub fn by_gauss<T: Number>([before, centre, after]: [T; 3], half: T) -> T {
+    half * (centre * INNER_WEIGHTS[1] + (before + after) * INNER_WEIGHTS[0])
 }
 
 /// The same as `kronrod`, and the integral of the first half, by the polynomial through the values at all nodes. Whatever is odd
@@ -65,23 +74,28 @@ pub fn gauss(f: impl Fn([f64; 4]) -> [f64; 4], a: f64, b: f64) -> f64 {
 #[inline(always)]
 pub fn kronrod_halves(f: impl Fn([f64; 8]) -> [f64; 8], a: f64, b: f64) -> ([f64; 2], f64) {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let values = f(nodes(middle, half));
-    let whole = by_rules(pairs(&values, |before, after| before + after), values[3], half);
-    let [outer, gauss, inner] = pairs(&values, |before, after| before - after);
-    let odd = ODD_WEIGHTS[0] * outer + ODD_WEIGHTS[1] * gauss + ODD_WEIGHTS[2] * inner;
-    let rough = OUTER_ODD_WEIGHTS[0] * outer + OUTER_ODD_WEIGHTS[1] * inner;
-    let [fine, doubt] = whole;
-    ([fine, doubt.max(half * CHANCE * (rough - odd).abs())], 0.5 * fine + half * odd)
+    halves_by_rules(&f(nodes(middle, half)), half)
 }
 
-/// The integral and its doubt from the sums of the values at each pair of nodes and the value in the middle.
+/// Those integrals from the values at the nodes.
 #[inline(always)]
-fn by_rules(pairs: [f64; 3], centre: f64, half: f64) -> [f64; 2] {
-    let [outer, gauss, inner] = pairs;
-    let fine = WEIGHTS[0] * outer + WEIGHTS[1] * gauss + WEIGHTS[2] * inner + WEIGHTS[3] * centre;
-    let miss = (INNER_WEIGHTS[0] * gauss + INNER_WEIGHTS[1] * centre - fine).abs();
-    let rough = (OUTER_WEIGHTS[0] * outer + OUTER_WEIGHTS[1] * centre - fine).abs();
-    [half * fine, half * miss.max(CHANCE * rough)]
+pub fn halves_by_rules<T: Number>(values: &[T; 8], half: T) -> ([T; 2], T) {
+    let [fine, doubt] = by_rules(values, half);
+    let (outer, gauss, inner) = (values[0] - values[4], values[1] - values[5], values[2] - values[6]);
+    let odd = outer * ODD_WEIGHTS[0] + gauss * ODD_WEIGHTS[1] + inner * ODD_WEIGHTS[2];
+    let rough = outer * OUTER_ODD_WEIGHTS[0] + inner * OUTER_ODD_WEIGHTS[1];
+    ([fine, doubt.greater(half * CHANCE * (rough - odd).size())], fine * 0.5 + half * odd)
+}
+
+/// The integral and its doubt from the values at the nodes.
+#[inline(always)]
+pub fn by_rules<T: Number>(values: &[T; 8], half: T) -> [T; 2] {
+    let (outer, gauss, inner) = (values[0] + values[4], values[1] + values[5], values[2] + values[6]);
+    let centre = values[3];
+    let fine = outer * WEIGHTS[0] + gauss * WEIGHTS[1] + inner * WEIGHTS[2] + centre * WEIGHTS[3];
+    let miss = (gauss * INNER_WEIGHTS[0] + centre * INNER_WEIGHTS[1] - fine).size();
+    let rough = (outer * OUTER_WEIGHTS[0] + centre * OUTER_WEIGHTS[1] - fine).size();
+    [half * fine, half * miss.greater(rough * CHANCE)]
 }
 
 /// The integral from a to b, halved where the rules differ; not a number where that takes too long.

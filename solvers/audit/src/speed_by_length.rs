@@ -42,11 +42,7 @@ pub enum SpeedByLength {
 impl SpeedByLength {
     /// From v² and a at the anchor and at the other end.
     pub fn cubic(speed_sq: [f64; 2], a: [f64; 2], length: f64) -> Self {
-        let [from, to] = speed_sq;
-        let [slope, end_slope] = a.map(|a| 2.0 * a * length);
-        let c =
-            [from, slope, 3.0 * (to - from) - 2.0 * slope - end_slope, slope + end_slope - 2.0 * (to - from)];
-        Self::Cubic { c, length }
+        Self::Cubic { c: cubic(speed_sq, a, length), length }
     }
 
     /// The time from the anchor to a length; not a number where it cannot be integrated.
@@ -70,10 +66,9 @@ impl SpeedByLength {
             }
             Self::Cubic { c, length } => {
                 let x = way / length;
-                let slope = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]);
+                let (v, a) = (square(c, x).sqrt(), cubic_acceleration(c, *length, x));
                 let bend = 2.0 * c[2] + 6.0 * c[3] * x;
-                let v = square(c, x).sqrt();
-                (Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }, None)
+                (Pace { v, a, j: 0.5 * v * bend / (length * length) }, None)
             }
         }
     }
@@ -94,6 +89,19 @@ impl SpeedByLength {
             Self::Cubic { .. } => cubic_bounds([from, to], way),
         }
     }
+}
+
+/// v² by powers of the share of the length, from v² and a at both ends.
+#[inline(always)]
+pub fn cubic<T: Number>([from, to]: [T; 2], a: [T; 2], length: T) -> [T; 4] {
+    let (rise, slope, end_slope) = (to - from, a[0] * 2.0 * length, a[1] * 2.0 * length);
+    [from, slope, rise * 3.0 - slope * 2.0 - end_slope, slope + end_slope - rise * 2.0]
+}
+
+/// a at a share of the length.
+#[inline(always)]
+pub fn cubic_acceleration<T: Number>(c: &[T; 4], length: T, x: T) -> T {
+    (c[1] + x * (c[2] * 2.0 + x * 3.0 * c[3])) * 0.5 / length
 }
 
 /// The same where v² is a cubic of the length: v² and a between their coefficients in Bernstein form by the length, in which j/v is
@@ -208,8 +216,9 @@ fn slowness(c: &[f64; 4], length: f64, x: [f64; 8]) -> [f64; 8] {
     })
 }
 
+/// v² at a share of the length.
 #[inline(always)]
-fn square(c: &[f64; 4], x: f64) -> f64 {
+pub fn square<T: Number>(c: &[T; 4], x: T) -> T {
     c[0] + x * (c[1] + x * (c[2] + x * c[3]))
 }
 

@@ -6,18 +6,19 @@
 //! q_sss = (C''' − 3 C''ₜ/g (C'' − C''ₜ T) − (C'''ₜ + |C'' − C''ₜ T|²/g) T)/g³.
 
 use super::curve::Curve;
+use super::number::{inner, Number};
 use super::speed_by_length::Pace;
-use super::vectors::{inner, length, vector_of};
+use super::vectors::vector_of;
 use super::{EPS, ROUNDINGS};
 
 /// Where |C'| is below this share of its size the piece has no direction to speak of.
-const STILL: f64 = 1e-6;
+pub const STILL: f64 = 1e-6;
 
 /// A vector, and what of it may be rounding.
 #[derive(Clone, Copy, Debug)]
-pub struct Rounded<const M: usize> {
-    pub value: [f64; M],
-    pub rounding: [f64; M],
+pub struct Rounded<const M: usize, T = f64> {
+    pub value: [T; M],
+    pub rounding: [T; M],
 }
 
 /// A place of a piece: the columns and their slopes by u, each with a bound of its error; of positions beside the rounding of the
@@ -35,27 +36,27 @@ pub struct Place<const M: usize> {
     pub tip_slope: f64,
 }
 
-/// A place, and what is known there whatever the speed.
+/// A place, and what is known there whatever the speed; or several places.
 #[derive(Clone, Copy, Debug)]
-pub struct Station<const M: usize> {
-    pub u: f64,
+pub struct Station<const M: usize, T = f64> {
+    pub u: T,
     /// ds/du.
-    pub slope: f64,
-    pub first: [f64; M],
-    pub second: [f64; M],
-    pub third: [f64; M],
+    pub slope: T,
+    pub first: [T; M],
+    pub second: [T; M],
+    pub third: [T; M],
     /// What the speed of the tool that feeds limit is of that along the path, and the curvature of its path in 1/mm.
-    pub tip: f64,
-    pub curvature: f64,
+    pub tip: T,
+    pub curvature: T,
 }
 
 /// What of the derivatives at a station may be rounding. It takes as long to know as the derivatives, and is asked for where these
 /// come near a limit.
 #[derive(Clone, Copy, Debug)]
-pub struct Roundings<const M: usize> {
-    first: [f64; M],
-    second: [f64; M],
-    third: [f64; M],
+pub struct Roundings<const M: usize, T = f64> {
+    first: [T; M],
+    second: [T; M],
+    third: [T; M],
 }
 
 impl<const M: usize> Station<M> {
@@ -66,27 +67,9 @@ impl<const M: usize> Station<M> {
 
     /// The same where the derivatives are at hand.
     #[inline(always)]
-    pub fn by(curve: &Curve<M>, u: f64, [c1, c2, c3]: &[[f64; M]; 3]) -> Option<Self> {
-        let g = length(c1);
-        if g.is_nan() || g <= STILL * curve.size_lengths()[0] {
-            return None;
-        }
-        let per = 1.0 / g;
-        let (per2, per3) = (per * per, per * per * per);
-        let direction = vector_of::<M>(|k| c1[k] * per);
-        let (along2, along3) = (inner(&direction, c2), inner(&direction, c3));
-        let across: [f64; M] = vector_of(|k| c2[k] - along2 * direction[k]);
-        let turned = inner(&across, &across) * per;
-        let bent = 3.0 * along2 * per;
-        Some(Self {
-            u,
-            slope: g,
-            tip: 1.0,
-            curvature: length(&across) * per2,
-            first: direction,
-            second: vector_of(|k| across[k] * per2),
-            third: vector_of(|k| (c3[k] - bent * across[k] - (along3 + turned) * direction[k]) * per3),
-        })
+    pub fn by(curve: &Curve<M>, u: f64, derivatives: &[[f64; M]; 3]) -> Option<Self> {
+        let station = Self::anywhere(u, derivatives);
+        (station.slope > STILL * curve.size_lengths()[0]).then_some(station)
     }
 
     /// Of joints by their first three derivatives by u and g with its first two:
@@ -112,54 +95,110 @@ impl<const M: usize> Station<M> {
         }
     }
 
-    pub fn velocity(&self, v: f64) -> [f64; M] {
-        vector_of(|k| self.first[k] * v)
-    }
-
-    pub fn acceleration(&self, Pace { v, a, .. }: Pace) -> [f64; M] {
-        let square = v * v;
-        vector_of(|k| self.first[k] * a + self.second[k] * square)
-    }
-
     pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
         let (mixed, cube) = (3.0 * v * a, v * v * v);
         vector_of(|k| self.first[k] * j + self.second[k] * mixed + self.third[k] * cube)
     }
 }
 
-impl<const M: usize> Roundings<M> {
-    /// At a station of a curve with these derivatives: what is rounded in C', C'' and C''' is felt in g and its derivatives as well.
+impl<const M: usize, T: Number> Station<M, T> {
+    /// By these derivatives, whether or not the piece has a direction there.
     #[inline(always)]
-    pub fn new(curve: &Curve<M>, station: &Station<M>, [c1, c2, c3]: &[[f64; M]; 3]) -> Self {
-        let [size1, size2, size3] = curve.derivative_sizes();
-        let [most1, most2, most3] = curve.size_lengths();
-        let (per, direction) = (1.0 / station.slope, &station.first);
+    pub fn anywhere(u: T, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
+        let (g, one) = (inner(c1, c1).root(), u.filled(1.0));
+        let per = one / g;
         let (per2, per3) = (per * per, per * per * per);
-        let (along2, along3) = (inner(direction, c2), inner(direction, c3));
-        let across: [f64; M] = vector_of(|k| c2[k] - along2 * direction[k]);
-        let turned = inner(&across, &across) * per;
-        let bent = 3.0 * along2 * per;
-        let felt = most1 * per;
-        let felt2 = felt * felt;
-        let along = along2.abs() * per;
-        let of_change = (turned + (bent * along2).abs() + along3.abs()) * per;
-        let most_change = felt * (4.0 * felt * most2 * most2 * per + most3);
-        let unit = ROUNDINGS * EPS;
-        let (unit1, unit2, unit3) = (unit * per, unit * per2, unit * per3);
-        Self {
-            first: vector_of(|k| unit1 * (size1[k] + c1[k].abs() * felt)),
-            second: vector_of(|k| {
-                let taken = size1[k] * along + felt2 * direction[k].abs() * most2;
-                unit2 * (taken + felt * (size2[k] + c2[k].abs()))
-            }),
-            third: vector_of(|k| {
-                let taken = size1[k] * of_change + direction[k].abs() * most_change;
-                let inside = size2[k] * along + c2[k].abs() * felt * most2 * per;
-                unit3 * (taken + 3.0 * inside + size3[k] * felt)
-            }),
+        let (mut direction, mut across, mut second, mut third) = (*c1, *c1, *c1, *c1);
+        for k in 0..M {
+            direction[k] = c1[k] * per;
         }
+        let (along2, along3) = (inner(&direction, c2), inner(&direction, c3));
+        for k in 0..M {
+            across[k] = c2[k] - along2 * direction[k];
+        }
+        let turned = inner(&across, &across) * per;
+        let bent = along2 * 3.0 * per;
+        for k in 0..M {
+            second[k] = across[k] * per2;
+            third[k] = (c3[k] - bent * across[k] - (along3 + turned) * direction[k]) * per3;
+        }
+        let curvature = inner(&across, &across).root() * per2;
+        Self { u, slope: g, tip: one, curvature, first: direction, second, third }
     }
 
+    #[inline(always)]
+    pub fn velocity(&self, v: T) -> [T; M] {
+        let mut velocity = self.first;
+        for k in 0..M {
+            velocity[k] = self.first[k] * v;
+        }
+        velocity
+    }
+
+    #[inline(always)]
+    pub fn acceleration(&self, Pace { v, a, .. }: Pace<T>) -> [T; M] {
+        let (square, mut acceleration) = (v * v, self.first);
+        for k in 0..M {
+            acceleration[k] = self.first[k] * a + self.second[k] * square;
+        }
+        acceleration
+    }
+}
+
+impl<const M: usize, T: Number> Roundings<M, T> {
+    /// At a station of a curve with these derivatives: what is rounded in C', C'' and C''' is felt in g and its derivatives as well.
+    #[inline(always)]
+    pub fn new(curve: &Curve<M>, station: &Station<M, T>, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
+        let [size1, size2, size3] = curve.derivative_sizes();
+        let [most1, most2, most3] = curve.size_lengths();
+        let (per, direction) = (station.slope.filled(1.0) / station.slope, &station.first);
+        let (per2, per3) = (per * per, per * per * per);
+        let (along2, along3) = (inner(direction, c2), inner(direction, c3));
+        let mut across = *c2;
+        for k in 0..M {
+            across[k] = c2[k] - along2 * direction[k];
+        }
+        let turned = inner(&across, &across) * per;
+        let bent = along2 * 3.0 * per;
+        let felt = per * most1;
+        let felt2 = felt * felt;
+        let along = along2.size() * per;
+        let of_change = (turned + (bent * along2).size() + along3.size()) * per;
+        let most_change = felt * (felt * 4.0 * most2 * most2 * per + most3);
+        let unit = ROUNDINGS * EPS;
+        let (unit1, unit2, unit3) = (per * unit, per2 * unit, per3 * unit);
+        let mut roundings = Self { first: *c1, second: *c1, third: *c1 };
+        for k in 0..M {
+            roundings.first[k] = unit1 * (c1[k].size() * felt + size1[k]);
+            let taken = along * size1[k] + felt2 * direction[k].size() * most2;
+            roundings.second[k] = unit2 * (taken + felt * (c2[k].size() + size2[k]));
+            let taken = of_change * size1[k] + direction[k].size() * most_change;
+            let inside = along * size2[k] + c2[k].size() * felt * most2 * per;
+            roundings.third[k] = unit3 * (taken + inside * 3.0 + felt * size3[k]);
+        }
+        roundings
+    }
+
+    #[inline(always)]
+    pub fn velocity(&self, v: T) -> [T; M] {
+        let mut velocity = self.first;
+        for k in 0..M {
+            velocity[k] = self.first[k] * v;
+        }
+        velocity
+    }
+
+    #[inline(always)]
+    pub fn acceleration(&self, Pace { v, a, .. }: Pace<T>) -> [T; M] {
+        let (size, square, mut acceleration) = (a.size(), v * v, self.first);
+        for k in 0..M {
+            acceleration[k] = self.first[k] * size + self.second[k] * square;
+        }
+        acceleration
+    }
+}
+
+impl<const M: usize> Roundings<M> {
     /// Of joints by the same as a station, each with how wrong it may be. Where nothing is known of a derivative its rounding is as
     /// great as any number.
     pub fn of_joints(joints: [&Rounded<M>; 3], way: [(f64, f64); 3]) -> Self {
@@ -186,15 +225,6 @@ impl<const M: usize> Roundings<M> {
         }
     }
 
-    pub fn velocity(&self, v: f64) -> [f64; M] {
-        vector_of(|k| self.first[k] * v)
-    }
-
-    pub fn acceleration(&self, Pace { v, a, .. }: Pace) -> [f64; M] {
-        let (size, square) = (a.abs(), v * v);
-        vector_of(|k| self.first[k] * size + self.second[k] * square)
-    }
-
     pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
         let (size, mixed, cube) = (j.abs(), (3.0 * v * a).abs(), v * v * v);
         vector_of(|k| self.first[k] * size + self.second[k] * mixed + self.third[k] * cube)
@@ -205,7 +235,7 @@ impl<const M: usize> Roundings<M> {
 mod tests {
     use super::*;
     use crate::polygon::Polygon;
-    use crate::vectors::distance;
+    use crate::vectors::{distance, length};
 
     #[test]
     fn on_a_parabola_acceleration_and_jerk_are_those_of_its_parameter() {

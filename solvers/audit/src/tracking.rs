@@ -30,6 +30,9 @@ const MOST_GUESSES: usize = 6;
 const SETTLED: f64 = 1e-7;
 const MOST_ERROR: f64 = 1e-3 * PLACE_TOLERANCE;
 
+/// Setpoints whose places are guessed together.
+const AHEAD: usize = 8;
+
 /// Steps towards the nearest place of a phase.
 const MOST_STEPS: usize = 12;
 
@@ -102,15 +105,15 @@ impl<'a> Plan<'a> {
             let mut astray = 0;
             for i in 0..rows.len() {
                 tell(seen, i);
-                let (before, rest) = rows.split_at_mut(i);
                 let first = if number == 0 && continues { known.last() } else { None };
-                let (previous, row) = (before.last().or(first), &mut rest[0]);
-                row.nearest = match previous {
+                let previous = rows[..i].last().or(first);
+                let nearest = match previous {
                     Some(last) if astray > MOST_ASTRAY => last.nearest,
-                    _ => finder.find(previous, row),
+                    _ => finder.find(previous, &rows[i..]),
                 };
-                astray = if row.nearest.is_good() { 0 } else { astray + 1 };
-                row.line = self.path.line[row.nearest.place.piece];
+                astray = if nearest.is_good() { 0 } else { astray + 1 };
+                rows[i].nearest = nearest;
+                rows[i].line = self.path.line[nearest.place.piece];
             }
         });
     }
@@ -136,6 +139,19 @@ struct Finder<'a, const M: usize> {
     columns: Option<Columns<'a, M>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
+    /// Guesses of the places of the next setpoints, the last one first.
+    guesses: Vec<Guess>,
+}
+
+/// The place that a setpoint has where that before it has the place `from` and the step from there to the next one is as expected; and
+/// how far it is from it.
+struct Guess {
+    from: Place,
+    step: f64,
+    /// Of the setpoint, in s.
+    time: f64,
+    place: Place,
+    distance: f64,
 }
 
 impl<'a, const M: usize> Finder<'a, M> {
@@ -146,7 +162,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             None => columns = Some(plan.columns(limits)),
         }
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, columns, reach }
+        Self { plan, limits, profile, columns, reach, guesses: vec![] }
     }
 
     fn columns(&mut self) -> &mut Columns<'a, M> {
@@ -157,19 +173,19 @@ impl<'a, const M: usize> Finder<'a, M> {
         }
     }
 
-    fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Nearest<M> {
-        let (path, limits) = (&self.plan.path, self.limits);
+    /// The place of the first one of some setpoints, which follow `previous`.
+    fn find(&mut self, previous: Option<&Row<M>>, rows: &[Row<M>]) -> Nearest<M> {
+        let (path, limits, row) = (&self.plan.path, self.limits, &rows[0]);
         // From the place of the setpoint before; where that is not good, from the profile's place one period earlier.
         let known = previous.filter(|before| {
-            let near = (row.t - before.t).abs() <= 2.0 * limits.period;
-            self.profile.is_none() || (before.nearest.is_good() && near)
+            self.profile.is_none() || (before.nearest.is_good() && self.are_near(before.t, row.t))
         });
         let from = match (known, &self.plan.profile) {
             (Some(row), _) => row.nearest.place,
             (None, Some(profile)) => profile.place_before(path, row.t - limits.period),
             (None, None) => Place { piece: 0, u: 0.0 },
         };
-        if !(row.t.is_finite() && row.q.iter().all(|q| q.is_finite()) && self.reach.is_finite()) {
+        if !(self.is_finite(row) && self.reach.is_finite()) {
             return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
         let columns = self.columns();
@@ -181,7 +197,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         let close = PLACE_TOLERANCE + rounding;
         let guess = known
             .filter(|_| self.profile.is_some())
-            .and_then(|before| self.guess(from, before.nearest.next_step, &row.q, rounding));
+            .and_then(|before| self.next_guess(from, [before.nearest.step, before.nearest.next_step], rows));
         let mut judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));
             (late - rounding).max(0.0)
@@ -195,13 +211,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             None => self.by_time(from, row, rounding),
         };
         let place = found.place;
-        // The parameter of every piece is in mm.
-        let passed = if place.piece == from.piece { 0.0 } else { path.width[from.piece] };
-        let step = passed + place.u - from.u;
-        let next_step = match known.map(|before| before.nearest.step) {
-            Some(before) if before > 0.0 => (2.0 * step - before).max(0.0),
-            _ => step,
-        };
+        let [step, next_step] = self.steps(from, place, known.map_or(0.0, |before| before.nearest.step));
         let late = if found.error.is_finite() { found.error } else { 0.0 };
         let (off, bend) = (found.distance - rounding, self.columns().curve(place.piece).bounds()[0]);
         let mut nearest =
@@ -216,6 +226,62 @@ impl<'a, const M: usize> Finder<'a, M> {
             }
         }
         nearest
+    }
+
+    /// The step of u from one place to the next, and how far it goes on from there if that step changes as this one did from the step
+    /// before.
+    fn steps(&self, from: Place, place: Place, before: f64) -> [f64; 2] {
+        // The parameter of every piece is in mm.
+        let passed = if place.piece == from.piece { 0.0 } else { self.plan.path.width[from.piece] };
+        let step = passed + place.u - from.u;
+        [step, if before > 0.0 { (2.0 * step - before).max(0.0) } else { step }]
+    }
+
+    /// The guess of the place of the first one of some setpoints, where that before it is at `from`, after a step of u, with the next
+    /// one.
+    fn next_guess(&mut self, from: Place, steps: [f64; 2], rows: &[Row<M>]) -> Option<(Place, f64)> {
+        let is_next = |guess: &Guess| {
+            guess.from == from && guess.step == steps[1] && guess.time.to_bits() == rows[0].t.to_bits()
+        };
+        if !self.guesses.last().is_some_and(is_next) {
+            self.guess_ahead(from, steps, rows);
+        }
+        self.guesses.pop().map(|guess| (guess.place, guess.distance))
+    }
+
+    /// Guesses the places of some setpoints, each from the one before, and looks at the profile there: at once as long as all are on
+    /// one piece.
+    fn guess_ahead(&mut self, mut from: Place, mut steps: [f64; 2], rows: &[Row<M>]) {
+        self.guesses.clear();
+        let mut before = None;
+        for row in &rows[..rows.len().min(AHEAD)] {
+            let is_near = before.is_none_or(|before| self.are_near(before, row.t));
+            if !(is_near && self.is_finite(row)) {
+                break;
+            }
+            let columns = self.columns();
+            let rounding = rounding(columns.count(), columns.magnitude(from.piece), &row.q);
+            let Some((place, distance)) = self.guess(from, steps[1], &row.q, rounding) else { break };
+            let is_same = self.guesses.first().is_none_or(|first| first.place.piece == place.piece);
+            if !is_same {
+                break;
+            }
+            self.guesses.push(Guess { from, step: steps[1], time: row.t, place, distance });
+            (from, steps, before) = (place, self.steps(from, place, steps[0]), Some(row.t));
+        }
+        if let Some(profile) = &mut self.profile {
+            profile.look_ahead(self.guesses.iter().map(|guess| guess.place));
+        }
+        self.guesses.reverse();
+    }
+
+    /// Whether one setpoint is at most two periods after another.
+    fn are_near(&self, before: f64, time: f64) -> bool {
+        (time - before).abs() <= 2.0 * self.limits.period
+    }
+
+    fn is_finite(&self, row: &Row<M>) -> bool {
+        row.t.is_finite() && row.q.iter().all(|q| q.is_finite())
     }
 
     /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead; none where that does not
