@@ -18,7 +18,10 @@
 //!
 //! These quotients are 0/0 at rest where m' vanishes, which is always at an end of the phase. Nearer to it than rounding
 //! allows they are taken at a place a little farther off, and continued from there.
+//!
+//! `at_once` has the motion at several times together, where v² is a cubic of the length.
 
+pub mod at_once;
 mod axis_way;
 mod clock;
 mod lengths;

@@ -33,6 +33,7 @@ use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
 use self::cursor::Cursor;
 pub use self::path_data::PathData;
+use crate::phase_motion::at_once::{Moments, TIMES};
 use crate::phase_motion::{PhaseMotion, Rates, State};
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::watch::Watch;
@@ -238,6 +239,8 @@ impl<const M: usize> Sampler<M> {
     fn fill_by_time(&self, mut part: Slices<M>, watch: Watch) -> Effort {
         let mut effort = Effort::default();
         let mut cursor = self.cursor();
+        // Setpoints in motion on one piece: their numbers, their phases, and the times since these began.
+        let mut moving: Vec<(usize, usize, f64)> = Vec::with_capacity(TIMES);
         let mut i = 0;
         while i < part.t.len() {
             let index = part.start + i;
@@ -257,18 +260,61 @@ impl<const M: usize> Sampler<M> {
                     self.set_end(run, &mut part, i, self.ends_moving && index + 1 == self.count);
                     continue;
                 };
-                let phase = cursor.seek(&run.phases, time);
-                let state = cursor.motion().at_time(time - self.starts[phase], self.period);
-                effort.raise(state.iterations, state.error * self.phases.duration[phase] / self.period);
-                self.set(&mut part, i, phase, cursor.motion(), &state);
+                let phase = cursor.find(&run.phases, time);
+                let is_on = |first: usize| self.phases.piece[first] == self.phases.piece[phase];
+                if moving.len() == TIMES || moving.first().is_some_and(|&(_, first, _)| !is_on(first)) {
+                    self.fill_at_once(&mut part, &moving, &mut cursor, &mut effort);
+                    moving.clear();
+                }
+                moving.push((i, phase, time - self.starts[phase]));
             }
             i = stop;
         }
+        self.fill_at_once(&mut part, &moving, &mut cursor, &mut effort);
         effort
     }
 
+    /// Fills in setpoints in motion on one piece, no more than are looked at at once.
+    fn fill_at_once(
+        &self,
+        part: &mut Slices<M>,
+        moving: &[(usize, usize, f64)],
+        cursor: &mut Cursor<'_, M>,
+        effort: &mut Effort,
+    ) {
+        let Some(&(_, first, _)) = moving.first() else { return };
+        let mut times = [(self.phase(first), 0.0); TIMES];
+        for (own, &(_, phase, t)) in times.iter_mut().zip(moving) {
+            *own = (self.phase(phase), t);
+        }
+        let piece = cursor.piece(self.phases.piece[first]);
+        let moments = Moments::new(&piece, &times[..moving.len()], self.period);
+        for (lane, &(i, phase, t)) in moving.iter().enumerate() {
+            let of_period = self.phases.duration[phase] / self.period;
+            if let Some(moment) = moments.as_ref().and_then(|moments| moments.get(lane)) {
+                effort.raise(moment.iterations, moment.error * of_period);
+                self.set_sample(part, i, phase, moment.u, (moment.position, moment.rates));
+            } else {
+                cursor.enter(phase);
+                let state = cursor.motion().at_time(t, self.period);
+                effort.raise(state.iterations, state.error * of_period);
+                self.set(part, i, phase, cursor.motion(), &state);
+            }
+        }
+    }
+
     fn set(&self, part: &mut Slices<M>, i: usize, phase: usize, motion: &PhaseMotion<M>, state: &State) {
-        let (position, Rates { velocity, acceleration, jerk }) = motion.sample(state);
+        self.set_sample(part, i, phase, state.u, motion.sample(state));
+    }
+
+    fn set_sample(
+        &self,
+        part: &mut Slices<M>,
+        i: usize,
+        phase: usize,
+        u: f64,
+        (position, Rates { velocity, acceleration, jerk }): ([f64; M], Rates<M>),
+    ) {
         let piece = self.phases.piece[phase];
         part.position[i] = position;
         part.velocity[i] = velocity;
@@ -276,7 +322,7 @@ impl<const M: usize> Sampler<M> {
         part.jerk[i] = jerk;
         part.line[i] = self.path.lines[piece as usize];
         part.piece[i] = piece;
-        part.u[i] = state.u;
+        part.u[i] = u;
     }
 
     /// Speed, first phase and its motion where the path begins; a speed of 0 is exact.

@@ -4,7 +4,7 @@
 //!
 //! Parts are counted from the end of the phase that is nearer in time, so that nothing is lost next to rest.
 
-mod cubic;
+pub mod cubic;
 
 use super::lengths::{fill, PiecePath, SLOW};
 use super::pace::{time_of_way, Pace};

@@ -96,6 +96,29 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         Located { miss: found.miss + error, ..found }
     }
 
+    /// The lengths that a law is about, where those are of the axes on a piece without weights.
+    pub(super) fn axes_lengths(&self, law: PhaseLaw) -> Option<AxesLengths<'_, M>> {
+        let lengths = self.of(law);
+        let (Speeds::Axes { coefficients, width }, false) = (&lengths.speeds, self.piece.is_rational())
+        else {
+            return None;
+        };
+        let (rows, per_width) = (coefficients.hodograph(), 1.0 / width);
+        if lengths.even.is_some() {
+            return Some(AxesLengths {
+                rows,
+                per_width,
+                nodes: &[],
+                error: 0.0,
+                steepest: 0.0,
+                rounding: 0.0,
+            });
+        }
+        let Filled { nodes, error, steepest } = lengths.filled();
+        let rounding = lengths.table().rounding();
+        Some(AxesLengths { rows, per_width, nodes, error: *error, steepest: *steepest, rounding })
+    }
+
     /// The length of a phase from one quadrature.
     pub(super) fn rough_length(&self, phase: &Phase) -> f64 {
         quadrature(&self.rate(phase.law, Line::ONE), phase.u0, phase.u1)
@@ -212,6 +235,27 @@ impl<const M: usize> Speeds<M> {
                 Source::Own(Speed::new(coefficients.hodograph(), coefficients.denominator(), *width))
             }
         }
+    }
+}
+
+/// Lengths of the axes on a piece without weights.
+pub(super) struct AxesLengths<'a, const M: usize> {
+    /// Bernstein coefficients of the hodograph times binomials.
+    pub rows: &'a [[f64; M]],
+    pub per_width: f64,
+    /// Of the table; none of a line.
+    nodes: &'a [Node],
+    /// Its proven error, at least the slope of the length per u, and what no length is known more closely than.
+    pub error: f64,
+    pub steepest: f64,
+    pub rounding: f64,
+}
+
+impl<const M: usize> AxesLengths<'_, M> {
+    /// Whether the rule of the table is as good between two places as on one of its panels.
+    pub fn are_on_one_panel(&self, from: f64, to: f64) -> bool {
+        let next = self.nodes.partition_point(|node| node.u <= from);
+        self.nodes.get(next).is_none_or(|node| to <= node.u)
     }
 }
 

@@ -28,8 +28,15 @@ impl<'a, const M: usize> Cursor<'a, M> {
         self.phase = phase;
     }
 
-    /// Goes to the phase that contains the time, among those of a run.
+    /// Goes to the phase that contains the time, among those of a run, and makes its motion ready.
     pub fn seek(&mut self, run: &Range<usize>, time: f64) -> usize {
+        self.find(run, time);
+        self.enter(self.phase);
+        self.phase
+    }
+
+    /// Goes to the phase that contains the time, among those of a run.
+    pub fn find(&mut self, run: &Range<usize>, time: f64) -> usize {
         let starts = self.starts;
         if !run.contains(&self.phase) || starts[self.phase] > time {
             self.phase = run.start + starts[run.clone()].partition_point(|&start| start <= time) - 1;
@@ -37,16 +44,26 @@ impl<'a, const M: usize> Cursor<'a, M> {
         while self.phase + 1 < run.end && starts[self.phase + 1] <= time {
             self.phase += 1;
         }
-        if self.motion.as_ref().is_none_or(|(phase, _)| *phase != self.phase) {
-            let phase = self.phases.get(self.phase).expect("all laws are known");
-            let piece = match self.piece.take() {
-                Some((number, piece)) if number == phase.piece => piece,
-                _ => Rc::new(self.path.piece(phase.piece as usize)),
-            };
-            self.piece = Some((phase.piece, piece.clone()));
-            self.motion = Some((self.phase, PhaseMotion::new(piece, &phase)));
-        }
         self.phase
+    }
+
+    /// Makes the motion on a phase ready.
+    pub fn enter(&mut self, number: usize) {
+        if self.motion.as_ref().is_none_or(|(phase, _)| *phase != number) {
+            let phase = self.phases.get(number).expect("all laws are known");
+            let piece = self.piece(phase.piece);
+            self.motion = Some((number, PhaseMotion::new(piece, &phase)));
+        }
+    }
+
+    /// A piece, with the lengths that laws are about.
+    pub fn piece(&mut self, number: u32) -> Rc<PiecePath<'a, M>> {
+        let piece = match self.piece.take() {
+            Some((last, piece)) if last == number => piece,
+            _ => Rc::new(self.path.piece(number as usize)),
+        };
+        self.piece = Some((number, piece.clone()));
+        piece
     }
 
     pub fn motion(&self) -> &PhaseMotion<'a, M> {

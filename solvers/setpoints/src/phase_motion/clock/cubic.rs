@@ -13,7 +13,7 @@ use feedplan_planner::phases::Phase;
 const MOST_TERMS: usize = 18;
 const NOTHING: f64 = 1e-18;
 /// 1/((k + 1)(k + 2)): what the term k of ẍ is in that of x.
-const PER_TERM: [f64; MOST_TERMS] = {
+pub const PER_TERM: [f64; MOST_TERMS] = {
     let (mut per, mut k) = ([0.0; MOST_TERMS], 0);
     while k < MOST_TERMS {
         per[k] = 1.0 / ((k + 1) * (k + 2)) as f64;
@@ -22,9 +22,9 @@ const PER_TERM: [f64; MOST_TERMS] = {
     per
 };
 /// A step of Newton's method, in parts of the time of a series, whose error, about its square, is below rounding.
-const LAST_STEP: f64 = 1e-10;
+pub const LAST_STEP: f64 = 1e-10;
 /// A series may end so far beyond the length, in parts of it: where the duration is that of the motion but for rounding.
-const OVER: f64 = 1e-3;
+pub const OVER: f64 = 1e-3;
 /// Series are no shorter than this part of the duration, and no more than so many: speeds that are absurd have more.
 const SHORTEST: f64 = 1e-12;
 const MOST_PARTS: usize = 10_000;
