@@ -59,7 +59,8 @@ macro_rules! kernels {
                 phases: &Phases,
                 seen: Seen,
             ) -> Tally<$count> {
-                let of = Audited { junction_speed, phases, limits: self, starts: &phases.starts(path) };
+                let (starts, are_good) = (&phases.starts(path), &phases.have_good_numbers(self.axes));
+                let of = Audited { junction_speed, phases, limits: self, starts, are_good };
                 audit_profile(&of, &|| Columns::new(path, self, None), seen)
             }
 
@@ -71,7 +72,8 @@ macro_rules! kernels {
                 seen: Seen,
             ) -> Tally<$count> {
                 let starts = &phases.starts(&joints.path);
-                let of = Audited { junction_speed, phases, limits: self, starts };
+                let are_good = &phases.have_good_numbers(self.axes);
+                let of = Audited { junction_speed, phases, limits: self, starts, are_good };
                 audit_profile(&of, &|| Columns::new(&joints.path, self, Some(joints)), seen)
                     .merge(audit_travel(joints, *phases, starts, self))
             }

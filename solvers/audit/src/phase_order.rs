@@ -4,12 +4,12 @@ use super::curve::Followed;
 use super::phases::Phases;
 use super::{Check, Tally, EPS, GAP_TOLERANCE, ROUNDINGS};
 
-/// A path and the phases on it, whose laws are about so many axes or joints.
+/// A path and the phases on it, and whether the numbers of each can be measured.
 pub struct PhaseOrder<'a> {
     pub path: &'a Followed<'a>,
     pub phases: &'a Phases<'a>,
     pub starts: &'a [f64],
-    pub axes: usize,
+    pub are_good: &'a [bool],
 }
 
 /// Where the next phase has to begin.
@@ -21,7 +21,7 @@ struct Next {
 impl PhaseOrder<'_> {
     /// Offers the gaps; whether the runs are those of the path and all numbers are good, so that the ends of runs can be judged.
     pub fn audit<const M: usize>(&self, tally: &mut Tally<M>) -> bool {
-        let Self { path, phases, starts, axes } = *self;
+        let Self { path, phases, starts, are_good } = *self;
         if phases.runs.len() != path.runs.len()
             || phases.runs.first().is_some_and(|&first| first != 0)
             || phases.runs.last().is_some_and(|&last| last != phases.len() as i64)
@@ -35,7 +35,7 @@ impl PhaseOrder<'_> {
             let mut next = Next { piece: first, u: 0.0 };
             let here = runs[0] as usize..runs[1] as usize;
             for i in here.clone() {
-                if !phases.has_good_numbers(i, axes) {
+                if !are_good[i] {
                     return false; // reported with the phase itself
                 }
                 let entered = phases.piece[i] as usize;

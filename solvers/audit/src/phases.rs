@@ -103,7 +103,7 @@ impl Phases<'_> {
             && runs.first() == Some(&0)
             && runs.last() == Some(&(self.len() as i64))
             && runs.windows(2).all(|pair| pair[0] <= pair[1])
-            && (0..self.len()).all(|i| self.has_good_numbers(i, axes))
+            && self.have_good_numbers(axes).iter().all(|&good| good)
     }
 
     /// When each phase begins, and when the last one ends, in s; pauses before and between the runs included.
@@ -122,20 +122,30 @@ impl Phases<'_> {
         starts
     }
 
-    /// Whether the numbers of phase `i`, taken alone, can be measured; on a path of so many axes or joints.
-    pub fn has_good_numbers(&self, i: usize, axes: usize) -> bool {
-        let numbers = [self.value, self.u0, self.u1, self.p0, self.p1, self.duration, self.a0, self.a1];
-        // 0 times what is not finite is no number.
-        let nothing = numbers.iter().fold(0.0, |sum, column| sum + 0.0 * column[i]);
-        let needs_axis = matches!(self.kind[i], AXIS_ACCELERATION | AXIS_VELOCITY);
-        (self.piece[i] as usize) < self.pieces
-            && self.kind[i] <= SPEED_CUBIC
-            && (!needs_axis || (self.axis[i] as usize) < axes)
-            && nothing == 0.0
-            && self.p0[i] >= 0.0
-            && self.p1[i] >= 0.0
-            && self.duration[i] >= 0.0
-            && (matches!(self.kind[i], PATH_JERK | SPEED_CUBIC) || (self.a0[i] == 0.0 && self.a1[i] == 0.0))
+    /// Whether the numbers of each phase, taken alone, can be measured; on a path of so many axes or joints.
+    pub fn have_good_numbers(&self, axes: usize) -> Vec<bool> {
+        // 0 times what is not finite is no number; column after column, in the vectors of the processor.
+        let mut nothing = vec![0.0; self.len()];
+        for column in [self.value, self.u0, self.u1, self.p0, self.p1, self.duration, self.a0, self.a1] {
+            for (sum, number) in nothing.iter_mut().zip(column) {
+                *sum += 0.0 * number;
+            }
+        }
+        let mut are_good: Vec<bool> = nothing.iter().map(|nothing| *nothing == 0.0).collect();
+        for column in [self.p0, self.p1, self.duration] {
+            for (good, number) in are_good.iter_mut().zip(column) {
+                *good &= *number >= 0.0;
+            }
+        }
+        for (i, good) in are_good.iter_mut().enumerate() {
+            let kind = self.kind[i];
+            let needs_axis = matches!(kind, AXIS_ACCELERATION | AXIS_VELOCITY);
+            *good &= (self.piece[i] as usize) < self.pieces
+                && kind <= SPEED_CUBIC
+                && (!needs_axis || (self.axis[i] as usize) < axes)
+                && (matches!(kind, PATH_JERK | SPEED_CUBIC) || (self.a0[i] == 0.0 && self.a1[i] == 0.0));
+        }
+        are_good
     }
 
     /// Whether the speed on phase `i` is known by the length of the path.

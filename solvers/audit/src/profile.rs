@@ -59,6 +59,8 @@ pub struct Audited<'a, const M: usize> {
     pub limits: &'a Limits<M>,
     /// When each phase begins, and the last one ends.
     pub starts: &'a [f64],
+    /// Whether the numbers of each phase, taken alone, can be measured.
+    pub are_good: &'a [bool],
 }
 
 /// The whole profile: phases, joints, ends of runs. Each thread makes columns of its own.
@@ -70,8 +72,7 @@ pub fn audit_profile<'a, const M: usize>(
     let phases = of.phases;
     let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
         let (mut columns, mut looks) = (columns(), Looks::default());
-        let (first, count) = (block.start, columns.count());
-        let good = |i: usize| phases.has_good_numbers(i, count);
+        let first = block.start;
         let groups = phases.groups(block, GROUP);
         for group in groups.iter().step_by(FIRST) {
             of.at_once(group, &mut columns, &mut looks, tally);
@@ -79,7 +80,7 @@ pub fn audit_profile<'a, const M: usize>(
                 of.phase((i, *time), &mut columns, &mut None, tally);
             }
         }
-        let (mut is_good, mut last) = (first > 0 && good(first - 1), None);
+        let (mut is_good, mut last) = (first > 0 && of.are_good[first - 1], None);
         let begun = phases.runs.partition_point(|&begin| begin < first as i64);
         let mut runs = phases.runs[begun..].iter().peekable();
         for (number, group) in groups.into_iter().enumerate() {
@@ -90,7 +91,7 @@ pub fn audit_profile<'a, const M: usize>(
             for (member, i) in group.enumerate() {
                 tell(seen, i);
                 let found = match is_known {
-                    true => good(i),
+                    true => of.are_good[i],
                     false => of.phase((i, looks.times[member]), &mut columns, &mut last, tally),
                 };
                 let was_good = std::mem::replace(&mut is_good, found);
@@ -124,7 +125,7 @@ impl<const M: usize> Audited<'_, M> {
         let (phases, time) = (self.phases, self.starts[i]);
         let piece = phases.piece[i] as usize;
         let line = columns.path.line_of(piece);
-        if known.is_none() && !phases.has_good_numbers(i, columns.count()) {
+        if !self.are_good[i] {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return false;
         }
@@ -219,7 +220,7 @@ impl<const M: usize> Audited<'_, M> {
         looks.phases.extend(group.clone().map(|i| {
             let u = [phases.u0[i], phases.u1[i]];
             let is_cubic = phases.kind[i] != PATH_JERK && phases.is_by_length(i, columns);
-            let is_good = phases.has_good_numbers(i, columns.count()) && is_order(u, curve.width());
+            let is_good = self.are_good[i] && is_order(u, curve.width());
             (is_cubic && is_good).then(|| at_once::Phase {
                 u,
                 p: [phases.p0[i], phases.p1[i]],
@@ -338,8 +339,8 @@ impl<const M: usize> Audited<'_, M> {
 
     /// Phases must follow each other without gap over every piece, and runs begin and end at rest.
     fn order(&self, columns: &mut Columns<M>, tally: &mut Tally<M>) {
-        let Self { phases, starts, .. } = *self;
-        let order = PhaseOrder { path: &columns.path, phases, starts, axes: columns.count() };
+        let Self { phases, starts, are_good, .. } = *self;
+        let order = PhaseOrder { path: &columns.path, phases, starts, are_good };
         if !order.audit(tally) {
             return;
         }
@@ -589,7 +590,8 @@ mod tests {
         let feed = [2.0, f64::INFINITY, f64::INFINITY, f64::INFINITY];
         let (path, limits) = (Followed { feed: &feed, ..Followed::of_one(pieces) }, Limits::<2>::none());
         let phases = Phases::of_one(&[PATH_JERK], &[255], &[-6.0], &[0.0, 1.0], &[1.0, 0.0]);
-        let of = Audited { junction_speed: &[0.0; 2], phases: &phases, limits: &limits, starts: &[0.0, 1.0] };
+        let (starts, are_good) = (&[0.0, 1.0], &[true]);
+        let of = Audited { junction_speed: &[0.0; 2], phases: &phases, limits: &limits, starts, are_good };
         let tally = audit_profile(&of, &|| Columns::new(&path, &limits, None), &|_| ());
         assert!(tally.get(Check::Feed, 0).ratio > 1.4, "{:?}", tally.get(Check::Feed, 0));
     }

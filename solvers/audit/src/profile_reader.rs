@@ -20,6 +20,9 @@ const SWITCH_SHARE: f64 = 1e-4;
 /// Switches on each side that are looked at; right profiles have a few at most in so short a time.
 const MOST_SWITCHES: usize = 64;
 
+/// So many phases are looked at one after the other for a place that is ahead.
+const NEXT: usize = 4;
+
 /// Reads a profile along the setpoints; keeps the phase it is on, since the next place is mostly on it too.
 pub struct Reader<'a, const M: usize> {
     clock: ProfileClock<'a>,
@@ -107,16 +110,10 @@ impl<'a, const M: usize> Reader<'a, M> {
         self.ahead.reverse();
     }
 
-    /// The phase that holds a place; as a rule this one or the next.
+    /// The phase that holds a place; as a rule this one or one of the next.
     fn phase_from(&self, phase: usize, place: Place) -> usize {
-        let next = (phase + 1).min(self.clock.phases.len() - 1);
-        if self.holds(phase, place) {
-            phase
-        } else if self.holds(next, place) {
-            next
-        } else {
-            self.find(place)
-        }
+        let mut next = phase..self.clock.phases.len().min(phase + NEXT);
+        next.find(|&phase| self.holds(phase, place)).unwrap_or_else(|| self.find(place))
     }
 
     /// When the profile is at a place, pauses of runs included, in s.

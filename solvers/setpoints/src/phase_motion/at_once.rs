@@ -1,8 +1,8 @@
 //! The motion at several times on phases of one piece, eight at once, in the vectors of the processor.
 //!
 //! It is that of `PhaseMotion` where v² is a cubic polynomial of the length of the axes on a piece without weights, in the same digits
-//! but for rounding. What takes longer is left to that: next to rest, where a phase needs several series or goes over a node of the
-//! table of lengths, and where the place is not known after so many steps of Newton's method. So what is found of one time does not
+//! but for rounding. What takes longer is left to that: next to rest, where a phase needs several series or is longer than a panel of
+//! the table of lengths, and where the place is not known after so many steps of Newton's method. So what is found of one time does not
 //! depend on the others.
 
 use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
@@ -71,7 +71,7 @@ impl<const M: usize> Moments<M> {
         for (lane, (phase, t)) in times.iter().enumerate() {
             let Phase { u0, u1, p0, p1, a0, a1, duration, .. } = *phase;
             let is_inside = *t > 0.0 && *t < duration;
-            if phase.law == PhaseLaw::SpeedCubic && is_inside && lengths.are_on_one_panel(u0, u1) {
+            if phase.law == PhaseLaw::SpeedCubic && is_inside && lengths.is_rule_good(u0, u1) {
                 is_any = true;
                 for (row, number) in numbers.iter_mut().zip([u0, u1, p0, p1, a0, a1, duration, *t]) {
                     row[lane] = number;
@@ -390,7 +390,7 @@ mod tests {
         let turn = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.3], [0.0, 0.3]];
         let curve = path(&turn, &[]);
         let [short, long] =
-            [[0.26, 0.34], [0.26, 2.9]].map(|u| half(phase(&curve, u, [10.0, 10.0], [0.0, 0.0])));
+            [[0.2, 0.3], [0.2, 2.9]].map(|u| half(phase(&curve, u, [10.0, 10.0], [0.0, 0.0])));
         assert_eq!(known(&curve, &[short, long]), [true, false]);
     }
 
@@ -415,7 +415,7 @@ mod tests {
             let shares = [1e-9, 0.1, 0.4, 0.5, 0.6, 0.8, 0.99, 1.0 - 1e-9];
             let times = shares.map(|share| (phase, share * phase.duration));
             let lengths = curve.axes_lengths(phase.law).expect("the piece has no weights");
-            let is_easy = part < 0.01 && lengths.are_on_one_panel(u[0], u[1]);
+            let is_easy = part < 0.01 && lengths.is_rule_good(u[0], u[1]);
             let moments = Moments::new(&curve, &times, PERIOD);
             for (lane, time) in times.iter().enumerate() {
                 let Some(moment) = moments.as_ref().and_then(|of| of.get(lane)) else {

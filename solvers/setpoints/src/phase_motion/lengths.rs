@@ -252,10 +252,12 @@ pub(super) struct AxesLengths<'a, const M: usize> {
 }
 
 impl<const M: usize> AxesLengths<'_, M> {
-    /// Whether the rule of the table is as good between two places as on one of its panels.
-    pub fn are_on_one_panel(&self, from: f64, to: f64) -> bool {
-        let next = self.nodes.partition_point(|node| node.u <= from);
-        self.nodes.get(next).is_none_or(|node| to <= node.u)
+    /// Whether the rule of the table is as good between two places as on its panels: they are no farther apart than the panels that
+    /// they and what is between them are on are wide. The bound of the derivatives that makes a panel so wide holds on all of it.
+    pub fn is_rule_good(&self, from: f64, to: f64) -> bool {
+        let first = self.nodes.partition_point(|node| node.u <= from).saturating_sub(1);
+        let panels = self.nodes[first.min(self.nodes.len())..].windows(2);
+        panels.take_while(|ends| ends[0].u < to).all(|ends| to - from <= ends[1].u - ends[0].u)
     }
 }
 
