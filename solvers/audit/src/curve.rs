@@ -305,6 +305,14 @@ impl<const M: usize> Curve<M> {
         by_width(self.hodographs.polynomial_rates(t, rest), self.per_width)
     }
 
+    /// C and C' on a piece without weights, at one u or at several.
+    #[inline(always)]
+    pub fn polynomial_place<T: Number>(&self, u: T) -> [[T; M]; 2] {
+        let (t, rest) = self.parts(u);
+        let [point, slope] = self.hodographs.polynomial_place(t, rest);
+        [point, scaled(slope, self.per_width)]
+    }
+
     /// The length of C' on a piece without weights, at one u or at several.
     #[inline(always)]
     pub fn polynomial_speed<T: Number>(&self, u: T) -> T {

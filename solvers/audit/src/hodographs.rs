@@ -174,6 +174,16 @@ impl<const M: usize> Hodographs<M> {
         with_degree!(self.degree, n, sum(&self.rows[1][..n], t, rest))
     }
 
+    /// C and dC/dt of such a piece.
+    #[inline(always)]
+    pub fn polynomial_place<T: Number>(&self, t: T, rest: T) -> [[T; M]; 2] {
+        let mut point = with_degree!(self.degree, n, sum(&self.rows[0][..=n], t, rest));
+        for k in 0..M {
+            point[k] = point[k] + self.start[k];
+        }
+        [point, self.polynomial_slope(t, rest)]
+    }
+
     /// The first three derivatives by t.
     #[inline]
     pub fn rates(&self, t: f64, rest: f64) -> [[f64; M]; 3] {

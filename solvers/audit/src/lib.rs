@@ -248,6 +248,12 @@ impl<const M: usize> Tally<M> {
         known >= 0.0 && most <= known * limit
     }
 
+    /// Whether a value that is not above 0 changes nothing, whatever its limit.
+    #[inline(always)]
+    pub fn is_measured(&self, check: Check, axis: usize) -> bool {
+        self.worst[check as usize][axis].ratio >= 0.0
+    }
+
     /// At most what a value may be to change nothing; not a number where nothing is known. A value against no limit only has to be a
     /// number.
     pub fn most(&self, check: Check, axis: usize, limit: f64) -> f64 {

@@ -55,7 +55,9 @@ impl<const M: usize> Jerks<'_, M> {
         let rests = phases.p1[i] == 0.0 && phases.p0[j] == 0.0;
         if !rests {
             let change = (after - before).abs() - ROUNDINGS * EPS * (after.abs() + before.abs());
-            tally.offer(Check::AccelerationContinuity, 0, change, self.negligible(0.0), time, line);
+            if !(change <= 0.0 && tally.is_measured(Check::AccelerationContinuity, 0)) {
+                tally.offer(Check::AccelerationContinuity, 0, change, self.negligible(0.0), time, line);
+            }
         }
         let pieces = [i, j].map(|phase| phases.piece[phase] as usize);
         if if rests { before == 0.0 && after == 0.0 } else { pieces[0] == pieces[1] } {

@@ -244,11 +244,16 @@ impl<const M: usize> Audited<'_, M> {
         tally: &mut Tally<M>,
     ) {
         let phases = self.phases;
+        let off = (phases.duration[i] - elapsed).abs();
+        // Most phases are not off by more than the rounding of their width.
+        if off < ROUNDINGS * width_rounding * elapsed && tally.is_measured(Check::Duration, 0) {
+            return;
+        }
         let slowest = phases.p0[i].min(phases.p1[i]).sqrt();
         let rounding = width_rounding * (phases.u1[i] - phases.u0[i]);
         let at_end = if slowest > 0.0 { rounding / (slowest * elapsed) } else { 0.0 };
         let known = (ROUNDINGS * width_rounding.max(at_end)).max(doubt / elapsed);
-        let error = (phases.duration[i] - elapsed).abs() / elapsed - known;
+        let error = off / elapsed - known;
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[i], line);
     }
 
@@ -374,7 +379,9 @@ impl<const M: usize> Audited<'_, M> {
         if before == after && phases.u1[i] == phases.u0[j] && phases.p1[i] == phases.p0[j] {
             // One place, and one speed there.
             for k in 0..columns.count() {
-                tally.offer(Check::Jump, k, 0.0, self.negligible(j, k, columns), time, line);
+                if !tally.is_measured(Check::Jump, k) {
+                    tally.offer(Check::Jump, k, 0.0, self.negligible(j, k, columns), time, line);
+                }
             }
             return;
         }

@@ -8,6 +8,9 @@ use super::phases::Phases;
 use super::rows::Row;
 use super::{EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
+/// So many phases are looked at one after the other for a later time.
+const NEXT: usize = 8;
+
 /// A profile of good numbers on the clock of the setpoints.
 #[derive(Clone, Copy)]
 pub struct ProfileClock<'a> {
@@ -46,6 +49,25 @@ impl ProfileClock<'_> {
         let passed = self.starts[phases.clone()].partition_point(|&start| start <= time);
         let phase = phases.start + passed.saturating_sub(1);
         (!phases.is_empty()).then(|| (phase, time - self.starts[phase]))
+    }
+
+    /// About where the profile is at a time: u as a cubic of it, by its ends on the phase. With the phase, which is looked for from
+    /// another one on.
+    pub fn place_about(&self, from: usize, time: f64) -> Option<(usize, Place)> {
+        let (run, phases) = (self.run_of(time), &self.phases);
+        let (here, since) = (self.phases_of(run), time - self.shift(run));
+        let has_begun = |phase: usize| here.contains(&phase) && self.starts[phase] <= since;
+        let phase = match has_begun(from) && !has_begun(from + NEXT) {
+            true => (from..from + NEXT).rev().find(|&phase| has_begun(phase))?,
+            false => self.phase_of(run, time)?.0,
+        };
+        let (u, duration) = ([phases.u0[phase], phases.u1[phase]], phases.duration[phase]);
+        let x = ((since - self.starts[phase]) / duration).clamp(0.0, 1.0);
+        let speeds = [phases.p0[phase].sqrt(), phases.p1[phase].sqrt()].map(|speed| speed * duration);
+        let bend = 3.0 * (u[1] - u[0]) - 2.0 * speeds[0] - speeds[1];
+        let rest = speeds[0] + speeds[1] - 2.0 * (u[1] - u[0]);
+        let about = u[0] + x * (speeds[0] + x * (bend + x * rest));
+        Some((phase, Place { piece: phases.piece[phase] as usize, u: about }))
     }
 
     /// The start of the phase that `time` falls into.

@@ -4,11 +4,14 @@
 //! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
 //! that is early or late is the way that the profile moves in that time.
 
+mod at_once;
+
 use super::columns::Columns;
 use super::curve::Followed;
 use super::joints::path::JointPath;
 use super::moves::Programmed;
 use super::nearest::{step_towards, Found, Place, Search};
+use super::number::Number;
 use super::parallel;
 use super::phase_motion::ROUNDING;
 use super::profile_clock::ProfileClock;
@@ -29,9 +32,6 @@ const MOST_ASTRAY: u32 = 64;
 const MOST_GUESSES: usize = 6;
 const SETTLED: f64 = 1e-7;
 const MOST_ERROR: f64 = 1e-3 * PLACE_TOLERANCE;
-
-/// Setpoints whose places are guessed together.
-const AHEAD: usize = 8;
 
 /// Steps towards the nearest place of a phase.
 const MOST_STEPS: usize = 12;
@@ -125,6 +125,28 @@ fn rounding<const M: usize>(count: usize, magnitude: f64, q: &[f64; M]) -> f64 {
     ROUNDING * most * (count as f64).sqrt()
 }
 
+/// A place on a path, at such a distance from a setpoint and with such a slope, where it is not before `from`, and close.
+fn good_guess(
+    path: &Followed,
+    from: Place,
+    Place { piece, u }: Place,
+    [distance, slope]: [f64; 2],
+    rounding: f64,
+) -> Option<(Place, f64)> {
+    let width = path.width[piece];
+    let least = if piece == from.piece { from.u } else { 0.0 };
+    let u = settled(u, [0.0, width], rounding / slope);
+    let good = from.piece <= piece && least <= u && u <= width && distance <= PLACE_TOLERANCE + rounding;
+    good.then_some((Place { piece, u }, distance))
+}
+
+/// How much more the step du of Newton's method moves the place than the last one may, by its length, where |C'| has this size, and by
+/// the error after it, where |C''| is at most `bend`.
+#[inline(always)]
+fn is_last<T: Number>(du: T, size: T, bend: f64) -> [T; 2] {
+    [du.size() * size + -SETTLED, du * du * (1.5 * bend) + -MOST_ERROR]
+}
+
 /// The place u of a piece, or its end where rounding does not tell it from there: the profile may pause at ends.
 fn settled(u: f64, ends: [f64; 2], rounding: f64) -> f64 {
     ends.into_iter().find(|end| (end - u).abs() <= rounding).unwrap_or(u)
@@ -139,19 +161,17 @@ struct Finder<'a, const M: usize> {
     columns: Option<Columns<'a, M>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
-    /// Guesses of the places of the next setpoints, the last one first.
+    /// Guesses of the places of the next setpoints, the last one first, and the phase of the last one.
     guesses: Vec<Guess>,
+    phase: usize,
 }
 
-/// The place that a setpoint has where that before it has the place `from` and the step from there to the next one is as expected; and
-/// how far it is from it.
+/// The place of the first one of so many setpoints that are `left`, its distance from there, and |C'| there.
 struct Guess {
-    from: Place,
-    step: f64,
-    /// Of the setpoint, in s.
-    time: f64,
+    left: usize,
     place: Place,
     distance: f64,
+    slope: f64,
 }
 
 impl<'a, const M: usize> Finder<'a, M> {
@@ -162,7 +182,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             None => columns = Some(plan.columns(limits)),
         }
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, columns, reach, guesses: vec![] }
+        Self { plan, limits, profile, columns, reach, guesses: vec![], phase: 0 }
     }
 
     fn columns(&mut self) -> &mut Columns<'a, M> {
@@ -185,7 +205,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             (None, Some(profile)) => profile.place_before(path, row.t - limits.period),
             (None, None) => Place { piece: 0, u: 0.0 },
         };
-        if !(self.is_finite(row) && self.reach.is_finite()) {
+        if !(Self::is_finite(row) && self.reach.is_finite()) {
             return Nearest { place: from, off: f64::INFINITY, ..Nearest::default() };
         }
         let columns = self.columns();
@@ -197,7 +217,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         let close = PLACE_TOLERANCE + rounding;
         let guess = known
             .filter(|_| self.profile.is_some())
-            .and_then(|before| self.next_guess(from, [before.nearest.step, before.nearest.next_step], rows));
+            .and_then(|before| self.next_guess(from, before.nearest.next_step, rows, rounding));
         let mut judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));
             (late - rounding).max(0.0)
@@ -237,42 +257,55 @@ impl<'a, const M: usize> Finder<'a, M> {
         [step, if before > 0.0 { (2.0 * step - before).max(0.0) } else { step }]
     }
 
-    /// The guess of the place of the first one of some setpoints, where that before it is at `from`, after a step of u, with the next
-    /// one.
-    fn next_guess(&mut self, from: Place, steps: [f64; 2], rows: &[Row<M>]) -> Option<(Place, f64)> {
-        let is_next = |guess: &Guess| {
-            guess.from == from && guess.step == steps[1] && guess.time.to_bits() == rows[0].t.to_bits()
-        };
-        if !self.guesses.last().is_some_and(is_next) {
-            self.guess_ahead(from, steps, rows);
+    /// The place of the first one of some setpoints and its distance: from about where the profile is at its time or, where that leads
+    /// nowhere, from the place one more step ahead.
+    fn next_guess(&mut self, from: Place, step: f64, rows: &[Row<M>], rounding: f64) -> Option<(Place, f64)> {
+        if self.guesses.last().is_none_or(|guess| guess.left != rows.len()) {
+            self.guess_at_once(rows);
         }
-        self.guesses.pop().map(|guess| (guess.place, guess.distance))
+        let path = &self.plan.path;
+        let known = self.guesses.pop_if(|guess| guess.left == rows.len());
+        known
+            .and_then(|guess| good_guess(path, from, guess.place, [guess.distance, guess.slope], rounding))
+            .or_else(|| self.guess(from, step, &rows[0].q, rounding))
     }
 
-    /// Guesses the places of some setpoints, each from the one before, and looks at the profile there: at once as long as all are on
-    /// one piece.
-    fn guess_ahead(&mut self, mut from: Place, mut steps: [f64; 2], rows: &[Row<M>]) {
+    /// Guesses the places of those of some setpoints that are on one piece with the first one, and reads the profile there. What is
+    /// guessed of one does not depend on the others.
+    fn guess_at_once(&mut self, rows: &[Row<M>]) {
         self.guesses.clear();
-        let mut before = None;
-        for row in &rows[..rows.len().min(AHEAD)] {
-            let is_near = before.is_none_or(|before| self.are_near(before, row.t));
-            if !(is_near && self.is_finite(row)) {
+        let Some(clock) = &self.plan.profile else { return };
+        let (mut starts, mut q) = ([0.0; at_once::COUNT], [[0.0; at_once::COUNT]; M]);
+        let (mut first, mut count) = (None, 0);
+        for row in rows.iter().take(at_once::COUNT).take_while(|row| Self::is_finite(row)) {
+            let Some((phase, Place { piece, u })) = clock.place_about(self.phase, row.t) else { break };
+            if *first.get_or_insert(piece) != piece {
                 break;
             }
-            let columns = self.columns();
-            let rounding = rounding(columns.count(), columns.magnitude(from.piece), &row.q);
-            let Some((place, distance)) = self.guess(from, steps[1], &row.q, rounding) else { break };
-            let is_same = self.guesses.first().is_none_or(|first| first.place.piece == place.piece);
-            if !is_same {
-                break;
+            (self.phase, starts[count]) = (phase, u);
+            for k in 0..M {
+                q[k][count] = row.q[k];
             }
-            self.guesses.push(Guess { from, step: steps[1], time: row.t, place, distance });
-            (from, steps, before) = (place, self.steps(from, place, steps[0]), Some(row.t));
+            count += 1;
         }
+        let Some(piece) = first else { return };
+        let columns = self.columns();
+        let curve = columns.curve(piece).clone();
+        if !columns.are_axes() || curve.polygon.is_rational() {
+            return;
+        }
+        let found = at_once::nearest(&curve, &starts, &q);
+        self.guesses.extend((0..count).rev().map(|i| Guess {
+            left: rows.len() - i,
+            place: Place { piece, u: found.u[i] },
+            distance: found.distance[i],
+            slope: found.slope[i],
+        }));
+        let (guesses, width) = (&self.guesses, self.plan.path.width[piece]);
         if let Some(profile) = &mut self.profile {
-            profile.look_ahead(self.guesses.iter().map(|guess| guess.place));
+            let places = guesses.iter().rev().map(|guess| guess.place);
+            profile.look_ahead(places.filter(|place| 0.0 <= place.u && place.u <= width));
         }
-        self.guesses.reverse();
     }
 
     /// Whether one setpoint is at most two periods after another.
@@ -280,7 +313,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         (time - before).abs() <= 2.0 * self.limits.period
     }
 
-    fn is_finite(&self, row: &Row<M>) -> bool {
+    fn is_finite(row: &Row<M>) -> bool {
         row.t.is_finite() && row.q.iter().all(|q| q.is_finite())
     }
 
@@ -294,13 +327,11 @@ impl<'a, const M: usize> Finder<'a, M> {
             let Place { piece, u } = place;
             let ([away, slope], bend) = (columns.toward(piece, u, q), columns.bend(piece));
             let (du, size) = (step_towards(&away, &slope), length(&slope));
-            if du.abs() * size <= SETTLED || 1.5 * bend * du * du <= MOST_ERROR {
-                let least = if piece == from.piece { from.u } else { 0.0 };
+            if is_last(du, size, bend).iter().any(|more| *more <= 0.0) {
                 let distance = (inner(&away, &away) - (du * size).powi(2)).max(0.0).sqrt();
-                let u = settled(u + du, [0.0, path.width[piece]], rounding / size);
-                let good = least <= u && u <= path.width[piece] && distance <= PLACE_TOLERANCE + rounding;
-                if good {
-                    return Some((Place { piece, u }, distance));
+                let guess = good_guess(path, from, Place { piece, u: u + du }, [distance, size], rounding);
+                if guess.is_some() {
+                    return guess;
                 }
             }
             let next = place.moved(du, path.width, pieces);
