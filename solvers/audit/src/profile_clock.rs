@@ -116,3 +116,22 @@ impl ProfileClock<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::phases::PARAMETER_ACCELERATION;
+
+    #[test]
+    fn at_constant_acceleration_the_profile_is_where_it_is_about() {
+        // u̇ from 1 to 3 mm/s in 2 s, from the tenth second of the setpoints on.
+        let phases = Phases::of_one(&[PARAMETER_ACCELERATION], &[255], &[1.0], &[0.0, 4.0], &[1.0, 9.0]);
+        let phases = Phases { duration: &[2.0], ..phases };
+        let clock = ProfileClock { phases, starts: &[0.0, 2.0], run_starts: &[10.0] };
+        for from in [0, 7] {
+            for (time, u) in [(9.0, 0.0), (10.0, 0.0), (11.0, 1.5), (12.0, 4.0), (13.0, 4.0)] {
+                assert_eq!(clock.place_about(from, time), Some((0, Place { piece: 0, u })));
+            }
+        }
+    }
+}
