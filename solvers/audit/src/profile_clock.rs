@@ -51,23 +51,26 @@ impl ProfileClock<'_> {
         (!phases.is_empty()).then(|| (phase, time - self.starts[phase]))
     }
 
-    /// About where the profile is at a time: u as a cubic of it, by its ends on the phase. With the phase, which is looked for from
-    /// another one on.
-    pub fn place_about(&self, from: usize, time: f64) -> Option<(usize, Place)> {
-        let (run, phases) = (self.run_of(time), &self.phases);
+    /// The phase that `time` falls into, looked for from another one on.
+    pub fn phase_from(&self, from: usize, time: f64) -> Option<usize> {
+        let run = self.run_of(time);
         let (here, since) = (self.phases_of(run), time - self.shift(run));
         let has_begun = |phase: usize| here.contains(&phase) && self.starts[phase] <= since;
-        let phase = match has_begun(from) && !has_begun(from + NEXT) {
-            true => (from..from + NEXT).rev().find(|&phase| has_begun(phase))?,
-            false => self.phase_of(run, time)?.0,
-        };
-        let (u, duration) = ([phases.u0[phase], phases.u1[phase]], phases.duration[phase]);
-        let x = ((since - self.starts[phase]) / duration).clamp(0.0, 1.0);
+        let near = from..if has_begun(from) { from + NEXT } else { from };
+        let found = near.into_iter().find(|&phase| !has_begun(phase + 1));
+        found.or_else(|| self.phase_of(run, time).map(|(phase, _)| phase))
+    }
+
+    /// About where the profile is at a time, on this phase: u as a cubic of the time, by its ends.
+    pub fn place_about(&self, phase: usize, time: f64) -> Place {
+        let phases = &self.phases;
+        let since = time - self.shift(self.run_of(time)) - self.starts[phase];
+        let (width, duration) = (phases.u1[phase] - phases.u0[phase], phases.duration[phase]);
+        let x = (since / duration).clamp(0.0, 1.0);
         let speeds = [phases.p0[phase].sqrt(), phases.p1[phase].sqrt()].map(|speed| speed * duration);
-        let bend = 3.0 * (u[1] - u[0]) - 2.0 * speeds[0] - speeds[1];
-        let rest = speeds[0] + speeds[1] - 2.0 * (u[1] - u[0]);
-        let about = u[0] + x * (speeds[0] + x * (bend + x * rest));
-        Some((phase, Place { piece: phases.piece[phase] as usize, u: about }))
+        let (bend, rest) = (3.0 * width - 2.0 * speeds[0] - speeds[1], speeds[0] + speeds[1] - 2.0 * width);
+        let u = phases.u0[phase] + x * (speeds[0] + x * (bend + x * rest));
+        Place { piece: phases.piece[phase] as usize, u }
     }
 
     /// The start of the phase that `time` falls into.
@@ -130,7 +133,8 @@ mod tests {
         let clock = ProfileClock { phases, starts: &[0.0, 2.0], run_starts: &[10.0] };
         for from in [0, 7] {
             for (time, u) in [(9.0, 0.0), (10.0, 0.0), (11.0, 1.5), (12.0, 4.0), (13.0, 4.0)] {
-                assert_eq!(clock.place_about(from, time), Some((0, Place { piece: 0, u })));
+                assert_eq!(clock.phase_from(from, time), Some(0));
+                assert_eq!(clock.place_about(0, time), Place { piece: 0, u });
             }
         }
     }

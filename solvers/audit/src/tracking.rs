@@ -14,6 +14,7 @@ use super::nearest::{step_towards, Found, Place, Search};
 use super::number::Number;
 use super::parallel;
 use super::phase_motion::ROUNDING;
+use super::phases::SPEED_CUBIC;
 use super::profile_clock::ProfileClock;
 use super::profile_reader::Reader;
 use super::rows::{Nearest, Row};
@@ -161,6 +162,8 @@ struct Finder<'a, const M: usize> {
     columns: Option<Columns<'a, M>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
+    /// Whether the profile has phases on which v² is a cubic of the length.
+    is_by_length: bool,
     /// Guesses of the places of the next setpoints, the last one first, and the phase of the last one.
     guesses: Vec<Guess>,
     phase: usize,
@@ -181,8 +184,9 @@ impl<'a, const M: usize> Finder<'a, M> {
             Some(clock) => profile = Some(Reader::new(clock, plan.columns(limits))),
             None => columns = Some(plan.columns(limits)),
         }
+        let is_by_length = plan.profile.is_some_and(|clock| clock.phases.kind.contains(&SPEED_CUBIC));
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, columns, reach, guesses: vec![], phase: 0 }
+        Self { plan, limits, profile, columns, reach, is_by_length, guesses: vec![], phase: 0 }
     }
 
     fn columns(&mut self) -> &mut Columns<'a, M> {
@@ -274,15 +278,18 @@ impl<'a, const M: usize> Finder<'a, M> {
     /// guessed of one does not depend on the others.
     fn guess_at_once(&mut self, rows: &[Row<M>]) {
         self.guesses.clear();
-        let Some(clock) = &self.plan.profile else { return };
+        let Some(clock) = self.plan.profile.as_ref().filter(|_| self.is_by_length) else { return };
         let (mut starts, mut q) = ([0.0; at_once::COUNT], [[0.0; at_once::COUNT]; M]);
         let (mut first, mut count) = (None, 0);
         for row in rows.iter().take(at_once::COUNT).take_while(|row| Self::is_finite(row)) {
-            let Some((phase, Place { piece, u })) = clock.place_about(self.phase, row.t) else { break };
-            if *first.get_or_insert(piece) != piece {
+            let Some(phase) = clock.phase_from(self.phase, row.t) else { break };
+            self.phase = phase;
+            // On other phases the places follow each other more evenly, and the profile is not read at once.
+            let piece = clock.phases.piece[phase] as usize;
+            if clock.phases.kind[phase] != SPEED_CUBIC || *first.get_or_insert(piece) != piece {
                 break;
             }
-            (self.phase, starts[count]) = (phase, u);
+            starts[count] = clock.place_about(phase, row.t).u;
             for k in 0..M {
                 q[k][count] = row.q[k];
             }

@@ -37,6 +37,7 @@ use crate::phase_motion::at_once::{Moments, TIMES};
 use crate::phase_motion::{PhaseMotion, Rates, State};
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::{Phase, Phases};
 
 /// An end is at rest when its p is 0, whatever the phase's law, because a ramp may be too short for its places to show it;
@@ -239,7 +240,7 @@ impl<const M: usize> Sampler<M> {
     fn fill_by_time(&self, mut part: Slices<M>, watch: Watch) -> Effort {
         let mut effort = Effort::default();
         let mut cursor = self.cursor();
-        // Setpoints in motion on one piece: their numbers, their phases, and the times since these began.
+        // Setpoints on one piece where v² is a cubic of the length: their numbers, their phases, and the times since these began.
         let mut moving: Vec<(usize, usize, f64)> = Vec::with_capacity(TIMES);
         let mut i = 0;
         while i < part.t.len() {
@@ -261,17 +262,36 @@ impl<const M: usize> Sampler<M> {
                     continue;
                 };
                 let phase = cursor.find(&run.phases, time);
+                let setpoint = (i, phase, time - self.starts[phase]);
+                if self.phases.kind[phase] != PhaseLaw::SpeedCubic as u8 {
+                    self.fill_alone(&mut part, setpoint, &mut cursor, &mut effort);
+                    continue;
+                }
                 let is_on = |first: usize| self.phases.piece[first] == self.phases.piece[phase];
                 if moving.len() == TIMES || moving.first().is_some_and(|&(_, first, _)| !is_on(first)) {
                     self.fill_at_once(&mut part, &moving, &mut cursor, &mut effort);
                     moving.clear();
                 }
-                moving.push((i, phase, time - self.starts[phase]));
+                moving.push(setpoint);
             }
             i = stop;
         }
         self.fill_at_once(&mut part, &moving, &mut cursor, &mut effort);
         effort
+    }
+
+    /// Fills in a setpoint in motion.
+    fn fill_alone(
+        &self,
+        part: &mut Slices<M>,
+        (i, phase, t): (usize, usize, f64),
+        cursor: &mut Cursor<'_, M>,
+        effort: &mut Effort,
+    ) {
+        cursor.enter(phase);
+        let state = cursor.motion().at_time(t, self.period);
+        effort.raise(state.iterations, state.error * self.phases.duration[phase] / self.period);
+        self.set(part, i, phase, cursor.motion(), &state);
     }
 
     /// Fills in setpoints in motion on one piece, no more than are looked at at once.
@@ -289,17 +309,14 @@ impl<const M: usize> Sampler<M> {
         }
         let piece = cursor.piece(self.phases.piece[first]);
         let moments = Moments::new(&piece, &times[..moving.len()], self.period);
-        for (lane, &(i, phase, t)) in moving.iter().enumerate() {
-            let of_period = self.phases.duration[phase] / self.period;
-            if let Some(moment) = moments.as_ref().and_then(|moments| moments.get(lane)) {
-                effort.raise(moment.iterations, moment.error * of_period);
-                self.set_sample(part, i, phase, moment.u, (moment.position, moment.rates));
-            } else {
-                cursor.enter(phase);
-                let state = cursor.motion().at_time(t, self.period);
-                effort.raise(state.iterations, state.error * of_period);
-                self.set(part, i, phase, cursor.motion(), &state);
-            }
+        for (lane, &setpoint) in moving.iter().enumerate() {
+            let Some(moment) = moments.as_ref().and_then(|moments| moments.get(lane)) else {
+                self.fill_alone(part, setpoint, cursor, effort);
+                continue;
+            };
+            let (i, phase, _) = setpoint;
+            effort.raise(moment.iterations, moment.error * self.phases.duration[phase] / self.period);
+            self.set_sample(part, i, phase, moment.u, (moment.position, moment.rates));
         }
     }
 
