@@ -10,6 +10,8 @@ const PER = { velocity: "s", acceleration: "s²", jerk: "s³" };
 const HEIGHT = { speed: 120, others: 150 };
 /* The legend of so many axes is beside their limits; that of more is below them. */
 const MOST_BESIDE = 3;
+/* Values below this part of the limit are rounding. */
+const ROUNDING = 1e-6;
 
 export class AxesPlot {
   /* `rows` are names of quantities; with `relative` values are drawn over their limits. */
@@ -57,12 +59,14 @@ export class AxesPlot {
     this.show();
   }
 
-  /* A quantity that the method does not limit may have single high spikes: they are cut at the top of the chart. */
+  /* A quantity that the method does not limit may have single high spikes: they are cut at the top of the chart, which is
+     not below the machine's limit. What is 0 but for rounding has the scale of the limit. */
   #reach(name, curve, k) {
-    const top = greatest(curve.y);
+    const top = greatest(curve.y), limit = this.data.limits[name][k] || 0;
     if (this.data.judged.includes(name)) return top;
+    if (top <= ROUNDING * limit) return limit;
     const sorted = Float32Array.from(curve.y, Math.abs).sort();
-    const common = 2 * (sorted[Math.floor(0.98 * sorted.length)] || 0);
+    const common = Math.max(2 * (sorted[Math.floor(0.98 * sorted.length)] || 0), limit);
     return common > 0 ? Math.min(top, common) : top;
   }
 
@@ -110,7 +114,8 @@ function told({ axes, units, limits, least }, name, isJudged) {
   if (!known.length) return "";
   // A unit is told once, after the last of the axes in a row that have it.
   const list = known.map(({ text, unit }, k) => (known[k + 1]?.unit === unit ? text : `${text} ${unit}`)).join(", ");
-  return isJudged ? `limits ${list}` : `not limited by this method (machine: ${list})`;
+  if (isJudged) return `limits ${list}`;
+  return `between jumps of acceleration; not limited by this method (machine: ${list})`;
 }
 
 function heading(name, unit, note) {
