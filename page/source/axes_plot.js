@@ -114,8 +114,7 @@ function told({ axes, units, limits, least }, name, isJudged) {
   if (!known.length) return "";
   // A unit is told once, after the last of the axes in a row that have it.
   const list = known.map(({ text, unit }, k) => (known[k + 1]?.unit === unit ? text : `${text} ${unit}`)).join(", ");
-  if (isJudged) return `limits ${list}`;
-  return `between jumps of acceleration; not limited by this method (machine: ${list})`;
+  return isJudged ? `limits ${list}` : `not limited by this method (machine: ${list})`;
 }
 
 function heading(name, unit, note) {
