@@ -71,8 +71,8 @@ def tolerance_text(least: float, greatest: float, unit: str = "mm") -> str:
 
 
 def distance_text(distance: float, unit: str = "mm", form: str = ".3g") -> str:
-    """A small distance: `9.39 µm` for millimetres, `0.00939 rad` for others."""
-    return f"{1e3 * distance:{form}} µm" if unit == "mm" else f"{distance:{form}} {unit}"
+    """A small distance: `9.39 µm` for millimetres, to a tenth of a nanometre, `0.00939 rad` for others."""
+    return f"{round(1e3 * distance, 4) + 0.0:{form}} µm" if unit == "mm" else f"{distance:{form}} {unit}"
 
 
 def ratio_text(number: float, other: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from feedplan.units import duration_text
+from feedplan.units import distance_text, duration_text
 
 
 @pytest.mark.parametrize(
@@ -24,3 +24,10 @@ from feedplan.units import duration_text
 )
 def test_a_duration_never_shows_sixty_seconds(seconds: float, text: str) -> None:
     assert duration_text(seconds) == text
+
+
+def test_a_distance_is_told_to_a_tenth_of_a_nanometre() -> None:
+    assert distance_text(0.00939) == "9.39 µm"
+    assert distance_text(1.4e-8) == "0 µm"
+    assert distance_text(-1e-11, form="+.3g") == "+0 µm"
+    assert distance_text(1.4e-8, "rad") == "1.4e-08 rad"

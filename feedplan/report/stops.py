@@ -15,8 +15,8 @@ from feedplan.report.activity import ACTIVE, Activity
 ENDS = "start and end"
 TURN_BACK = "turning back"
 CORNER = "corner that cannot be rounded"
-EXACT_CORNER = "corner on the exact path (G61)"
-CONTROL = "change between G64 and G61 or G61.1"
+EXACT_CORNER = "corner on the exact path (G61, cycles)"
+CONTROL = "change between G64 and the exact path (G61, G61.1, cycles)"
 OTHER = "other"
 _ASKED = {
     StopCause.TOOL: "tool change (M6)",

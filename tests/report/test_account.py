@@ -111,9 +111,9 @@ def test_stops_are_counted_by_cause() -> None:
         "tool change (M6)": 1,
         "spindle, coolant and the like": 1,
         "exact stop (G61.1)": 2,
-        "corner on the exact path (G61)": 2,
+        "corner on the exact path (G61, cycles)": 2,
         "turning back": 1,
-        "change between G64 and G61 or G61.1": 1,
+        "change between G64 and the exact path (G61, G61.1, cycles)": 1,
         "start and end": 2,
     }
     by_cause = {row.cause: row for row in made.account.stops}
@@ -154,7 +154,7 @@ def test_the_page_the_table_and_plan_json_say_the_same(tmp_path: Path, capsys: A
     assert rows["length"].startswith("60.000 mm")
     assert rows["rapid"].endswith(", 10 mm")
     assert rows["limits"].startswith("feed ")
-    assert "1 × corner on the exact path (G61)" in rows["stops"]
+    assert "1 × corner on the exact path (G61, cycles)" in rows["stops"]
     assert rows["tolerance"] == "0.001 mm"
     assert sorted(file.name for file in out.iterdir()) == ["plan.json", "report.html"]
     summary = json.loads((out / "plan.json").read_text())
