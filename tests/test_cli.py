@@ -202,6 +202,13 @@ def test_bad_usage_is_one_sentence_and_exits_2(arguments: list[str], words: str,
     assert_one_sentence(err, words)
 
 
+def test_a_word_of_a_program_is_no_option(tmp_path: Path, capsys: Any) -> None:
+    file = tmp_path / "own.ngc"
+    file.write_text("G21 F100\nG1 X[#<tool_table>]\nM2\n")
+    assert main(["plan", str(file)]) == 2
+    assert "parameter #<tool_table> is used" in capsys.readouterr().err
+
+
 SQUARE = "G21 G90\nG61\nF3000\nG1 X20\nG1 Y20\nG1 X0\nG1 Y0\nM2\n"
 
 

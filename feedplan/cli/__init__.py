@@ -25,7 +25,7 @@ from feedplan.cli.machines import machines
 from feedplan.cli.plan import plan
 from feedplan.cli.serve import serve
 from feedplan.cli.time import time
-from feedplan.errors import FeedplanError, InfeasibleError, SolverError
+from feedplan.errors import FeedplanError, InfeasibleError, InputError, SolverError
 
 _TRACEBACK = "FEEDPLAN_TRACEBACK"
 
@@ -75,7 +75,8 @@ def _explained(error: Exception) -> tuple[str, int]:
     if isinstance(error, (InfeasibleError, SolverError)):
         return str(error), BROKEN
     if isinstance(error, FeedplanError):
-        return _by_option(str(error)), BAD_INPUT
+        # Programs and machine files have words of their own.
+        return _by_option(str(error)) if type(error) is InputError else str(error), BAD_INPUT
     if isinstance(error, MemoryError):
         return "the memory of this computer does not suffice: split the program", BAD_INPUT
     what = f"this is a defect in feedplan ({type(error).__name__}: {error})"
