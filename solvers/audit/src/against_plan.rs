@@ -7,11 +7,12 @@ use super::curve::sagitta;
 use super::deviation::{allowed, enough, settled, window};
 use super::nearest::Place;
 use super::neighbours::Neighbours;
+use super::number::inner;
 use super::profile_reader::ACCELERATION_SHARE;
 use super::rows::Row;
 use super::setpoints::at_once::COUNT;
 use super::tracking::{is_step, Plan};
-use super::vectors::{distance, from_to, inner, length, vector_of, Segment};
+use super::vectors::{distance, from_to, length, vector_of, Segment};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.

@@ -5,7 +5,7 @@
 use std::rc::Rc;
 
 use super::hodographs::Hodographs;
-use super::number::{self, Number};
+use super::number::{inner, scaled, Number};
 use super::polygon::Polygon;
 use super::vectors::{curvature, length, vector, vector_of};
 
@@ -318,7 +318,7 @@ impl<const M: usize> Curve<M> {
     pub fn polynomial_speed<T: Number>(&self, u: T) -> T {
         let (t, rest) = self.parts(u);
         let slope = scaled(self.hodographs.polynomial_slope(t, rest), self.per_width);
-        number::inner(&slope, &slope).root()
+        inner(&slope, &slope).root()
     }
 
     /// What the rounding of the first three derivatives is relative to.
@@ -395,14 +395,6 @@ impl<const M: usize> Curve<M> {
 #[inline(always)]
 pub fn sagitta(bend: f64, step: f64) -> f64 {
     0.125 * bend * step * step
-}
-
-#[inline(always)]
-fn scaled<const M: usize, T: Number>(mut derivative: [T; M], scale: f64) -> [T; M] {
-    for k in 0..M {
-        derivative[k] = derivative[k] * scale;
-    }
-    derivative
 }
 
 /// Derivatives by t to those by u.

@@ -3,8 +3,9 @@
 //! A first difference over its time is a mean velocity, a second difference a mean acceleration: where one
 //! exceeds a limit the motion does. A position is known to `EPS` of its magnitude and a time to `EPS` of its own.
 
+use super::number::inner;
 use super::rows::Row;
-use super::vectors::{from_to, inner, length, vector_of};
+use super::vectors::{from_to, length, vector_of};
 use super::{Limits, EPS, PASS_EXCESS, PASS_MARK, ROUNDINGS};
 
 /// Consecutive setpoints.

@@ -5,9 +5,9 @@
 
 use fearless_simd::{dispatch, Level};
 
-use super::number::Number;
+use super::number::{inner, Number};
 use super::polygon::{Polygon, MOST};
-use super::vectors::{from_to, inner, length, vector_of};
+use super::vectors::{from_to, length, vector_of};
 
 /// Coefficients of a function of the piece, times binomials.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];

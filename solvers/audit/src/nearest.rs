@@ -1,7 +1,8 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
 use super::curve::{Curve, Followed};
-use super::vectors::{distance, inner};
+use super::number::inner;
+use super::vectors::distance;
 
 /// Pieces that one step passes: where a piece has no direction steps are of any length.
 const MOST_PASSED: usize = 8;

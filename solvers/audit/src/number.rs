@@ -85,3 +85,12 @@ pub fn inner<const M: usize, T: Number>(a: &[T; M], b: &[T; M]) -> T {
     }
     sum
 }
+
+/// The vector times a factor.
+#[inline(always)]
+pub fn scaled<const M: usize, T: Number + Mul<S, Output = T>, S: Copy>(mut a: [T; M], factor: S) -> [T; M] {
+    for k in 0..M {
+        a[k] = a[k] * factor;
+    }
+    a
+}

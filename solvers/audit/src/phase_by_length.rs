@@ -3,6 +3,7 @@
 //! Speed v, acceleration a and jerk j along the path come from the length (`speed_by_length`), the length from Kronrod's rule
 //! over |C'|; the rates of the axes from both and the place (`station`).
 
+use super::number::inner;
 use std::rc::Rc;
 
 use super::bulge::{bulge, Bulge, Known};
@@ -10,7 +11,6 @@ use super::curve::Curve;
 use super::quadrature::{gauss, kronrod_halves, MOST_HALVINGS, RULES_AGREE};
 use super::speed_by_length::{Pace, SpeedByLength};
 use super::station::Station;
-use super::vectors::inner;
 use super::{EPS, ROUNDINGS};
 
 /// An interval on which the rule is good: the distance of its start from the anchor and the length up to there, and the same of

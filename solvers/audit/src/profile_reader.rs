@@ -33,7 +33,7 @@ pub struct Reader<'a, const M: usize> {
     motion: (usize, Motion<M>),
     /// Where it was last.
     last: Option<(Place, Passage<M>)>,
-    /// Where it goes next, the last of these places first, and on which phases these are.
+    /// The places that come next, the last one first; the phase of each, and what the profile does there.
     ahead: Vec<(Place, usize, Passage<M>)>,
 }
 

@@ -6,7 +6,7 @@
 //! q_sss = (C''' − 3 C''ₜ/g (C'' − C''ₜ T) − (C'''ₜ + |C'' − C''ₜ T|²/g) T)/g³.
 
 use super::curve::Curve;
-use super::number::{inner, Number};
+use super::number::{inner, scaled, Number};
 use super::speed_by_length::Pace;
 use super::vectors::vector_of;
 use super::{EPS, ROUNDINGS};
@@ -128,20 +128,12 @@ impl<const M: usize, T: Number> Station<M, T> {
 
     #[inline(always)]
     pub fn velocity(&self, v: T) -> [T; M] {
-        let mut velocity = self.first;
-        for k in 0..M {
-            velocity[k] = self.first[k] * v;
-        }
-        velocity
+        scaled(self.first, v)
     }
 
     #[inline(always)]
     pub fn acceleration(&self, Pace { v, a, .. }: Pace<T>) -> [T; M] {
-        let (square, mut acceleration) = (v * v, self.first);
-        for k in 0..M {
-            acceleration[k] = self.first[k] * a + self.second[k] * square;
-        }
-        acceleration
+        combined([&self.first, &self.second], [a, v * v])
     }
 }
 
@@ -181,20 +173,12 @@ impl<const M: usize, T: Number> Roundings<M, T> {
 
     #[inline(always)]
     pub fn velocity(&self, v: T) -> [T; M] {
-        let mut velocity = self.first;
-        for k in 0..M {
-            velocity[k] = self.first[k] * v;
-        }
-        velocity
+        scaled(self.first, v)
     }
 
     #[inline(always)]
     pub fn acceleration(&self, Pace { v, a, .. }: Pace<T>) -> [T; M] {
-        let (size, square, mut acceleration) = (a.size(), v * v, self.first);
-        for k in 0..M {
-            acceleration[k] = self.first[k] * size + self.second[k] * square;
-        }
-        acceleration
+        combined([&self.first, &self.second], [a.size(), v * v])
     }
 }
 
@@ -229,6 +213,16 @@ impl<const M: usize> Roundings<M> {
         let (size, mixed, cube) = (j.abs(), (3.0 * v * a).abs(), v * v * v);
         vector_of(|k| self.first[k] * size + self.second[k] * mixed + self.third[k] * cube)
     }
+}
+
+/// The sum of two vectors times their factors.
+#[inline(always)]
+fn combined<const M: usize, T: Number>([a, b]: [&[T; M]; 2], [by_a, by_b]: [T; 2]) -> [T; M] {
+    let mut sum = *a;
+    for k in 0..M {
+        sum[k] = a[k] * by_a + b[k] * by_b;
+    }
+    sum
 }
 
 #[cfg(test)]

@@ -11,14 +11,14 @@ use super::curve::Followed;
 use super::joints::path::JointPath;
 use super::moves::Programmed;
 use super::nearest::{step_towards, Found, Place, Search};
-use super::number::Number;
+use super::number::{inner, Number};
 use super::parallel;
 use super::phase_motion::ROUNDING;
 use super::phases::SPEED_CUBIC;
 use super::profile_clock::ProfileClock;
 use super::profile_reader::Reader;
 use super::rows::{Nearest, Row};
-use super::vectors::{inner, length};
+use super::vectors::length;
 use super::{tell, Limits, Seen, PLACE_TOLERANCE};
 
 /// Setpoints a thread takes at a time.
@@ -141,10 +141,10 @@ fn good_guess(
     good.then_some((Place { piece, u }, distance))
 }
 
-/// How much more the step du of Newton's method moves the place than the last one may, by its length, where |C'| has this size, and by
-/// the error after it, where |C''| is at most `bend`.
+/// By how much a step du of Newton's method is too great to be the last one, in mm: its length, where |C'| is `size`, and the error that
+/// it leaves, where |C''| is at most `bend`. The step is the last one where one of both is not positive.
 #[inline(always)]
-fn is_last<T: Number>(du: T, size: T, bend: f64) -> [T; 2] {
+fn beyond_last<T: Number>(du: T, size: T, bend: f64) -> [T; 2] {
     [du.size() * size + -SETTLED, du * du * (1.5 * bend) + -MOST_ERROR]
 }
 
@@ -202,7 +202,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         let (path, limits, row) = (&self.plan.path, self.limits, &rows[0]);
         // From the place of the setpoint before; where that is not good, from the profile's place one period earlier.
         let known = previous.filter(|before| {
-            self.profile.is_none() || (before.nearest.is_good() && self.are_near(before.t, row.t))
+            self.profile.is_none()
+                || (before.nearest.is_good() && (row.t - before.t).abs() <= 2.0 * limits.period)
         });
         let from = match (known, &self.plan.profile) {
             (Some(row), _) => row.nearest.place,
@@ -315,11 +316,6 @@ impl<'a, const M: usize> Finder<'a, M> {
         }
     }
 
-    /// Whether one setpoint is at most two periods after another.
-    fn are_near(&self, before: f64, time: f64) -> bool {
-        (time - before).abs() <= 2.0 * self.limits.period
-    }
-
     fn is_finite(row: &Row<M>) -> bool {
         row.t.is_finite() && row.q.iter().all(|q| q.is_finite())
     }
@@ -334,7 +330,7 @@ impl<'a, const M: usize> Finder<'a, M> {
             let Place { piece, u } = place;
             let ([away, slope], bend) = (columns.toward(piece, u, q), columns.bend(piece));
             let (du, size) = (step_towards(&away, &slope), length(&slope));
-            if is_last(du, size, bend).iter().any(|more| *more <= 0.0) {
+            if beyond_last(du, size, bend).iter().any(|more| *more <= 0.0) {
                 let distance = (inner(&away, &away) - (du * size).powi(2)).max(0.0).sqrt();
                 let guess = good_guess(path, from, Place { piece, u: u + du }, [distance, size], rounding);
                 if guess.is_some() {

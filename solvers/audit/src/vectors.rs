@@ -1,4 +1,6 @@
-//! Vectors of M numbers, one an axis: length, inner product, distance, curvature, and straight lines between two points.
+//! Vectors of M numbers, one an axis: length, distance, curvature, and straight lines between two points.
+
+use super::number::inner;
 
 /// Row `i` of a table with a column for each axis.
 #[inline(always)]
@@ -27,16 +29,6 @@ pub fn vector_of<const M: usize>(number: impl Fn(usize) -> f64) -> [f64; M] {
 #[inline(always)]
 pub fn length<const M: usize>(a: &[f64; M]) -> f64 {
     inner(a, a).sqrt()
-}
-
-/// Inner product of two vectors.
-#[inline(always)]
-pub fn inner<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
-    let mut sum = 0.0;
-    for k in 0..M {
-        sum += a[k] * b[k];
-    }
-    sum
 }
 
 /// The products by axis.

@@ -2,7 +2,8 @@
 //! nearly straight.
 
 use super::{Local, Polygon};
-use crate::vectors::{distance, inner, length};
+use crate::number::inner;
+use crate::vectors::{distance, length};
 
 /// Halvings of a piece, at most, until its parts are nearly straight: in a sharp turn the distance from a place that is
 /// passed twice falls, rises and falls again. Parts shorter than this, in mm or as a part of the whole, are not halved.

@@ -13,7 +13,7 @@ use crate::bulge::{bulge, Bulge, Known};
 use crate::chord::chord_error;
 use crate::columns::{Columns, RATES};
 use crate::curve::Curve;
-use crate::number::Number;
+use crate::number::{inner, Number};
 use crate::speed_by_length::{cubic_bounds, is_same_speed, Pace, SpeedByLength};
 use crate::{Check, Limits, Tally, FEEDS};
 
@@ -573,15 +573,6 @@ fn of_each<S: Simd, T>(simd: S, of: &[T; PHASES], number: impl Fn(&T) -> f64) ->
         lanes[i] = number(&of[i]);
     }
     f64x8::from_slice(simd, &lanes)
-}
-
-#[inline(always)]
-fn inner<const M: usize, S: Simd>(a: &[f64x8<S>; M], b: &[f64x8<S>; M]) -> f64x8<S> {
-    let mut sum = a[0] * b[0];
-    for k in 1..M {
-        sum += a[k] * b[k];
-    }
-    sum
 }
 
 #[inline(always)]

@@ -3,7 +3,7 @@
 
 use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
-use super::{is_last, MOST_GUESSES};
+use super::{beyond_last, MOST_GUESSES};
 use crate::curve::Curve;
 use crate::number::inner;
 
@@ -40,7 +40,7 @@ fn look<const M: usize, S: Simd>(simd: S, curve: &Curve<M>, u: &Lanes, q: &[Lane
         }
         let size_sq = inner(&tangent, &tangent);
         let (du, size) = (inner(&away, &tangent) / size_sq, size_sq.sqrt());
-        let [by_length, by_error] = is_last(du, size, bend);
+        let [by_length, by_error] = beyond_last(du, size, bend);
         let is_new = (by_length.simd_le(nothing) | by_error.simd_le(nothing)) & !is_found;
         place = is_new.select(u + du, place);
         distance_sq = is_new.select(inner(&away, &away) - du * size * (du * size), distance_sq);
