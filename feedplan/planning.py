@@ -418,10 +418,10 @@ def plan(
         followed = source
     else:
         report("read", 0.0)
-        with _timed(compute, "read"):
-            if isinstance(source, Program):
-                program = source
-            else:
+        if isinstance(source, Program):
+            program = source
+        else:
+            with _timed(compute, "read"):
                 program = read_program(
                     source,
                     machine,

@@ -1,4 +1,4 @@
-"""The time of a plan of a whole program, with its pauses."""
+"""The time of a plan of a whole program, with its pauses; and the computing time of its stages."""
 
 from __future__ import annotations
 
@@ -59,3 +59,9 @@ def test_the_audit_expects_the_pause_before_the_first_move(planned: dict[str, Pl
     slow = late.setpoints(period=0.0037)
     assert audit(late.problem, late.profile, MILL.with_period(0.0037), late.program, slow).ok
     assert np.isclose(slow.duration, late.time, atol=3 * 0.0037)
+
+
+def test_the_time_of_reading_is_told_where_the_plan_reads(planned: dict[str, Plan]) -> None:
+    prompt = planned["prompt"]
+    assert list(prompt.compute)[:3] == ["read", "fit", "plan"]
+    assert list(plan(prompt.program, MILL).compute)[:2] == ["fit", "plan"]

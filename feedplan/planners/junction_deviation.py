@@ -56,8 +56,8 @@ def plan(
     max_velocity: float | None = None,
     max_acceleration: float | None = None,
 ) -> SpeedProfile:
-    """The fastest trapezoids with corners by `deviation` [mm], or by `square_corner_velocity` [mm/s], or by
-    `axis_jumps` [mm/s] of X, Y and Z.
+    """The fastest trapezoids with corners by `square_corner_velocity` [mm/s] or by `axis_jumps` [mm/s] of X,
+    Y and Z if one of these is given, else by `deviation` [mm].
 
     `blocks` are held at once, the one in motion among them (None: all). Arcs are chopped into lines within
     `arc_tolerance` [mm], or of the length `arc_segment` [mm]. `short_lines` is the limit of speed

@@ -120,6 +120,13 @@ def test_words_of_extruders_are_left_out_with_a_warning() -> None:
     assert sum("they move an extruder, which is not planned" in warning for warning in program.warnings) == 1
 
 
+def test_words_of_offsets_that_no_code_uses_are_left_out_with_a_warning() -> None:
+    program = read_gcode("G21 G90\nT1 D1\nG1 X5 D2 F600\nG83 X6 Z-3 R1 Q1 D0.2\nG80\nG96 S100 D900\nM2\n")
+    (warning,) = program.warnings
+    assert warning.startswith("line 2: the words D that stand alone are left out")
+    assert program.target[0, 0] == 5
+
+
 def test_a_feed_may_be_given_for_moves_before_the_first_f() -> None:
     with pytest.raises(ProgramError, match=r"no feed: give F before .* \(--feed\)"):
         read_gcode("G21 G1 X1\nM2\n")

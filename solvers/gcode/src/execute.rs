@@ -60,7 +60,7 @@ impl Interpreter<'_> {
         let vector = self.state.coordinate_mode == CoordinateMode::Vector;
         let motion = motion_of(block, axes, self.state.motion, vector)?;
         let directed = takes_direction(block, self.state.coordinate_mode, motion);
-        check_use(block, axes, motion, self.state.absolute, directed)?;
+        let left_out = check_use(block, axes, motion, self.state.absolute, directed)?;
         self.check_coordinate_mode(block, motion)?;
         let motion = motion.filter(|_| !self.switches_look_ahead(block, motion));
 
@@ -68,6 +68,7 @@ impl Interpreter<'_> {
             return fault!("a corner ,C or ,R stands behind no straight move: give G1 and its place");
         }
         self.set_feed_and_speed(block)?;
+        self.warn_of(left_out);
         self.switch(block)?;
         if block.code(Group::Once) == Some(40) {
             self.pause(block, axes)?;
@@ -179,16 +180,26 @@ impl Interpreter<'_> {
         Ok(())
     }
 
+    /// Warns of the words that no code of their block uses and that are left out.
+    #[inline]
+    fn warn_of(&mut self, left_out: u32) {
+        if left_out & bit(b'E') != 0 {
+            self.warn_once(Topic::Extruder, || {
+                "the words E are left out: they move an extruder, which is not planned".into()
+            });
+        }
+        if left_out & bit(b'D') != 0 {
+            self.warn_once(Topic::Diameter, || {
+                "the words D that stand alone are left out: give D in the block of its G41 or G42".into()
+            });
+        }
+    }
+
     /// T, and M codes that switch something, with a stop of the tool where they need one.
     fn switch(&mut self, block: &Block) -> Outcome<()> {
         let change = block.m_code(MGroup::ToolChange);
         if change.is_some() || block.has(b'T') {
             self.set_tool(block, change)?;
-        }
-        if block.has(b'E') && block.m_code(MGroup::Output).is_none() {
-            self.warn_once(Topic::Extruder, || {
-                "the words E are left out: they move an extruder, which is not planned".into()
-            });
         }
         let known = [MGroup::ToolChange, MGroup::Spindle, MGroup::Coolant, MGroup::Output, MGroup::User];
         let codes = known.into_iter().filter_map(|group| block.m_code(group));

@@ -3,8 +3,11 @@
 use super::block::{bit, bits, g_name, Block, Group, MGroup, AXES, AXIS_WORDS};
 use super::fault::Outcome;
 
-/// Words that need no code in their block. D names a tool, which G41 and G42 use.
-pub const FREE_WORDS: u32 = bits(b"FSTD");
+/// Words that need no code in their block.
+pub const FREE_WORDS: u32 = bits(b"FST");
+
+/// Words that programs have where no code uses them: of extruders, and of offsets that other controls keep.
+const LEFT_OUT: u32 = bits(b"DE");
 
 /// Words of G2 and G3 beside the axes.
 pub const ARC_WORDS: u32 = bits(b"IJKRP");
@@ -85,28 +88,30 @@ fn words_of(code: u16) -> u32 {
         52 => bits(b"PL"),
         62 => bits(b"PKRQ"),
         100 => bits(b"PLRQIJ"),
-        411 | 421 => bits(b"L"),
+        411 | 421 => bits(b"DL"),
         // Older controls of Fanuc have one number for lengths and radii, also beside G41 and G42.
-        410 | 420 | 430 | 432 | 434 | 435 | 490 => bits(b"H"),
+        410 | 420 => bits(b"DH"),
+        430 | 432 | 434 | 435 | 490 => bits(b"H"),
         541 | 1540 => bits(b"P"),
         640 => bits(b"PQ"),
         680 => bits(b"R"),
-        730 | 830 => bits(b"RLQP"),
+        730 | 830 => bits(b"RLQPD"),
         740 | 810 | 820 | 840 | 850 | 860 | 890 => bits(b"RLP"),
         760 => bits(b"PIJKRQHELD"),
+        960 => bits(b"D"),
         _ => 0,
     }
 }
 
-/// Refuses a word that no code of the block uses: it would be a misunderstanding. With `directed`, I, J, K are the tool's
-/// direction.
+/// Refuses a word that no code of the block uses: it would be a misunderstanding. Returns those that are left out. With
+/// `directed`, I, J, K are the tool's direction.
 pub fn check_use(
     block: &Block,
     axes: u32,
     motion: Option<u16>,
     absolute: bool,
     directed: bool,
-) -> Outcome<()> {
+) -> Outcome<u32> {
     let mut used = FREE_WORDS | axes | if directed { bits(b"IJK") } else { 0 };
     for code in block.codes().chain(motion) {
         used |= words_of(code);
@@ -128,9 +133,10 @@ pub fn check_use(
     if block.m_code(MGroup::Override).is_some() {
         used |= bit(b'P');
     }
-    let unused = block.words & !used & !bit(b'E');
+    let left_out = block.words & !used & LEFT_OUT;
+    let unused = block.words & !used & !LEFT_OUT;
     if unused == 0 {
-        return check_together(block, motion, absolute);
+        return check_together(block, motion, absolute).map(|()| left_out);
     }
     let letter = b'A' + unused.trailing_zeros() as u8;
     let remedy = match (letter, motion) {

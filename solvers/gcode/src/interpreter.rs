@@ -58,6 +58,7 @@ pub(super) enum Topic {
     NoToolLength,
     LongDwell,
     Extruder,
+    Diameter,
     CycleDwell,
     Retract,
     LookAhead,
