@@ -88,8 +88,7 @@ class Transport:
             time.sleep(pause)
             connection = self._connection()
             try:
-                connection.request(method, target, body, {**own, **(headers or {})})
-                response = connection.getresponse()
+                response = _answer(connection, method, target, body, {**own, **(headers or {})})
                 break
             except (OSError, http.client.HTTPException) as error:
                 connection.close()
@@ -135,6 +134,22 @@ class Transport:
                         event = {}
             # A stream that has ended by itself has no more events.
             silent += 1
+
+
+def _answer(
+    connection: HTTPConnection, method: str, target: str, body: bytes | None, headers: Mapping[str, str]
+) -> HTTPResponse:
+    """The answer to a request. A service that refuses a request answers before all of it has arrived and
+    closes the connection: sending then breaks, and the answer is there."""
+    from http.client import HTTPException
+
+    try:
+        connection.request(method, target, body, headers)
+    except (BrokenPipeError, ConnectionResetError):
+        with suppress(OSError, HTTPException):
+            return connection.getresponse()
+        raise
+    return connection.getresponse()
 
 
 def _error(response: HTTPResponse) -> FeedplanError:

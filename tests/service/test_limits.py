@@ -13,6 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+import feedplan
 from feedplan.service.limits import Limits
 from tests.service.servers import LONG, PART, Server, long_part, running
 
@@ -63,6 +64,13 @@ def test_size_of_a_request(small: Server) -> None:
         except OSError:
             pass
         assert b" 413 " in line.recv(1000).split(b"\r\n")[0]
+
+
+def test_the_client_tells_why_a_program_is_refused_before_it_has_arrived(small: Server) -> None:
+    # So much that it is still being sent when the answer comes.
+    program = b"(" + b"x" * 30_000_000 + b")\n"
+    with pytest.raises(feedplan.InputError, match="which is max_upload: split the program"):
+        feedplan.Client(small.url).plan(program, "mill")
 
 
 def test_time_of_a_request(small: Server) -> None:
