@@ -591,9 +591,9 @@ def curvature_jumps(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
     count = len(profile.kinked)
     joints = "1 joint" if count == 1 else f"{count} joints, here the most"
     return (
-        f"{at_line(line)}the tool slows to {math.sqrt(speed_sq[slowest]):.3g} mm/s where the curvature "
-        f"jumps, as it does at {joints}: limits of jerk hold it there; a path of continuous curvature is "
-        "faster",
+        f"{at_line(line)}the tool slows to {math.sqrt(speed_sq[slowest]):.3g} {problem.unit}/s where the "
+        f"curvature jumps, as it does at {joints}: limits of jerk hold it there; a path of continuous "
+        "curvature is faster",
     )
 
 

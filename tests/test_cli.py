@@ -126,6 +126,8 @@ def test_a_broken_limit_is_written_reported_and_exits_1(
     assert main(["plan", "a.ngc", "-o", str(tmp_path)]) == 1
     out, err = capsys.readouterr()
     assert "FAILED, 1 of 2 limits broken" in out
+    # Such a plan may be faster than the bound: there is no gap.
+    assert " s for this path, which keeps the limits\n" in out
     assert err == f"error: the audit failed: {broken_square.verdict.failures[0]}\n"
     assert "Audit FAILED" in (tmp_path / "report.html").read_text()
 

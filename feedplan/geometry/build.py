@@ -18,6 +18,7 @@ from feedplan.geometry.joined import joined
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.geometry.rules import Motion, Rules
+from feedplan.machine.axis import usual_units
 from feedplan.machine.machine import Machine
 from feedplan.program.program import PathControl, Program
 from feedplan.progress import Listener, part, tell
@@ -134,9 +135,10 @@ def build_path(
         index, axis, position = outside
         least, greatest = words.travel[axis]
         end, bound = ("begins", least) if position < least else ("ends", greatest)
+        (unit,) = usual_units((names[axis],))
         raise InputError(
-            f"{program.name}, line {program.line[index]}: {names[axis]} reaches {position:.6g} mm, "
-            f"its travel {end} at {bound:.6g} mm: move the work, or correct the travel of the machine"
+            f"{program.name}, line {program.line[index]}: {names[axis]} reaches {position:.6g} {unit}, "
+            f"its travel {end} at {bound:.6g} {unit}: move the work, or correct the travel of the machine"
         )
     first = move[runs[:-1], 0]
     followed = CompositeCurve.of(native)

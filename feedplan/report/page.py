@@ -50,7 +50,7 @@ def write_report(
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
         tables.verdict(audit),
-        tables.numbers(summary, account, setpoints),
+        tables.numbers(summary, account, audit, setpoints),
         _warnings(summary.get("warnings") or ()),
     )
     charts = Template(asset("page_charts.html")).substitute(

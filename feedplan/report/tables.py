@@ -68,7 +68,7 @@ def verdict(audit: Audit) -> str:
     )
 
 
-def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str:
+def numbers(summary: Mapping[str, Any], account: Account, audit: Audit, setpoints: int) -> str:
     """The big numbers under the title."""
     time, whole = float(summary["time"]), account.all
     unit, turning = account.motion.units
@@ -78,7 +78,7 @@ def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str
     if account.motion.turns.all():
         length, mean = (f"{whole.turn:.4g}", turning), (f"{whole.mean_turn:.4g}", f"{turning}/s")
         turned, by_minute = "", ""
-    bound, gap = summary.get("lower_bound"), summary.get("gap")
+    bound = summary.get("lower_bound")
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
         ("Length", *length, turned or f"{summary['pieces']} pieces"),
@@ -87,9 +87,15 @@ def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
     ]
     if bound is not None:
-        optimal = gap is not None and gap <= 1e-9
-        proof = "no plan of this path is faster" + ("" if optimal else f" than {bound:.6g} s")
-        cells.insert(1, ("Gap to the bound", _short(100.0 * (gap or 0.0)), "%", proof))
+        gap = float(summary.get("gap") or 0.0)
+        than = f" than {bound:.6g} s"
+        if audit.ok:
+            proof = "no plan of this path is faster" + ("" if gap <= 1e-9 else than)
+            cells.insert(1, ("Gap to the bound", _short(100.0 * gap), "%", proof))
+        else:
+            # A plan that breaks limits may be faster than the bound.
+            proof = f"no plan of this path that keeps the limits is faster{than}"
+            cells.insert(1, ("Gap to the bound", "–", "", proof))
     items = "".join(_number(*cell) for cell in cells)
     return f'<dl class="numbers card">{items}</dl>'
 
@@ -208,7 +214,7 @@ def _slow_row(row: SlowLine, texts: Mapping[int, str], units: tuple[str, str]) -
     text = escape(texts.get(row.line, "").strip()[:120])
     unit = f"{units[row.turns]}/s"
     cells = [
-        f'<td class="n">{row.line}</td>',
+        f'<td class="n">{row.line or "–"}</td>',
         f'<td class="code"><code>{text}</code></td>' if texts else "",
         f'<td class="n">{duration_text(row.lost)}</td><td class="n">{duration_text(row.time)}</td>',
         f'<td class="n">{row.speed:.4g} {unit}</td><td class="n">{row.wanted:.4g} {unit}</td>',

@@ -2,7 +2,7 @@
 
 import { greatest } from "./curve.js";
 import { shown } from "./numbers.js";
-import { choice } from "./parts.js";
+import { choice, heading, rapidsBeyond } from "./parts.js";
 import { Plot } from "./plot.js";
 import { axisColour, style } from "./theme.js";
 
@@ -73,12 +73,11 @@ export class AxesPlot {
   #speed() {
     const { length, path, time, failures } = this.data;
     const { top_speed: top, cutting_speed: cutting } = length;
-    const hides = top > 1.5 * cutting;
+    const reach = (top > 1.5 * cutting ? 1.25 * cutting : 1.1 * top) || 1;
     const unit = `${path.unit}/s`;
-    const note = hides ? `rapids up to ${shown(top)} ${unit} run out of the chart` : "";
     const curves = [{ name: "speed", curve: time.speed, colour: "--accent", width: 1.6, fill: true }];
     const marks = failures.filter((failure) => !PER[failure.name] && Number.isFinite(failure.time)).map(({ time: x }) => ({ x }));
-    return { curves, range: [0, (hides ? 1.25 * cutting : 1.1 * top) || 1], unit, marks, head: heading("speed", unit, note) };
+    return { curves, range: [0, reach], unit, marks, head: heading("speed", unit, rapidsBeyond(reach, top, unit)) };
   }
 
   #quantity(name) {
@@ -115,10 +114,4 @@ function told({ axes, units, limits, least }, name, isJudged) {
   // A unit is told once, after the last of the axes in a row that have it.
   const list = known.map(({ text, unit }, k) => (known[k + 1]?.unit === unit ? text : `${text} ${unit}`)).join(", ");
   return isJudged ? `limits ${list}` : `not limited by this method (machine: ${list})`;
-}
-
-function heading(name, unit, note) {
-  const bold = document.createElement("b");
-  bold.textContent = name;
-  return [bold, ` [${unit}]  ${note}`];
 }

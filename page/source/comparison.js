@@ -1,7 +1,8 @@
 /* The page of a comparison: the speed of every method, linked to the tool path of the chosen one. */
 
 import { Cursor } from "./cursor.js";
-import { choice } from "./parts.js";
+import { greatest } from "./curve.js";
+import { choice, element, heading, rapidsBeyond } from "./parts.js";
 import { PathView } from "./path_view.js";
 import { Plot } from "./plot.js";
 import { Run } from "./run.js";
@@ -22,7 +23,9 @@ export function comparison(data) {
   let chosen = 0, across = "length";
 
   const path = new PathView(at("path"), at("path-tools"), cursor);
-  const speed = new Plot(at("speed"), {
+  const box = at("speed").appendChild(element("div", "row"));
+  const head = box.appendChild(element("p"));
+  const speed = new Plot(box, {
     height: 330,
     label: " ",
     onZoom: (range) => speed.zoom(range),
@@ -31,9 +34,11 @@ export function comparison(data) {
   cursor.follow((time) => speed.point(time === null ? null : across === "time" ? time : runs[chosen].lengthAt(time)));
 
   /* The chart is scaled by the cutting speeds: much faster rapids are cut at its top. */
-  const top = Math.max(...methods.map((method) => method.cutting_speed)) || 1;
+  const reach = 1.25 * Math.max(...methods.map((method) => method.cutting_speed)) || 1;
+  const top = Math.max(...methods.map((method) => greatest(method.speed)));
   function drawSpeed() {
-    const { unit } = methods[chosen];
+    const { unit } = methods[chosen], perSecond = `${unit}/s`;
+    head.replaceChildren(...heading("speed", perSecond, rapidsBeyond(reach, top, perSecond)));
     speed.label = across === "length" ? `path length [${unit}]` : "time [s]";
     const curves = methods.map((method, k) => ({
       name: method.method,
@@ -43,7 +48,7 @@ export function comparison(data) {
       dash: DASHES[Math.floor(Math.max(k - 1, 0) / OTHERS.length) % 3],
     }));
     const ends = [0, Math.max(...runs.map((run) => (across === "length" ? run.length : run.duration))) || 1];
-    speed.show({ curves, ends, range: [0, 1.25 * top], unit: `${unit}/s` });
+    speed.show({ curves, ends, range: [0, reach], unit: perSecond });
   }
 
   function choose(name) {

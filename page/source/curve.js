@@ -12,7 +12,8 @@ export function sampled(curve, from, to, columns, { isLimit = false, top = Infin
   let variation = 0, least = Infinity, most = -Infinity, before = NaN;
   let i = lastUpTo(curve.x, from);
   for (let k = 0; k < columns; k += 1) {
-    const start = from + k * step, end = start + step;
+    // The last column has the end of the curve too, which differs from `to` by the rounding of sums.
+    const start = from + k * step, end = start + (k + 1 < columns ? step : 2 * step);
     while (i + 1 < curve.x.length && curve.x[i + 1] <= start) i += 1;
     const first = at(curve, i, start);
     let a = first, b = first, aIsFirst = true, j = i;

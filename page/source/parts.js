@@ -1,5 +1,7 @@
 /* Small parts of a page. */
 
+import { shown } from "./numbers.js";
+
 export function element(tag, kind = "", text = "") {
   const made = document.createElement(tag);
   if (kind) made.className = kind;
@@ -23,4 +25,14 @@ export function choice(names, label, onChoose) {
     for (const button of box.children) button.setAttribute("aria-pressed", String(button.dataset.name === chosen));
   };
   return { box, press };
+}
+
+/* The head of a chart: a quantity, its unit and a note. */
+export function heading(name, unit, note = "") {
+  return [element("b", "", name), ` [${unit}]  ${note}`];
+}
+
+/* The note on rapids that are faster than the `reach` of a chart, which is scaled by the cutting speeds. */
+export function rapidsBeyond(reach, top, unit) {
+  return top > reach ? `rapids up to ${shown(top)} ${unit} run out of the chart` : "";
 }

@@ -3,11 +3,11 @@
 import uPlot from "uplot";
 
 import { grid, sampled } from "./curve.js";
-import { shown } from "./numbers.js";
+import { shown, tick } from "./numbers.js";
 import { font, style, wash } from "./theme.js";
 import { touch } from "./touch.js";
 
-const AXIS = 64; // width of the numbers at the left in pixels
+const AXIS = 64; // width of the numbers at the left in pixels: nine characters
 const LATE = 200; // [ms]
 
 export class Plot {
@@ -80,7 +80,7 @@ export class Plot {
 
   #options(width, from, to, found) {
     const axis = { stroke: style("--soft"), grid: { stroke: style("--grid"), width: 1 }, ticks: { show: false }, font: font(12) };
-    const read = (u, values) => values.map((value) => shown(value, 6));
+    const read = (u, values) => values.map(tick);
     return {
       width,
       height: this.height + (this.label ? 46 : 22),

@@ -1,5 +1,6 @@
 /* The planned speed below its limits over the length of the path, and the speed of another run. */
 
+import { element, heading, rapidsBeyond } from "./parts.js";
 import { Plot } from "./plot.js";
 
 const LIMITS = {
@@ -15,7 +16,9 @@ export class SpeedPlot {
     this.run = run;
     this.data = data;
     const { unit } = data.path;
-    this.plot = new Plot(container, {
+    const box = container.appendChild(element("div", "row"));
+    this.head = box.appendChild(element("p"));
+    this.plot = new Plot(box, {
       height: 330,
       label: `path length [${unit}]`,
       onZoom: (range) => this.plot.zoom(range),
@@ -41,7 +44,9 @@ export class SpeedPlot {
       curves.push({ name: other.name, curve, colour: "--other", width: 1.6, dash: [6, 3] });
     }
     curves.push({ name: "planned speed", curve: length.speed, colour: "--accent", width: 2, fill: true });
-    this.plot.show({ curves, ends: [0, this.run.length || 1], range: [0, reach], unit: `${path.unit}/s` });
+    const unit = `${path.unit}/s`;
+    this.head.replaceChildren(...heading("speed", unit, rapidsBeyond(reach, top, unit)));
+    this.plot.show({ curves, ends: [0, this.run.length || 1], range: [0, reach], unit });
   }
 
   draw() {

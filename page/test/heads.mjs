@@ -1,5 +1,5 @@
-/* Opens a report and prints as JSON whether a tool path is drawn, and for each chart over time its heading and whether
-   the legend covers the heading:
+/* Opens a report and prints as JSON whether a tool path is drawn, the heading of the chart over the length, and for each
+   chart over time its heading and whether the legend covers the heading:
    node page/test/heads.mjs REPORT WIDTH */
 
 import { resolve } from "node:path";
@@ -19,6 +19,7 @@ const heads = await page.locator("#time .row").evaluateAll((rows) => rows.map((r
     own.left < entry.right && entry.left < own.right && own.top < entry.bottom && entry.top < own.bottom));
   return { text: words.toString(), covered };
 }));
+const length = await page.locator("#length .row p").textContent();
 const drawn = await page.locator("#path").isVisible();
 await browser.close();
-process.stdout.write(JSON.stringify({ drawn, heads }));
+process.stdout.write(JSON.stringify({ drawn, length, heads }));

@@ -208,6 +208,11 @@ def test_positions_outside_the_travel_name_line_axis_and_limit(make_program: Any
         build_path(make_program([[0, 0], [1, 0], [1, 10.5], [0, 0]]), machine)
     with pytest.raises(InputError, match=r"line 10: X reaches -11 mm, its travel begins at -10 mm"):
         build_path(make_program([[-11, 0], [1, 0]]), machine)
+    turning = dataclasses.replace(
+        machine, axes=(*machine.axes, Axis("A", 100.0, 1000.0, travel=(-90.0, 90.0)))
+    )
+    with pytest.raises(InputError, match=r"line 10: A reaches 400 deg, its travel ends at 90 deg: move"):
+        build_path(make_program([[0, 0, 0, 0], [1, 0, 0, 400]], axes="XYZA"), turning)
     # An arc that touches the limit is within, though the curve that follows it is not quite.
     touching = make_program([[0, -10], [0, 10]], arcs={0: ((0, 0, 0), 2, math.pi)})
     build_path(touching, machine)

@@ -262,6 +262,9 @@ def test_jumps_of_curvature_hold_the_speed_and_are_told() -> None:
     assert speed == pytest.approx(allowed, rel=2e-3)
     (sentence,) = made.warnings
     assert sentence.startswith("the tool slows to 20.8 mm/s where the curvature jumps, as it does at 2 ")
+    joints = replace(CURVES, axes=tuple(replace(axis, unit="rad") for axis in CURVES.axes))
+    (sentence,) = plan_program(_round_corner(), joints, "jerk-limited").warnings
+    assert sentence.startswith("the tool slows to 20.8 rad/s where")
 
 
 def test_an_axis_without_a_limit_of_jerk_is_named_unless_it_rests() -> None:

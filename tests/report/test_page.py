@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import feedplan
 from feedplan.report.container import contained
 from feedplan.report.figures import SetpointFigures, chart_data, over_length
 from feedplan.report.page import SCRIPT, asset, missing_pictures, write_report
@@ -96,6 +97,9 @@ def test_a_failed_audit_names_what_is_broken_where(broken_square: Any, tmp_path:
     text = page(broken_square, tmp_path / "report.html")
     assert "Audit FAILED" in text
     assert "1 limit is broken" in text
+    # It may be faster than the bound, which holds for plans within the limits.
+    assert '<dt>Gap to the bound</dt><dd class="short">–<small></small></dd>' in text
+    assert "no plan of this path that keeps the limits is faster than" in text
     assert f"<li>{broken_square.verdict.failures[0]}</li>" in text
     data = data_of(text)
     assert data["failures"] == [{"name": "acceleration", "axis": "X", "time": 0.05}]
@@ -159,6 +163,13 @@ def test_the_page_without_its_data_is_below_a_megabyte_and_a_half(square: Any, t
 
 def test_without_the_program_the_page_lacks_only_its_text(square: Any, tmp_path: Path) -> None:
     assert "<th>Source</th>" not in page(square, tmp_path / "report.html", tmp_path / "gone.ngc")
+
+
+def test_a_path_without_a_program_has_no_lines(tmp_path: Path) -> None:
+    path = feedplan.Path.from_bezier([[0, 0], [10, 0], [10, 10]], axes=("X", "Y"))
+    feedplan.write_plan(feedplan.plan(path, "mill"), tmp_path, formats=[])
+    slowest = (tmp_path / "report.html").read_text(encoding="utf-8").split("Slowest lines")[1]
+    assert '<tr><td class="n">–</td>' in slowest
 
 
 def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -211,6 +212,16 @@ def test_levels_of_detail_join_and_are_within_their_tolerances() -> None:
         assert all(level["off"] <= level["tolerance"] for level in levels)
 
 
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is missing: install Node.js 20 or newer")
+def test_a_chart_shows_the_end_of_its_curve_and_numbers_of_its_width() -> None:
+    command = ["node", str(ROOT / "page" / "test" / "curve.mjs")]
+    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert told["drawn"][0] == told["drawn"][-1] == 0.0
+    assert max(told["drawn"]) == 30.0
+    plain = [text.replace("\u202f", " ").replace("\u2212", "-") for text in told["ticks"]]
+    assert plain == ["0", "-2 000", "3e7", "-3e7", "-5e6", "2.5e-7", "-1.234e-5"]
+
+
 def test_the_page_needs_no_token_and_allows_no_other_origin(tmp_path: Path) -> None:
     with running(tmp_path / "store", *_with_token(tmp_path)) as server:
         for address, kind in (("/", "text/html"), ("/page.js", "text/javascript"), ("/page.css", "text/css")):
@@ -251,6 +262,9 @@ def test_the_legend_of_a_report_leaves_the_limits_readable(
         assert seen["drawn"]
         assert [head["text"] for head in seen["heads"] if head["covered"]] == []
         assert seen["heads"][1]["text"].endswith(f"limits {limits}")
+        # Both charts of the speed tell its unit, and that they are cut.
+        assert re.fullmatch(r"speed \[mm/s\]  rapids up to \d+\.\d mm/s run out of the chart", seen["length"])
+        assert seen["heads"][0]["text"] == seen["length"]
 
 
 @in_a_browser

@@ -102,7 +102,7 @@ export class Result {
     const verdict = summary.audit.ok ? "passed" : "FAILED";
     const entries = [
       ["Time", duration(summary.time), summary.today ? `${summary.today.controller}: ${duration(summary.today.time)}` : job.method],
-      ["Gap to the bound", `${shown(100 * (summary.gap ?? 0), 3)} %`, `at least ${duration(summary.lower_bound)}`],
+      ["Gap to the bound", summary.audit.ok ? `${shown(100 * (summary.gap ?? 0), 3)} %` : "–", `at least ${duration(summary.lower_bound)}`],
       ["Audit", verdict, summary.audit.ok ? "every limit holds" : job.result.failures[0] ?? "", summary.audit.ok ? "good" : "bad"],
       ["Length", `${shown(summary.length, 5)} ${this.plan.run.unit}`, `mean ${shown(summary.mean_speed)} ${this.plan.run.unit}/s`],
       ["Stops", `${summary.stops}`, `${summary.pieces} pieces`],
