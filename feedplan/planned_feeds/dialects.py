@@ -70,20 +70,40 @@ _LACKS: dict[DialectName, tuple[tuple[bytes, str], ...]] = {
 # The most characters of a line, without blanks and comments where these are not stored.
 _LONGEST: dict[DialectName, int] = {"linuxcnc": 255, "grbl": 70, "fanuc": 250}
 _NAMES_OF: dict[DialectName, str] = {"linuxcnc": "LinuxCNC", "grbl": "grbl", "fanuc": "Fanuc"}
-# Words whose effect is in the coordinates of a program that was written anew, and what the effect is.
-_IN_COORDINATES = (
-    (_g(r"43|43\.1|43\.2"), "tool lengths that are known, 0 for others (a tool table gives them)"),
+# Words that a program has not any more when it was written anew, and what has become of them.
+_GONE = (
+    (
+        _g(r"43|43\.1|43\.2"),
+        "is left out: the coordinates have the tool lengths that are known, 0 for others (a tool table gives "
+        "them)",
+    ),
     (
         _g(r"5[5-9]|59\.[1-3]|54\.1|154|10|52|92"),
-        "work offsets that are known, 0 for others (the machine file gives them)",
+        "is left out: the coordinates have the work offsets that are known, 0 for others (the machine file "
+        "gives them)",
+    ),
+    (
+        _g(r"33|33\.1|74|76|84"),
+        "is written as plain moves at its feed, which do not follow the spindle: a tap needs a holder that "
+        "gives way, and no thread can be cut so",
     ),
 )
+_GONE_IN: dict[DialectName, tuple[tuple[bytes, str], ...]] = {
+    "linuxcnc": (),
+    "grbl": ((_g(r"61|61\.1|64"), "is left out: grbl takes all corners by its junction deviation, $11"),),
+    "fanuc": (),
+}
 _COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*")
 
 
 def writes_points(dialect: DialectName) -> bool:
     """Whether an F needs a decimal point."""
     return dialect == "fanuc"
+
+
+def has_path_control(dialect: DialectName) -> bool:
+    """Whether the control takes G61, G61.1 and G64."""
+    return dialect != "grbl"
 
 
 def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
@@ -104,14 +124,13 @@ def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def in_coordinates(content: bytes) -> tuple[str, ...]:
-    """Sentences on the words of a program that it has not any more when it is written anew, each with its
-    first line."""
+def gone(dialect: DialectName, content: bytes) -> tuple[str, ...]:
+    """Sentences on the words of a program that it has not any more when it is written anew for a control,
+    each with its first line."""
     code = _without_comments(content)
-    found = ((re.search(pattern, code), what) for pattern, what in _IN_COORDINATES)
+    found = ((re.search(pattern, code), what) for pattern, what in _GONE + _GONE_IN[dialect])
     return tuple(
-        f"line {_line_of(code, first.start())}: {first[0].decode('ascii', 'replace')} is left out: the "
-        f"coordinates have the {what}"
+        f"line {_line_of(code, first.start())}: {first[0].decode('ascii', 'replace')} {what}"
         for first, what in found
         if first is not None
     )

@@ -16,7 +16,7 @@ import numpy as np
 from feedplan.arrays import Floats, Integers
 from feedplan.errors import InputError
 from feedplan.machine.machine import Machine
-from feedplan.planned_feeds.dialects import DialectName
+from feedplan.planned_feeds.dialects import DialectName, has_path_control
 from feedplan.planned_feeds.number import place_text
 from feedplan.program.events import COMMENT, MESSAGE, Events
 from feedplan.program.program import PathControl, Program
@@ -69,7 +69,8 @@ def expanded(program: Program, machine: Machine | None, dialect: DialectName) ->
         out.add(_dwell(program.start_dwell, dialect))
     for m in range(len(program)):
         out.lines += events.pop(m, [])
-        out.add(out.changed("control", _control(program, m)))
+        if has_path_control(dialect):
+            out.add(out.changed("control", _control(program, m)))
         rapid = not np.isfinite(program.feed[m])
         # The feed is read back as the same number.
         feed = b"" if rapid else out.changed("F", b"F" + place_text(60.0 * float(program.feed[m])))

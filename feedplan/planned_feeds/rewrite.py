@@ -16,7 +16,7 @@ from feedplan.arguments import file_path, flag, number, one_of, positive, refuse
 from feedplan.arrays import Floats, Integers
 from feedplan.errors import InputError
 from feedplan.planned_feeds.blocks import Blocks, Exclusion, blocks_of
-from feedplan.planned_feeds.dialects import DIALECTS, DialectName, in_coordinates, lacks, writes_points
+from feedplan.planned_feeds.dialects import DIALECTS, DialectName, gone, lacks, writes_points
 from feedplan.planned_feeds.expand import expanded
 from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, exclusions_of, line_speeds, planned_feeds
 from feedplan.planned_feeds.inverse_time import inverse_feeds, require_no_splines
@@ -154,7 +154,7 @@ def planned_program(
     left_out: tuple[str, ...] = ()
     if expand:
         if program.reading is not None:
-            left_out = in_coordinates(_text_of(program))
+            left_out = gone(dialect, _text_of(program))
         content, program, along, source_lines = _expanded(program, along, dialect)
     else:
         content, source_lines = _text_of(program), program.line

@@ -15,7 +15,8 @@
 | other | other M codes | | number of the code |
 
 The program stops the tool for all of them but S, T, M61, messages, comments and the outputs that are
-synchronised with the motion, M62, M63 and M67: these happen as the tool passes by. Laser power is either
+synchronised with the motion, M62, M63 and M67: these happen as the tool passes by. Cycles that turn the
+spindle back or stop it (G33.1, G74, G84, G86) have their own M3, M4, M5. Laser power is either
 that of M67 or S with the spindle on.
 """
 

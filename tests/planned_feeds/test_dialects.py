@@ -89,6 +89,29 @@ def test_what_the_coordinates_of_a_program_written_anew_have_is_told() -> None:
     assert feedplan.planned_program(plan).notes == ()
 
 
+def test_a_program_written_anew_for_grbl_has_no_words_of_path_control() -> None:
+    plan = planned("G21 G64 P0.01\nG0 Z5\nG1 X5 F600\nG81 X9 Z-5 R2\nG80\nM2\n")
+    made = feedplan.planned_program(plan, expand=True, dialect="grbl")
+    assert b"G61" not in made.content
+    assert b"G64" not in made.content
+    assert made.notes == ("line 1: G64 is left out: grbl takes all corners by its junction deviation, $11",)
+    others = feedplan.planned_program(plan, expand=True)
+    assert b"G64 P0.01\n" in others.content
+    assert b"G61\n" in others.content
+
+
+def test_taps_written_anew_turn_the_spindle_back_and_tell_that_they_do_not_follow_it() -> None:
+    tap = "G21\nG0 Z5\nS500 M3\nG98 G84 X1 Z-5 R2 F625\nG80\nM5\nM2\n"
+    made = feedplan.planned_program(planned(tap), expand=True)
+    assert b"G1 Z-5. F625.\nG4 P0.\nM4\nZ5.\nM3\nM5\nM2\n" in made.content
+    assert made.notes == (
+        "line 4: G84 is written as plain moves at its feed, which do not follow the spindle: a tap needs a "
+        "holder that gives way, and no thread can be cut so",
+    )
+    thread = feedplan.planned_program(planned("G21\nS500 M3\nG33 Z-5 K1\nM2\n"), expand=True)
+    assert thread.notes[0].startswith("line 3: G33 is written as plain moves at its feed")
+
+
 def test_a_path_file_is_written_as_gcode(tmp_path: Path) -> None:
     file, out = tmp_path / "curve.json", tmp_path / "curve.ngc"
     curves = '[{"degree": 2, "control_points": [[0, 0], [10, 0], [10, 10]], "weights": [1, 0.7, 1]}]'

@@ -81,6 +81,20 @@ def test_boring_and_tapping_cycles_differ_in_their_way_up() -> None:
     assert way_up("G74 P1") == [(-5, True, 1), (5, True, 0)]
 
 
+def test_cycles_that_turn_the_spindle_back_or_stop_it_tell_so() -> None:
+    def told(start: str, cycle: str) -> list[tuple[int, str]]:
+        events = read(f"S500 {start}\nG98 G0 Z5\n{cycle}").events
+        return list(zip(events.move.tolist(), events.words(), strict=True))[2:-1]
+
+    # The moves: up to Z5, down to R, to the bottom, up again.
+    assert told("M3", "G84 X0 Z-5 R1") == [(3, "G4 P0"), (3, "M4"), (4, "M3")]
+    assert told("M4", "G74 X0 Z-5 R1") == [(3, "G4 P0"), (3, "M3"), (4, "M4")]
+    assert told("M4", "G86 X0 Z-5 R1 P2") == [(3, "G4 P2"), (3, "M5"), (4, "M4")]
+    assert told("M3", "G33.1 Z-5 K1") == [(2, "M4"), (3, "M3")]
+    # A spindle that stands is left alone.
+    assert told("M5", "G84 X0 Z-5 R1") == [(3, "G4 P0")]
+
+
 def test_cycles_follow_plane_units_and_offsets() -> None:
     program = read("G20 G19 G10 L2 P1 X1 Y2\nG0 X1\nG99 G81 X-1 Y1 R0.5")
     assert program.target[-2].tolist() == pytest.approx([0, 3 * 25.4, 0])

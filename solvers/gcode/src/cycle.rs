@@ -5,10 +5,11 @@
 
 use super::block::{g_name, Block, AXES};
 use super::coordinates::Point;
+use super::execute::Spindle;
 use super::fault::Outcome;
 use super::interpreter::{Interpreter, Topic};
 use super::modal::FeedMode;
-use super::moves::{Control, Kind, Mode, Stop};
+use super::moves::{Control, Kind, Mode};
 use super::tolerance::MOST_REPEATS;
 
 /// The height above the last depth at which G73 and G83 stop, unless D gives it, in mm: 0.010 inch.
@@ -203,7 +204,14 @@ impl Interpreter<'_> {
         }
         self.feed_to(&mut place, normal, hole.bottom, feed)?;
         match hole.motion {
-            820 | 860 => self.dwell(block, b'P', hole.dwell)?,
+            820 => self.dwell(block, b'P', hole.dwell)?,
+            // The spindle stands still on the way up.
+            860 => {
+                self.dwell(block, b'P', hole.dwell)?;
+                self.turn_spindle(Spindle::Off);
+                self.rapid_to(&mut place, normal, hole.clear)?;
+                self.turn_spindle(Spindle::AsBefore);
+            }
             850 => self.feed_to(&mut place, normal, hole.retract, feed)?,
             890 => {
                 self.dwell(block, b'P', hole.dwell)?;
@@ -212,8 +220,9 @@ impl Interpreter<'_> {
             // A tap reverses the spindle at the bottom and again at the top.
             740 | 840 => {
                 self.dwell(block, b'P', hole.dwell)?;
+                self.turn_spindle(Spindle::Reversed);
                 self.feed_to(&mut place, normal, hole.clear, feed)?;
-                self.moves.stop(Stop::Switch);
+                self.turn_spindle(Spindle::AsBefore);
             }
             _ => {}
         }

@@ -16,6 +16,13 @@ use super::moves::{Control, Kind, Mode, Stop};
 use super::tip::takes_direction;
 use super::tolerance::{LONG_DWELL, MM_PER_INCH, MOST_DWELL, RATES};
 
+/// What the spindle does within a cycle.
+pub(super) enum Spindle {
+    Off,
+    Reversed,
+    AsBefore,
+}
+
 impl Interpreter<'_> {
     /// Runs a block of a line; true where it ends the program.
     #[inline]
@@ -225,6 +232,19 @@ impl Interpreter<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A stop at which a cycle turns the spindle otherwise, told as M3, M4 or M5. One that stands is left alone.
+    pub(super) fn turn_spindle(&mut self, spindle: Spindle) {
+        self.moves.stop(Stop::Switch);
+        if self.state.spindle_on {
+            let code = match spindle {
+                Spindle::Off => 5,
+                Spindle::Reversed => 4 - u8::from(self.state.spindle_back),
+                Spindle::AsBefore => 3 + u8::from(self.state.spindle_back),
+            };
+            self.moves.event(self.line, b'M', f64::from(code), [None; 2]);
+        }
     }
 
     /// G4: P or X seconds.

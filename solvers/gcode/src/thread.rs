@@ -2,9 +2,10 @@
 
 use super::block::Block;
 use super::coordinates::Point;
+use super::execute::Spindle;
 use super::fault::Outcome;
 use super::interpreter::Interpreter;
-use super::moves::{Kind, Stop};
+use super::moves::Kind;
 use super::tolerance::{MOST_PASSES, RATES};
 
 /// The heights of a thread along X and its ends along Z, in mm. Depths are from the drive line towards the workpiece.
@@ -52,9 +53,9 @@ impl Interpreter<'_> {
         let target = self.target(block, false)?;
         self.go(Kind::Line, &target, feed)?;
         if motion == 331 {
-            self.moves.stop(Stop::Switch);
+            self.turn_spindle(Spindle::Reversed);
             self.go(Kind::Line, &start, feed)?;
-            self.moves.stop(Stop::Switch);
+            self.turn_spindle(Spindle::AsBefore);
         }
         Ok(())
     }
