@@ -164,13 +164,15 @@ def limits_of(found: Mapping[str, Found | None]) -> dict[str, Found]:
     }
 
 
-def parameters_of(controller: str, settings: Mapping[str, Setting]) -> dict[str, Found]:
-    """The parameters of the controller's model that its settings give with an allowed value."""
+def parameters_of(controller: str, settings: Mapping[str, Setting], per_mm: float = 1.0) -> dict[str, Found]:
+    """The parameters of the controller's model that its settings give with an allowed value; lengths in
+    settings have `per_mm` units a mm."""
     parameters = MODELS[controller].parameters
     found: dict[str, Found] = {}
     for key, setting in settings.items():
         with suppress(MachineError):
-            found[key] = Found(parameters[key].checked(key, setting.number), setting.source)
+            unit = per_mm if parameters[key].unit.startswith("mm") else 1.0
+            found[key] = Found(parameters[key].checked(key, setting.number / unit), setting.source)
     return found
 
 

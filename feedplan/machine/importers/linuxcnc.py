@@ -6,6 +6,7 @@
 | [TRAJ] LINEAR_UNITS, ANGULAR_UNITS | mm, inch or units per mm; degree, rad, grad or units per degree |
 | [AXIS_X], [JOINT_0] MAX_VELOCITY, MAX_ACCELERATION, MAX_JERK | the axis's limits, the least of them |
 | [TRAJ] MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION, MAX_LINEAR_JERK | as well, of linear axes |
+| the first two of these, [TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH | parameters of the controller's model |
 | [AXIS_X], [JOINT_0] MIN_LIMIT, MAX_LIMIT | travel, the least of them |
 | [AXIS_X] OFFSET_AV_RATIO | the part of velocity and acceleration that programs do not have |
 | [EMCMOT] SERVO_PERIOD | period |
@@ -33,6 +34,7 @@ from feedplan.machine.importers.description import (
     greatest,
     least,
     limits_of,
+    parameters_of,
     travel_of,
 )
 from feedplan.machine.importers.text_files import LONGEST_LINE, Setting, TextFiles
@@ -107,7 +109,8 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
     letters = _letters(ini)
     turning = any(letter in ROTARY_LETTERS for letter in letters)
     per_degree = _units(ini, path, "ANGULAR_UNITS", _UNITS_PER_DEGREE, "degree") if turning else 1.0
-    reader = _AxisReader(ini, _units(ini, path, "LINEAR_UNITS", _UNITS_PER_MM, "mm or inch"), per_degree)
+    per_mm = _units(ini, path, "LINEAR_UNITS", _UNITS_PER_MM, "mm or inch")
+    reader = _AxisReader(ini, per_mm, per_degree)
     if kinematics == "corexy":
         axes = _corexy_axes(reader, letters, path)
     else:
@@ -123,7 +126,19 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         warnings=tuple(warnings),
         # The model of LinuxCNC knows axes that are the program's.
         controller="linuxcnc" if kinematics == "cartesian" else "",
+        parameters=_of_controller(ini, per_mm) if kinematics == "cartesian" else {},
     )
+
+
+def _of_controller(ini: Ini, per_mm: float) -> dict[str, Found]:
+    """The limits along the path and the depth of looking ahead, for the model of LinuxCNC."""
+    places = {
+        "max_linear_velocity": ("MAX_LINEAR_VELOCITY", "MAX_VELOCITY"),
+        "max_linear_acceleration": ("MAX_LINEAR_ACCELERATION", "MAX_ACCELERATION"),
+        "arc_blend_optimization_depth": ("ARC_BLEND_OPTIMIZATION_DEPTH",),
+    }
+    settings = {key: ini.get("TRAJ", *names) for key, names in places.items()}
+    return parameters_of("linuxcnc", {key: own for key, own in settings.items() if own is not None}, per_mm)
 
 
 class _AxisReader:

@@ -95,6 +95,22 @@ def test_each_number_has_its_source_and_the_text_loads_as_the_machine(tmp_path: 
     assert "no jerk of Y, A: jerk-limited" in note
 
 
+def test_the_model_of_the_controller_has_the_limits_along_the_path(tmp_path: Path) -> None:
+    more = "[TRAJ]\nMAX_ACCELERATION = 30\nARC_BLEND_OPTIMIZATION_DEPTH = 20\n"
+    found = find_machine(ini(MILL.replace("[TRAJ]\n", more), tmp_path))
+    assert {key: own.value for key, own in found.parameters.items()} == {
+        "max_linear_velocity": pytest.approx(4 * 25.4),
+        "max_linear_acceleration": pytest.approx(30 * 25.4),
+        "arc_blend_optimization_depth": 20,
+    }
+    table = found.to_toml().split("[controller]")[1].split("[[axes]]")[0]
+    assert "max_linear_velocity = 101.6 " in table
+    assert "# [TRAJ] MAX_LINEAR_VELOCITY = 4, mill.ini line 16" in table
+    assert "arc_blend_optimization_depth = 20.0 " in table
+    assert Machine.load(ini(found.to_toml(), tmp_path, "machine.toml")).controller is not None
+    assert not find_machine(ini(MILL.replace("trivkins", "corexykins"), tmp_path)).parameters
+
+
 @pytest.mark.parametrize(
     ("unit", "factor"),
     [("mm", 1.0), ("METRIC", 1.0), ("in", 25.4), ("imperial", 25.4), ("1.0", 1.0), ("0.1", 10.0)],
