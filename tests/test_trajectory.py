@@ -79,6 +79,7 @@ def test_a_tool_speed_is_that_of_the_tool_where_joints_move() -> None:
     [
         (-0.1, "the time is -0.1 s: give one from 0 to 1.1 s"),
         ([0.0, 2.0], "the time is 2 s: give one"),
+        (1.1 + 1e-9, "the time is 1.100000001 s: give one from 0 to 1.1 s"),
         (float("nan"), "the time is nan s: give one"),
         ("soon", "the time is 'soon': give a number"),
         ([[0.0]], "2 dimensions: give a number"),

@@ -90,7 +90,8 @@ def within(given: ArrayLike, name: str, end: float, unit: str) -> Floats:
     outside = ~((values >= 0.0) & (values <= end * (1.0 + 1e-12)))
     if outside.any():
         worst = float(values[outside].flat[0])
-        raise InputError(f"the {name} is {worst:g} {unit}: give one from 0 to {end:g} {unit}")
+        # So many digits that a value just beyond the end differs from it.
+        raise InputError(f"the {name} is {worst:.13g} {unit}: give one from 0 to {end:.13g} {unit}")
     return values
 
 

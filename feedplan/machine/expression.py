@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arguments import shown
 from feedplan.arrays import Floats
 from feedplan.errors import MachineError
 
@@ -76,7 +77,10 @@ def record(
     MachineError says in which way it cannot be recorded.
     """
     tape = _Tape(name, inputs)
-    joints = tuple(formula(tuple(Traced(tape, i) for i in range(inputs))))
+    given = formula(tuple(Traced(tape, i) for i in range(inputs)))
+    if not isinstance(given, Iterable):
+        tape.refuse(f"gives {shown(given)} in place of the joint positions")
+    joints = tuple(given)
     if len(joints) != len(joint_names):
         raise MachineError(
             f"the kinematics {name} gives {len(joints)} joint positions: give one for each of "
@@ -183,12 +187,17 @@ class Traced:
         return self._of(other)._with(Op.QUOTIENT, self) if _is_number(other) else NotImplemented
 
     def __pow__(self, exponent: Any) -> Traced:
+        if isinstance(exponent, Traced):
+            exponent.__rpow__(self)
         if not (_is_scalar(exponent) and exponent == int(exponent) and exponent >= 1):
             self.tape.refuse(f"takes the power {exponent!r}; only whole powers from 1 on are known")
         if exponent == 1:
             return self
         half = (self ** (int(exponent) // 2)).square()
         return half * self if exponent % 2 else half
+
+    def __rpow__(self, base: Any) -> NoReturn:
+        self.tape.refuse("takes a power with a coordinate as exponent; only whole powers from 1 on are known")
 
     def _of(self, value: Any) -> Traced:
         return value if isinstance(value, Traced) else self.tape.add(Op.CONSTANT, constant=float(value))

@@ -133,6 +133,8 @@ def test_positions_are_what_the_formulas_give_for_arrays() -> None:
         (lambda x, y: np.array([1.0, 2.0]) * x, "uses numpy's multiply"),
         (lambda x, y: x**0.5, "takes the power 0.5; only whole powers from 1 on are known"),
         (lambda x, y: x ** (-1), "takes the power -1; only whole powers"),
+        (lambda x, y: 2.0**x, "takes a power with a coordinate as exponent; only whole powers"),
+        (lambda x, y: x**y, "takes a power with a coordinate as exponent; only whole powers"),
         (lambda x, y: x % 2.0, "divides a coordinate with a remainder"),
         (lambda x, y: round(x), "rounds a coordinate"),
         (lambda x, y: "far", "gives 'far' as a joint position"),
@@ -154,6 +156,9 @@ def test_every_joint_needs_a_position() -> None:
     kinematics.joint_names = ("U", "V")
     with pytest.raises(MachineError, match="gives 1 joint positions: give one for each of U, V"):
         kinematics.recorded  # noqa: B018
+    Forgotten = type("Forgotten", (Formulas,), {"joints": lambda self, tip: None})
+    with pytest.raises(MachineError, match="Forgotten gives None in place of the joint positions: write"):
+        Forgotten(lambda x, y: x).recorded  # noqa: B018
 
 
 def test_the_series_of_sine_and_cosine_at_zero() -> None:

@@ -107,6 +107,8 @@ def create(name: str, axes: tuple[Axis, ...], values: Mapping[str, Any], machine
         )
     parameters = Parameters(values, machine)
     kinematics = factory(axes, parameters)
+    what = f"machine {machine}: the result of the factory of {name!r}"
+    require(isinstance(kinematics, Kinematics), what, kinematics, "a Kinematics")
     parameters.finish()
     _check_axes(kinematics, axes, parameters)
     return kinematics

@@ -80,6 +80,13 @@ def test_a_user_s_kinematics_is_known_by_its_name(tmp_path: Path) -> None:
         machine.inverse.tip((1.0, 2.0))
 
 
+def test_a_factory_makes_a_kinematics(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_registered", {})
+    registry.register("forgotten", lambda axes, parameters: None)  # type: ignore[arg-type, return-value]
+    with pytest.raises(MachineError, match="the factory of 'forgotten' is None: give a Kinematics"):
+        Machine("m", (Axis("X", 1.0, 10.0),), kinematics="forgotten")
+
+
 def test_bundled_names_are_taken() -> None:
     with pytest.raises(MachineError, match="register yours under another name"):
         registry.register("corexy", lambda axes, parameters: Bipod(1.0))
