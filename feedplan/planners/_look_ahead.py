@@ -18,7 +18,7 @@ from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square, speed_square
 from feedplan.errors import InfeasibleError, at_line
 from feedplan.planners._queue import Queue
-from feedplan.planners._segments import Rule, Segments, segments
+from feedplan.planners._segments import CurvePlaces, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
 # Parts of a segment shorter than this many roundings of its parameter and of v² are left out.
@@ -202,16 +202,13 @@ def _weighted_length(
     return np.asarray(total * (u1 - u0))
 
 
-def shared_acceleration(
-    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
-) -> tuple[Floats, Floats]:
+def shared_acceleration(at: CurvePlaces) -> tuple[Floats, Floats]:
     """Half along the path and √3/2 across it of the acceleration that every direction in their plane allows.
 
     No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a
     tangential ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
     A_k/√(t_k² + n_k²). Among all directions are an axis's both ones: A_k is the lesser of its two limits.
     """
-    del radius, speed
     with np.errstate(divide="ignore"):
-        whole = (limits.min(axis=0) / np.hypot(tangent, normal)).min(axis=1)
+        whole = (at.limits.min(axis=0) / np.hypot(at.tangent, at.normal)).min(axis=1)
     return np.stack([0.5 * whole, 0.5 * whole]), 0.5 * math.sqrt(3.0) * whole

@@ -125,11 +125,9 @@ class Queue:
         return np.asarray(np.sqrt(np.repeat(peak, np.diff(np.append(hill, len(up))))))
 
 
-def along_path(queue: Queue, max_velocity: float | None, max_acceleration: float | None) -> Queue:
-    """The queue with limits along the path, where they are given; raises InputError unless positive."""
-    given = {"velocity": (max_velocity, "mm/s"), "acceleration": (max_acceleration, "mm/s²")}
-    for name, (value, unit) in given.items():
-        if value is not None:
-            what, remedy = f"the greatest {name} along the path", f"a positive number [{unit}]"
-            queue = replace(queue, **{name: number(value, what, remedy, positive, unit)})  # type: ignore[arg-type]
-    return queue
+def along_path(name: str, given: float | None, unit: str) -> float:
+    """The greatest velocity or acceleration along the path, infinite where none is given; raises InputError
+    unless it is positive."""
+    if given is None:
+        return math.inf
+    return number(given, f"the greatest {name} along the path", f"a positive number [{unit}]", positive, unit)

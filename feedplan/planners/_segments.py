@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,23 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import SolverError, at_line
 from feedplan.profile import NO_AXIS
 
-# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight), the limits of the
-# axes (2, axes) [mm/s²], upward and downward as sizes, the radius of the path (m,) [mm], infinite where it is
-# straight, and the speed that feed and axis velocities allow (m,) [mm/s]: the greatest accelerations along
-# the path, of speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
-Rule = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
+
+class CurvePlaces(NamedTuple):
+    """Places of a curved path: unit `tangent` and unit `normal` (m, axes), the normal 0 where the path is
+    straight; the `limits` of the axes' accelerations (2, axes) [mm/s²], upward and downward as sizes; the
+    `radius` (m,) [mm], infinite where the path is straight; the `speed` (m,) [mm/s] that feed and axis
+    velocities allow."""
+
+    tangent: Floats
+    normal: Floats
+    limits: Floats
+    radius: Floats
+    speed: Floats
+
+
+# The greatest accelerations along the path, of speeding up and of slowing down (2, m), and across it (m,)
+# [mm/s²].
+Rule = Callable[[CurvePlaces], tuple[Floats, Floats]]
 
 # A curved piece is cut into even parts: on each the direction, and ln |C'|, change by STEP in the mean. Parts
 # on which one of them changes by more than 2 STEP, as beside a cusp, are cut again, CUTS times at most.
@@ -168,7 +181,7 @@ def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float)
     with np.errstate(divide="ignore", over="ignore"):
         radius = 1.0 / curvature
         normal, speed = _over(bend, size[:, None], 0.0), _speed(problem, rows, tangent)
-        along, across = rule(tangent, normal, problem.limits("acceleration"), radius, speed)
+        along, across = rule(CurvePlaces(tangent, normal, problem.limits("acceleration"), radius, speed))
         speed = np.minimum(speed, np.sqrt(across * radius))
     speed = np.minimum(speed, _chord_speed(problem, radius))
     shape = (-1, len(PLACES))

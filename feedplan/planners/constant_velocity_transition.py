@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from feedplan.arrays import Floats
 from feedplan.constraints.junction import junction_limit
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
@@ -31,11 +30,7 @@ CORNERS = Corners.PROGRAMMED
 
 def plan(problem: Problem) -> SpeedProfile:
     """The fastest trapezoids that pass corners so. Raises SolverError, InfeasibleError as sentences."""
-    speed = transition_speed(problem)
+    # 0 between runs, infinite where there is no corner.
+    speed = junction_limit(problem.path, problem.limits("acceleration").min(axis=0) * problem.period)
     hold = np.where(np.isfinite(speed) & (speed > 0.0), problem.period, 0.0)
     return look_ahead(problem, np.minimum(speed, problem.junction_speed), shared_acceleration, hold)
-
-
-def transition_speed(problem: Problem) -> Floats:
-    """Speed (n + 1,) [mm/s] at the ends of the pieces: 0 between runs, infinite where there is no corner."""
-    return junction_limit(problem.path, problem.limits("acceleration").min(axis=0) * problem.period)

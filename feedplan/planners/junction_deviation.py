@@ -35,7 +35,7 @@ from feedplan.geometry.joints import end_edges, tangent_jumps
 from feedplan.planners._junctions import Junctions, ShortLines
 from feedplan.planners._look_ahead import look_ahead
 from feedplan.planners._queue import Chords, Queue, along_path
-from feedplan.planners._segments import Rule, both_ways, in_direction
+from feedplan.planners._segments import CurvePlaces, Rule, both_ways, in_direction
 from feedplan.profile import SpeedProfile
 
 CORNERS = Corners.PROGRAMMED
@@ -85,9 +85,10 @@ def plan(
     queue = Queue(
         ahead=None if blocks is None else blocks - 1,
         chords=Chords(arc_tolerance, arc_segment) if chopped else None,
+        velocity=along_path("velocity", max_velocity, "mm/s"),
+        acceleration=along_path("acceleration", max_acceleration, "mm/s²"),
         cruise=cruise_ratio,
     )
-    queue = along_path(queue, max_velocity, max_acceleration)
     jumps = None if axis_jumps is None else _of_axes(problem, axis_jumps)
     junctions = Junctions(deviation, square_corner_velocity, jumps, short_lines, queue.acceleration)
     rule = each_direction if queue.chords is None else _from_chord_to_chord(junctions, queue.chords)
@@ -110,27 +111,22 @@ def corner_speed(problem: Problem, junctions: Junctions) -> Floats:
     return speed
 
 
-def each_direction(
-    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
-) -> tuple[Floats, Floats]:
+def each_direction(at: CurvePlaces) -> tuple[Floats, Floats]:
     """The greatest acceleration along the tangent alone, and along the normal alone."""
-    del radius, speed
-    return both_ways(limits, tangent), in_direction(limits, normal)
+    return both_ways(at.limits, at.tangent), in_direction(at.limits, at.normal)
 
 
 def _from_chord_to_chord(junctions: Junctions, chords: Chords) -> Rule:
     """The rule on curves that are chopped: the speed from chord to chord, as an acceleration across."""
 
-    def rule(
-        tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
-    ) -> tuple[Floats, Floats]:
-        del speed
-        half = chords.half_turn(radius)
-        ahead, aside = np.cos(half)[:, None] * tangent, np.sin(half)[:, None] * normal
+    def rule(at: CurvePlaces) -> tuple[Floats, Floats]:
+        half = chords.half_turn(at.radius)
+        ahead, aside = np.cos(half)[:, None] * at.tangent, np.sin(half)[:, None] * at.normal
         with np.errstate(invalid="ignore"):
-            chord = 2.0 * radius * np.sin(half)
-            square = junctions.square(ahead - aside, ahead + aside, chord, chord, limits)
-            return both_ways(limits, tangent), np.where(np.isinf(radius), np.inf, square / radius)
+            chord = 2.0 * at.radius * np.sin(half)
+            square = junctions.square(ahead - aside, ahead + aside, chord, chord, at.limits)
+            across = np.where(np.isinf(at.radius), np.inf, square / at.radius)
+        return both_ways(at.limits, at.tangent), across
 
     return rule
 

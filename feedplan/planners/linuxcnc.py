@@ -26,6 +26,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
 from feedplan.planners._look_ahead import look_ahead, shared_acceleration
 from feedplan.planners._queue import Queue, along_path
+from feedplan.planners._segments import CurvePlaces
 from feedplan.profile import SpeedProfile
 
 CORNERS = Corners.JOINED
@@ -44,8 +45,13 @@ def plan(
     Raises InputError for those, SolverError and InfeasibleError, all as sentences.
     """
     whole(depth, "the depth", "a whole number from 1")
-    queue = Queue(ahead=depth, least_time=PERIODS * problem.period, part=_part(problem))
-    queue = along_path(queue, max_velocity, max_acceleration)
+    queue = Queue(
+        ahead=depth,
+        velocity=along_path("velocity", max_velocity, "mm/s"),
+        acceleration=along_path("acceleration", max_acceleration, "mm/s²"),
+        least_time=PERIODS * problem.period,
+        part=_part(problem),
+    )
     return look_ahead(problem, problem.junction_speed, on_arcs, queue=queue)
 
 
@@ -60,15 +66,13 @@ def _part(problem: Problem) -> Floats:
     return np.where(np.isin(segment, segment[last[overlaps]]), 0.5, 1.0)
 
 
-def on_arcs(
-    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
-) -> tuple[Floats, Floats]:
+def on_arcs(at: CurvePlaces) -> tuple[Floats, Floats]:
     """√3/2 of the acceleration of every direction across the path; along it the rest at the greatest speed.
 
     The rest is half of it (`shared_acceleration`) where the bend limits the speed, more where the feed does
     (`tc.c`: `tcUpdateCircleAccRatio`).
     """
-    along, across = shared_acceleration(tangent, normal, limits, radius, speed)
+    along, across = shared_acceleration(at)
     with np.errstate(divide="ignore"):
-        used = np.minimum(speed**2 / radius, across) / (2.0 * along[0])
+        used = np.minimum(at.speed**2 / at.radius, across) / (2.0 * along[0])
     return 2.0 * along * np.sqrt(1.0 - used**2), across

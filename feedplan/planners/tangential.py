@@ -14,7 +14,7 @@ import numpy as np
 from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._look_ahead import look_ahead
-from feedplan.planners._segments import both_ways
+from feedplan.planners._segments import CurvePlaces, both_ways
 from feedplan.profile import SpeedProfile
 
 
@@ -23,9 +23,6 @@ def plan(problem: Problem) -> SpeedProfile:
     return look_ahead(problem, problem.junction_speed, along_only)
 
 
-def along_only(
-    tangent: Floats, normal: Floats, limits: Floats, radius: Floats, speed: Floats
-) -> tuple[Floats, Floats]:
+def along_only(at: CurvePlaces) -> tuple[Floats, Floats]:
     """No limit across the path."""
-    del normal, radius, speed
-    return both_ways(limits, tangent), np.full(len(tangent), np.inf)
+    return both_ways(at.limits, at.tangent), np.full(len(at.tangent), np.inf)

@@ -19,6 +19,7 @@ from feedplan.planners import junction_deviation, linuxcnc, planner
 from feedplan.planners._junctions import Junctions
 from feedplan.planners._look_ahead import look_ahead
 from feedplan.planners._queue import Chords
+from feedplan.planners._segments import CurvePlaces
 from feedplan.planners.junction_deviation import corner_speed
 from feedplan.program.read import read_program
 from feedplan.today import time_by
@@ -270,7 +271,8 @@ def test_arcs_of_linuxcnc_leave_along_the_path_what_the_circle_leaves() -> None:
     along_x, along_y = np.array([[1.0, 0.0]] * 2), np.array([[0.0, 1.0]] * 2)
     # At 0.6 of A across 0.8 are left; where the bend holds the speed, a half.
     speed = np.sqrt(A * 10.0 * np.array([0.6, 5.0]))
-    ways, across = linuxcnc.on_arcs(along_x, along_y, np.full((2, 2), A), np.full(2, 10.0), speed)
+    places = CurvePlaces(along_x, along_y, np.full((2, 2), A), np.full(2, 10.0), speed)
+    ways, across = linuxcnc.on_arcs(places)
     np.testing.assert_allclose(ways, [[0.8 * A, 0.5 * A]] * 2, rtol=1e-12)
     np.testing.assert_allclose(across, 0.5 * math.sqrt(3.0) * A, rtol=1e-12)
 
