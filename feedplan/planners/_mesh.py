@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from feedplan.arrays import Flags, Floats, Integers
-from feedplan.constraints.problem import Problem
+from feedplan.constraints.problem import Problem, feed_square, speed_square
 from feedplan.errors import InfeasibleError, at_line
 
 # Places of a cell in [0, 1]: both ends, and the extremes of the Legendre polynomial between them.
@@ -99,37 +99,28 @@ class Mesh:
 
 def subruns(problem: Problem) -> Iterator[list[Subrun]]:
     """The subruns of each run."""
-    count = len(problem.path)
-    pieces = np.arange(count)
-    width = problem.path.width
-    start, end = (problem.derivatives(pieces, at, 1)[1] for at in (np.zeros(count), width))
-    middle = problem.derivatives(pieces, 0.5 * width, 1)[1]
-    size = np.maximum(np.linalg.norm(middle, axis=1), np.maximum(*_norms(start, end)))
-    still = [norm <= _CUSP * size for norm in _norms(start, end)]
-    stop = np.array(problem.junction_speed) == 0.0
-    for piece in range(1, count):
-        stop[piece] |= still[1][piece - 1] or still[0][piece]
-    runs = problem.path.runs
-    for run in range(len(runs) - 1):
-        result = []
-        cuts = [
-            runs[run],
-            *(runs[run] + 1 + np.flatnonzero(stop[runs[run] + 1 : runs[run + 1]])),
-            runs[run + 1],
+    count, width = len(problem.path), problem.path.width
+    start, middle, end = (
+        np.linalg.norm(problem.derivatives(np.arange(count), share * width, 1)[1], axis=1)
+        for share in (0.0, 0.5, 1.0)
+    )
+    still = _CUSP * np.maximum(middle, np.maximum(start, end))
+    begins_in_cusp, ends_in_cusp = start <= still, end <= still
+    stop = problem.junction_speed == 0.0
+    stop[1:-1] |= ends_in_cusp[:-1] | begins_in_cusp[1:]
+    start_speed, end_speed = np.zeros(count), np.zeros(count)
+    start_speed[0], end_speed[-1] = problem.start_speed, problem.end_speed
+    for run, next_run in pairwise(problem.path.runs.tolist()):
+        cuts = [run, *(run + 1 + np.flatnonzero(stop[run + 1 : next_run])).tolist(), next_run]
+        yield [
+            Subrun(
+                first,
+                last,
+                None if begins_in_cusp[first] else float(start_speed[first]) ** 2,
+                None if ends_in_cusp[last - 1] else float(end_speed[last - 1]) ** 2,
+            )
+            for first, last in pairwise(cuts)
         ]
-        for first, last in pairwise(cuts):
-            speeds = [
-                problem.start_speed if first == 0 else 0.0,
-                problem.end_speed if last == count else 0.0,
-            ]
-            at_cusp = [still[0][first], still[1][last - 1]]
-            known = [None if cusp else speed**2 for cusp, speed in zip(at_cusp, speeds, strict=True)]
-            result.append(Subrun(int(first), int(last), known[0], known[1]))
-        yield result
-
-
-def _norms(*vectors: Floats) -> list[Floats]:
-    return [np.linalg.norm(vector, axis=1) for vector in vectors]
 
 
 @dataclass(frozen=True)
@@ -182,15 +173,13 @@ def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
     whole = problem.path.width[piece]
     u = whole * local
     width = whole * (upper - lower)
-    slope, bend = _derivatives(problem, piece, u)
-    square = _speed_square(problem, piece, u, slope)
-    chord = _chord_speed_square(problem, piece, u)
-    limits = [problem.use("velocity", slope) ** 2]
-    counted = square
-    if problem.feed_share is not None:
-        counted = ((problem.feed_share[piece] * slope) ** 2).sum(axis=2)
-    limits += [(counted / problem.feed[piece] ** 2)[..., None], (square / chord)[..., None]]
-    per_p = np.concatenate(limits, axis=2)
+    places = np.tile(piece, len(PLACES)), u.ravel()
+    _, slope, bend = problem.derivatives(*places, 2).reshape(3, *u.shape, -1)
+    square = speed_square(problem, *places).reshape(u.shape)
+    by_feed = feed_square(problem, *places).reshape(u.shape) / problem.feed[piece] ** 2
+    by_chord = square / _chord_speed_square(problem, *places).reshape(u.shape)
+    use = problem.use("velocity", slope) ** 2
+    per_p = np.concatenate([use, by_feed[..., None], by_chord[..., None]], axis=2)
     with np.errstate(divide="ignore"):
         most = 1.0 / per_p.max(axis=2)
     way = width[:, None] * np.einsum("ij,jck->ick", INTEGRATION, slope)
@@ -225,28 +214,11 @@ def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | No
     )
 
 
-def _derivatives(problem: Problem, piece: Integers, u: Floats) -> tuple[Floats, Floats]:
-    """q' and q'' (places, n, joints)."""
-    values = problem.derivatives(np.tile(piece, len(u)), np.ascontiguousarray(u).ravel(), 2)
-    return values[1].reshape(*u.shape, -1), values[2].reshape(*u.shape, -1)
-
-
-def _speed_square(problem: Problem, piece: Integers, u: Floats, slope: Floats) -> Floats:
-    """The square of the speed that feed and junctions are about, over p (places, n)."""
-    tip = problem.tip_speed
-    if tip is None:
-        return np.asarray((slope**2).sum(axis=2))
-    t = u / problem.path.width[piece]
-    return tip.evaluate(np.tile(piece, len(u)), t.ravel()).reshape(u.shape)
-
-
 def _chord_speed_square(problem: Problem, piece: Integers, u: Floats) -> Floats:
-    """(2/T)²·(2ρδ − δ²) where ρ is the radius of curvature of the tool's path (places, n), at least δ."""
+    """(2/T)²·(2ρδ − δ²) at places (m,), ρ being the radius of curvature of the tool's path, at least δ."""
     if not np.isfinite(problem.chord_tolerance):
-        return np.full(u.shape, np.inf)
-    curve = problem.tip_curve or problem.path.curve
-    values = curve.evaluate(np.tile(piece, len(u)), u.ravel(), 2)
-    tangent, second = values[1], values[2]
+        return np.full(len(u), np.inf)
+    _, tangent, second = (problem.tip_curve or problem.path.curve).evaluate(piece, u, 2)
     square = (tangent**2).sum(axis=1)
     along = (tangent * second).sum(axis=1) / np.where(square > 0.0, square, 1.0)
     across = np.linalg.norm(second - along[:, None] * tangent, axis=1)
@@ -254,5 +226,4 @@ def _chord_speed_square(problem: Problem, piece: Integers, u: Floats) -> Floats:
     radius = np.where(across > 0.0, square / np.where(across > 0.0, across, 1.0), np.inf)
     # Where the tool stands still, while other axes turn, it has no chord.
     radius = np.where(square > 0.0, np.maximum(radius, tolerance), np.inf)
-    speed_sq = (2.0 / problem.period) ** 2 * tolerance * (2.0 * radius - tolerance)
-    return np.asarray(speed_sq.reshape(u.shape))
+    return np.asarray((2.0 / problem.period) ** 2 * tolerance * (2.0 * radius - tolerance))
