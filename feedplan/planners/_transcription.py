@@ -74,6 +74,12 @@ class Transcription:
             known[station] = x or 0.0
         return known
 
+    def completed(self, found: Floats) -> Floats:
+        """x in all stations (n + 1,) from that in the free ones."""
+        x = self.known.copy()
+        x[self.free] = found
+        return x
+
 
 def transcribe(
     mesh: Mesh, rows: Rows, acceleration: Floats, share: Floats, feasible: bool = True

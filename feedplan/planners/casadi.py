@@ -75,6 +75,4 @@ def _solve(task: Transcription, seconds: float) -> Floats:
     if not statistics["success"]:
         word = str(statistics["return_status"])
         raise Refusal(word, infeasible=word == "Infeasible_Problem_Detected")
-    result = task.known
-    result[free] = np.asarray(found["x"]).ravel()
-    return result
+    return task.completed(np.asarray(found["x"]).ravel())

@@ -66,10 +66,7 @@ def _solve(task: Transcription, seconds: float) -> Floats:
             break
     else:
         raise Refusal(word, infeasible="PrimalInfeasible" in word)
-    x = task.known
-    free = int(task.free.sum())
-    x[task.free] = np.maximum(np.array(solution.x)[:free], 0.0)
-    return x
+    return task.completed(np.maximum(np.array(solution.x)[: task.free.sum()], 0.0))
 
 
 def _program(task: Transcription) -> tuple[Any, Floats, list[Any], Floats]:
