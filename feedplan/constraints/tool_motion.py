@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,10 +51,6 @@ class ToolMotion:
             weights = np.repeat(share, np.diff(curve.offsets), axis=0)
             curve = replace(curve, control_points=curve.control_points * weights)
         return cls(curve, share, turns, units)
-
-    def __getstate__(self) -> dict[str, Any]:
-        # The copy makes its own table of lengths.
-        return {name: value for name, value in vars(self).items() if name != "_table"}
 
     @cached_property
     def _table(self) -> CurveLength | None:

@@ -10,6 +10,7 @@ from feedplan.arrays import Floats
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
+from feedplan.lazy import cached_property
 
 
 class CurveLength:
@@ -25,7 +26,14 @@ class CurveLength:
             raise InputError("the curve is empty: give at least one piece")
         if not 1e-16 <= accuracy < 1:
             raise InputError(f"the accuracy of lengths is {accuracy:g}: give a part from 1e-16 to 1")
-        self._table = Native(curve.native, accuracy)
+        self._curve, self._accuracy = curve, accuracy
+
+    def __reduce__(self) -> tuple[type[CurveLength], tuple[CompositeCurve, float]]:
+        return CurveLength, (self._curve, self._accuracy)
+
+    @cached_property
+    def _table(self) -> Native:
+        return Native(self._curve.native, self._accuracy)
 
     @property
     def total(self) -> float:

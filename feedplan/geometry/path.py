@@ -360,10 +360,6 @@ class Path:
         """The parameter interval of each piece (n,) [mm: about the length]."""
         return self.curve.width
 
-    def __getstate__(self) -> dict[str, Any]:
-        # The copy makes its own table of lengths.
-        return {name: value for name, value in vars(self).items() if name != "lengths"}
-
     @property
     def length(self) -> float:
         """Length along all axes [mm; of joints their unit]."""
