@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from feedplan.arguments import number, positive
-from feedplan.arrays import Flags
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
@@ -36,21 +34,20 @@ class Knots:
         self._origin = problem.joint_origin
         self._ends_at_rest = problem.end_speed == 0.0
         begins, _, times = self._sampler.runs.T
-        # Pauses and runs in turn; a pause of no time has no step.
-        pauses = np.concatenate(([problem.path.start_dwell], problem.path.dwell))
-        self._begin = np.zeros(2 * len(times) + 1)
+        # Pauses and runs in turn; one of no time has no step.
+        self._begin, self._time = np.zeros((2, 2 * len(times) + 1))
         self._begin[1::2], self._begin[2::2] = begins, begins + times
-        self._time = np.zeros(2 * len(times) + 1)
-        self._time[0::2], self._time[1::2] = pauses, times
-        steps = np.where(pauses > 0.0, 1.0, 0.0)
-        moving = np.where(times > 0.0, np.maximum(np.ceil(times / self.step), LEAST_STEPS), 0.0)
-        if not 1.0 + steps.sum() + moving.sum() <= most:
+        self._time[0::2] = np.append(problem.path.start_dwell, problem.path.dwell)
+        self._time[1::2] = times
+        steps = np.ones(len(self._time))
+        steps[1::2] = np.maximum(np.ceil(times / self.step), LEAST_STEPS)
+        steps[self._time == 0.0] = 0.0
+        if not 1.0 + steps.sum() <= most:
             raise InputError(
                 f"a step of {step:g} s makes more than {most} knots: choose a longer one, or ask for so many "
                 "by max_setpoints"
             )
-        self._steps = np.zeros(2 * len(times) + 1, np.int64)
-        self._steps[0::2], self._steps[1::2] = steps, moving
+        self._steps = steps.astype(np.int64)
         self._ends = np.cumsum(self._steps)
         self.count = 1 + int(self._ends[-1])
         self.duration = float(self._begin[-1] + self._time[-1])
@@ -75,13 +72,7 @@ class Knots:
         _, position, velocity, acceleration, jerk, line, piece, u, *_ = states
         if self._origin is not None:
             position += self._origin[piece]
-        chunk = SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
         stops = (left == 0) & (self._ends_at_rest | (index < self.count - 1))
-        return _resting(chunk, pausing | stops)
-
-
-def _resting(chunk: SetpointChunk, rests: Flags) -> SetpointChunk:
-    """The same without motion at some rows."""
-    moving = ~rests[:, None]
-    rates = {name: getattr(chunk, name) * moving for name in ("velocity", "acceleration", "jerk")}
-    return replace(chunk, **rates)
+        moving = ~(pausing | stops)[:, None]
+        rates = (velocity * moving, acceleration * moving, jerk * moving)
+        return SetpointChunk(t, position, *rates, line, self.axes, piece, u)
