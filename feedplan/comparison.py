@@ -133,7 +133,7 @@ def compare(
     rival = machine.controller if given is None else Controller.of(given)
     alone = replace(machine, controller=None)
     today: Today | None = None
-    plans: list[tuple[MethodName, Plan | None, str | None]] = []
+    rows: list[Row] = []
     for method, takes in has.items():
         shown = partial(_show, progress, method)
         shown("fit", 0.0)
@@ -143,26 +143,26 @@ def compare(
             today = today or made.today
             made = replace(made, machine=machine, today=today and replace(today, planned=made.time))
             made.audit(shown)
-            plans.append((method, made, None))
+            rows.append(Row(method, made, made.lower_bound))
         except (InfeasibleError, MissingPackageError, SolverError) as error:
-            plans.append((method, None, str(error)))
+            rows.append(Row(method, None, 0.0, str(error)))
         if progress:
             progress(method, 1.0)
-    bounds = [
-        max((other.lower_bound for _, other, _ in plans if other and _bounds(other, made)), default=0.0)
-        if made
-        else 0.0
-        for _, made, _ in plans
-    ]
-    return tuple(
-        Row(method, made, bound, error) for (method, made, error), bound in zip(plans, bounds, strict=True)
-    )
+    return tuple(replace(row, lower_bound=_greatest_bound(row, rows)) for row in rows)
 
 
 def _show(progress: Progress | None, method: str, stage: str, done: float) -> None:
     if progress and stage in STAGES:
         start, end = STAGES[stage]
         progress(method, start + (end - start) * done)
+
+
+def _greatest_bound(row: Row, rows: Sequence[Row]) -> float:
+    """The greatest lower bound of all plans that holds for the plan of a row; 0 without one."""
+    bounds = (
+        other.lower_bound for other in rows if row.plan and other.plan and _bounds(other.plan, row.plan)
+    )
+    return max(bounds, default=0.0)
 
 
 def _bounds(other: Plan, made: Plan) -> bool:
