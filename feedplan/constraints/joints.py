@@ -231,7 +231,7 @@ def _affine(task: _Task) -> _Motion:
     if ((joints.control_points < travel[:, 0]) | (joints.control_points > travel[:, 1])).any():
         _route(task, tips)
     linear = task.linear(tool)
-    speed = _either(SpeedPolynomial.of(linear), SpeedPolynomial.of(tool), _moving(linear))
+    speed = _either(SpeedPolynomial.of(linear), SpeedPolynomial.of(tool), linear.has_length)
     origin = joints.control_points[joints.offsets[:-1]]
     local = joints.control_points - np.repeat(origin, np.diff(joints.offsets), axis=0)
     whole = np.tile([0.0, 1.0], (len(tool), 1))
@@ -256,7 +256,7 @@ def _curved(task: _Task) -> _Motion:
     tips = tips.elevated(int(tips.degree.max()))
     control, width, weights = tips.by_piece, tips.width, tips.weights_by_piece
     route = _route(task, tips)
-    moves = _moving(task.linear(curve))
+    moves = task.linear(curve).has_length
     interpolants = joint_interpolants(
         kinematics, control, width, _accuracy(task, curve, moves), NODES, weights
     )
@@ -288,13 +288,6 @@ def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) ->
     rotary = np.array(task.words.kinematics.rotary)
     columns = rotary if rotary.any() else ~rotary
     return SpeedPolynomial.of(replace(joints, control_points=joints.control_points[:, columns]))
-
-
-def _moving(curve: CompositeCurve) -> Flags:
-    """Which pieces have a length (n,)."""
-    moving = np.ones(len(curve), dtype=bool)
-    moving[curve.zero_length] = False
-    return moving
 
 
 def _accuracy(task: _Task, curve: CompositeCurve, moves: Flags) -> Accuracy:

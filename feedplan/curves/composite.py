@@ -244,11 +244,11 @@ class CompositeCurve(OfNative[Curve]):
         )
 
     @property
-    def zero_length(self) -> Integers:
-        """The pieces whose control points all coincide."""
+    def has_length(self) -> Flags:
+        """Which pieces have control points that differ (n,)."""
         first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         apart = (self.control_points != first).any(axis=1)
-        return np.flatnonzero(~np.logical_or.reduceat(apart, self.offsets[:-1]))
+        return np.logical_or.reduceat(apart, self.offsets[:-1])
 
 
 def _degree(degree: int) -> int:

@@ -175,7 +175,7 @@ class Path:
         """
         instance(curve, CompositeCurve, "the curve", "a CompositeCurve")
         names, speed = _names(axes, curve.axes), _feed(feed)
-        moving = np.delete(np.arange(len(curve)), curve.zero_length)
+        moving = np.flatnonzero(curve.has_length)
         native, piece, rests = _closed_gaps(curve.take(moving)).native.regular()
         if len(piece) == 0:
             raise InputError("the curve has no length: give control points that differ")

@@ -275,7 +275,7 @@ def test_corners_and_pieces_of_no_length_are_found() -> None:
     knots = [0, 0, 0, 1, 1, 2, 3, 3, 3]
     corner = CompositeCurve.from_bspline([[0.0, 0], [1, 1], [2, 0], [3, 1], [3, 1], [3, 1]], knots, 2)
     assert joints(corner) == [Joint.CORNER, Joint.C1]
-    assert corner.zero_length.tolist() == [2]
+    assert corner.has_length.tolist() == [True, True, False]
 
 
 @pytest.mark.parametrize(
