@@ -141,7 +141,8 @@ class _Modes:
             "inches": False,
         }
         self.beside: set[bytes] = set()
-        self.given: list[tuple[int, dict[str, bool]]] = []
+        # The modes in force from a line on; of several in one line the last ones.
+        self._given = [(0, {**self.now, "plain": True})]
         self.units = self.feed_mode = b""
 
     def take(self, line: int, code: bytes) -> bool:
@@ -164,16 +165,14 @@ class _Modes:
             self.beside.add({b"16": b"15", b"7": b"8", b"43.5": b"49", b"68": b"69"}[code])
         else:
             self.beside.discard(code)
-        self.given.append((line, {**self.now, "plain": not self.beside}))
+        self._given.append((line, {**self.now, "plain": not self.beside}))
         return voids
 
-    def column(self, name: str, count: int, first: bool) -> Flags:
-        """A mode on each line (count,)."""
-        column = np.full(count, first)
-        for k, (line, given) in enumerate(self.given):
-            end = self.given[k + 1][0] if k + 1 < len(self.given) else count
-            column[line:end] = given[name]
-        return column
+    def columns(self, count: int) -> dict[str, Flags]:
+        """The modes on each line (count,), by name."""
+        lines, modes = zip(*self._given, strict=True)
+        at = np.searchsorted(lines, np.arange(count), side="right") - 1
+        return {name: np.array([own[name] for own in modes])[at] for name in modes[0]}
 
 
 def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
@@ -253,14 +252,9 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
         exclusion=exclusion,
         feed_at=feed_at,
         feed=feed,
-        inverse=now.column("inverse", count, False),
-        per_minute=now.column("per_minute", count, True),
         voids=voids,
         modes=modes,
-        absolute=now.column("absolute", count, True),
-        absolute_centres=now.column("absolute_centres", count, False),
-        inches=now.column("inches", count, False),
-        plain=now.column("plain", count, True),
+        **now.columns(count),
         calls_set_feed=bool((feed_at[away, 0] >= 0).any() or (calls and not subs)),
     )
 
