@@ -25,10 +25,11 @@ _ROTARY = b"ABC"
 
 @dataclass(frozen=True)
 class Word:
-    """A word of a line: its letter, its number as written, and where the number begins and ends."""
+    """A word of a line: its letter, its number as written, and where word and number begin and end."""
 
     letter: bytes
     text: bytes
+    start: int
     begin: int
     end: int
 
@@ -61,7 +62,7 @@ def words_of(line: bytes) -> list[Word] | None:
         found = _WORD.match(line, at)
         if found is None or found.end() > end:
             return None
-        words.append(Word(found[1].upper(), found[3], *found.span(3)))
+        words.append(Word(found[1].upper(), found[3], found.start(), *found.span(3)))
         at = found.end()
     letters = [word.letter for word in words if word.letter != b"G"]
     known = all(letter in b"NXYZABCUVWIJKRPFS" for letter in letters)
@@ -148,9 +149,9 @@ def _first(
     for word in words:
         number = rest.pop(word.letter, None)
         if word.letter in (b"R", b"P"):
-            # The word goes, with the blanks before its number.
-            begin = word.begin - len(_letter_before(body, word.begin))
-            pieces.append(body[at:begin].rstrip(b" \t") if blank else body[at:begin])
+            # The word goes, with the blanks before it.
+            before = body[at : word.start]
+            pieces.append(before.rstrip(b" \t") if blank else before)
             at = word.end
         elif number is not None:
             pieces += [body[at : word.begin], number]
@@ -160,9 +161,3 @@ def _first(
     code = b"".join(pieces)
     more = b"".join(blank + letter + number for letter, number in rest.items())
     return code + more + body[end:]
-
-
-def _letter_before(body: bytes, at: int) -> bytes:
-    """The letter of the word whose number begins there, with the blanks between them."""
-    found = re.search(rb"[A-Za-z][ \t]*$", body[:at])
-    return found[0] if found else b""
