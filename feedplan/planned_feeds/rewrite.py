@@ -341,8 +341,6 @@ def _split(
 def _most(blocks: Blocks, program: Program, feeds: Feeds, speeds: LineSpeeds) -> Floats:
     """The greatest feed that each move may ask for (m,): that of the plan in its line, else its own."""
     ratio = np.ones(len(blocks))
-    changed = feeds.changes.line - 1
-    by_line = np.ones(len(blocks))
-    by_line[speeds.line] = np.where(np.isnan(speeds.ratio), 1.0, speeds.ratio)
-    ratio[changed] = by_line[changed]
+    own = np.isin(speeds.line, feeds.changes.line - 1) & ~np.isnan(speeds.ratio)
+    ratio[speeds.line[own]] = speeds.ratio[own]
     return np.asarray(program.feed * ratio[program.line.astype(np.int64) - 1])
