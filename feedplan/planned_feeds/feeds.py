@@ -41,12 +41,12 @@ class Changes:
 class Feeds:
     """Edits of lines, by their index from 0.
 
-    `texts`: the new F of a line; `parts`: those of its parts, None where the F in force holds; `restore`: the
-    F in a new line before it; `modes`: lines that get G93; `left`: the reason why a line keeps its F.
+    `texts`: the new F of each part of a line, which has one if it is not split; None where the F in force
+    holds. `restore`: the F in a new line before it; `modes`: lines that get G93; `left`: the reason why a
+    line keeps its F.
     """
 
-    texts: dict[int, bytes]
-    parts: dict[int, list[bytes | None]]
+    texts: dict[int, list[bytes | None]]
     restore: dict[int, bytes]
     changes: Changes
     left: dict[int, str]
@@ -136,16 +136,12 @@ def planned_feeds(
     own = own_of[lines[of]] & first
     write = np.where(other, own | (wanted != before), feeds[of] & ~own & (before != 0.0))
 
-    texts: dict[int, bytes] = {}
-    several: dict[int, list[bytes | None]] = {}
+    texts: dict[int, list[bytes | None]] = {}
     rows = np.flatnonzero(write)
     for k, text in zip(rows.tolist(), feed_texts(wanted[rows], point), strict=True):
         place = int(of[k])
         new = text if wanted[k] else _text(blocks, source[place], programmed[place])
-        if counts[place] == 1:
-            texts[int(lines[place])] = new
-        else:
-            several.setdefault(int(lines[place]), [None] * int(counts[place]))[k - int(starts[place])] = new
+        texts.setdefault(int(lines[place]), [None] * int(counts[place]))[k - int(starts[place])] = new
     restore: dict[int, bytes] = {}
     for k in np.flatnonzero((exclusion[of] != Exclusion.NO) & (before != 0.0)).tolist():
         # The line before has the F that is restored.
@@ -156,7 +152,7 @@ def planned_feeds(
         left[int(lines[place])] = REASONS[Exclusion(exclusion[place])]
     changed = np.flatnonzero(other)
     changes = Changes(lines[of[changed]] + 1, programmed[of[changed]], wanted[changed])
-    return Feeds(texts, several, restore, changes, left)
+    return Feeds(texts, restore, changes, left)
 
 
 def _programmed_feeds(

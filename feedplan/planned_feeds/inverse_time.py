@@ -90,19 +90,15 @@ def inverse_feeds(
     lines, before, wanted = (np.array(column) for column in zip(*rows, strict=True))
     after = rounded_down(wanted)
     written = iter(feed_texts(after, point))
-    texts: dict[int, bytes] = {}
-    several: dict[int, list[bytes | None]] = {}
-    for line, size in sizes.items():
-        if size == 1:
-            texts[line] = next(written)
-        else:
-            several[line] = [next(written) for _ in range(size)]
+    texts: dict[int, list[bytes | None]] = {
+        line: [next(written) for _ in range(size)] for line, size in sizes.items()
+    }
     # Where the tool does not move any number will do.
-    texts |= dict.fromkeys(_idle(blocks, counts).tolist(), b"1")
+    texts |= {line: [b"1"] for line in idle.tolist()}
     modes = set(np.flatnonzero(blocks.modes[:, 0] >= 0).tolist())
     if min(modes, default=len(blocks)) > min(first):
         modes.add(min(first))
-    return Feeds(texts, several, {}, Changes(lines.astype(np.int64), before, after), {}, modes)
+    return Feeds(texts, {}, Changes(lines.astype(np.int64), before, after), {}, modes)
 
 
 def _refused(program: Program, line: int, why: str) -> InputError:

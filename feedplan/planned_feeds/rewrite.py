@@ -331,7 +331,7 @@ def _split(
         sense = Sense(
             bool(blocks.absolute[line]), bool(blocks.absolute_centres[line]), bool(blocks.inches[line])
         )
-        texts = feeds.parts.get(line, [None] * len(own))
+        texts = feeds.texts.get(line, [None] * len(own))
         replaced[line] = part_lines(
             blocks.line(line), words[m], sense, program.axes, motion.start, own, centre, texts, usual
         )

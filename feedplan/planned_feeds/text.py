@@ -68,7 +68,7 @@ def rewritten(blocks: Blocks, feeds: Feeds, replaced: Mapping[int, bytes]) -> by
         if line in feeds.restore:
             stop = line_end(content[begin:end]) or line_end(blocks.line(0)) or b"\n"
             parts += [b"F", feeds.restore[line], stop]
-        text = feeds.texts.get(line)
+        text = feeds.texts[line][0] if line in feeds.texts else None
         if line in feeds.modes:
             parts.append(_with_mode(blocks, line, text, replaced.get(line), usual))
         elif line in replaced:
