@@ -11,10 +11,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
 from feedplan.arrays import Flags, Floats, Integers
+from feedplan.constraints.tool_motion import linear_motion
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.speed_polynomial import SpeedPolynomial, interpolated_squares
 from feedplan.errors import InputError
@@ -39,21 +41,6 @@ MEETING = 1e-6
 NODES = 8
 
 
-@dataclass(frozen=True)
-class JointMotion:
-    """The fields of a `Problem` whose joints move in another way than the path's axes; see there.
-
-    `path` is cut so that each of its pieces has one piece of the joints.
-    """
-
-    path: Path
-    cut: Cut
-    joints: CompositeCurve
-    joint_origin: Floats
-    tip_speed: SpeedPolynomial
-    words: tuple[AxisWords, ...]
-
-
 def way_scale(axes: tuple[str, ...], machine: Machine) -> Floats:
     """The share of each axis of a path in its length (axes,), 1 for linear axes.
 
@@ -68,10 +55,12 @@ def way_scale(axes: tuple[str, ...], machine: Machine) -> Floats:
     return np.array(scale)
 
 
-def joint_motion(path: Path, machine: Machine, feed: Floats) -> JointMotion:
-    """The motion of the machine's joints along the path; `feed` (n,) [mm/s] is the greatest speed of a piece.
+def joint_motion(path: Path, machine: Machine, feed: Floats) -> tuple[Path, dict[str, Any]]:
+    """The path cut so that each piece has one piece of the machine's joints, and the fields of a `Problem`
+    that tell the joints' motion.
 
-    Raises InputError where the tool passes a singular position or a joint leaves its travel, with the line.
+    `feed` (n,) [mm/s] is the greatest speed of a piece. Raises InputError where the tool passes a singular
+    position or a joint leaves its travel, with the line.
     """
     runs = [_words(path, machine, run) for run in range(len(path.runs) - 1)]
     motions: list[_Motion] = []
@@ -88,9 +77,15 @@ def joint_motion(path: Path, machine: Machine, feed: Floats) -> JointMotion:
         motions.append(motion)
         start = motion.origin[-1] + motion.joints.control_points[-1]
     whole = _Motion.joined(motions)
-    cut = Cut(path.curve, whole.piece, whole.part)
-    cut_path = path.cut(whole.tool, whole.piece)
-    return JointMotion(cut_path, cut, whole.joints, whole.origin, whole.speed, tuple(words))
+    return path.cut(whole.tool, whole.piece), {
+        "joints": whole.joints,
+        "joint_origin": whole.origin,
+        "joint_axes": machine.axis_names,
+        "tip_speed": whole.speed,
+        "way_scale": way_scale(path.axes, machine),
+        "words": tuple(words),
+        "cut": Cut(path.curve, whole.piece, whole.part),
+    }
 
 
 def _require_meeting(machine: Machine, line: int, start: Floats, motion: _Motion) -> None:
@@ -123,10 +118,8 @@ class _Task:
         return int(self.path.line[self.pieces[piece]])
 
     def linear(self, curve: CompositeCurve) -> CompositeCurve:
-        """The motion in X, Y and Z alone; at rest in X where the path has none of them."""
-        columns = [column for column, name in enumerate(self.path.axes) if name in ("X", "Y", "Z")]
-        points = curve.control_points[:, columns] if columns else np.zeros((len(curve.control_points), 1))
-        return replace(curve, control_points=points)
+        """The motion in X, Y and Z alone."""
+        return linear_motion(curve, self.path.axes)
 
     def direction(self, curve: CompositeCurve) -> CompositeCurve:
         """The motion in I, J and K alone."""

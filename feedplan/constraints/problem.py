@@ -14,7 +14,7 @@ from feedplan.arguments import not_negative, number
 from feedplan.arrays import Floats
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
-from feedplan.constraints.tool_motion import ToolMotion
+from feedplan.constraints.tool_motion import ToolMotion, linear_motion
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.geometry.corners import Corners
@@ -147,15 +147,11 @@ class Problem:
         return self.joint_units or usual_units(self.axes)
 
     @property
-    def path_units(self) -> tuple[str, ...]:
-        """Units of the axes of the path."""
-        return self.units if self.joints is None else usual_units(self.path.axes)
-
-    @property
     def way_units(self) -> tuple[str, str]:
         """Units of the tool's way where X, Y, Z, or U, V, W move, and where others do alone."""
+        units = self.units if self.joints is None else usual_units(self.path.axes)
         leads = np.logical_or.reduce(feed_groups(self.path.axes)[:-1])
-        named = list(zip(self.path_units, leads.tolist(), strict=True))
+        named = list(zip(units, leads.tolist(), strict=True))
         return (
             shared_unit((unit for unit, lead in named if lead), "mm"),
             shared_unit((unit for unit, lead in named if not lead), "deg"),
@@ -238,13 +234,7 @@ class Problem:
     @cached_property
     def tip_curve(self) -> CompositeCurve | None:
         """The tool's motion in X, Y, Z where the joints have pieces of their own."""
-        if self.joints is None:
-            return None
-        points = np.zeros((len(self.path.curve.control_points), 3))
-        for column, name in enumerate(self.path.axes):
-            if name in ("X", "Y", "Z"):
-                points[:, "XYZ".index(name)] = self.path.curve.control_points[:, column]
-        return replace(self.path.curve, control_points=points)
+        return None if self.joints is None else linear_motion(self.path.curve, self.path.axes)
 
 
 def build_problem(
@@ -271,12 +261,10 @@ def build_problem(
     request = FeedRequest(feed, feed_override)
     if has_joints_of_its_own(path, machine):
         # Kinematics are loaded where they are needed.
-        from feedplan.constraints.joints import joint_motion, way_scale
+        from feedplan.constraints.joints import joint_motion
 
         axes, greatest, jump = list(machine.axes), NO_FEED, None
-        others: dict[str, Any] = vars(joint_motion(path, machine, feed_limit(path, greatest, request)))
-        path = others.pop("path")
-        others |= {"joint_axes": machine.axis_names, "way_scale": way_scale(path.axes, machine)}
+        path, others = joint_motion(path, machine, feed_limit(path, greatest, request))
     else:
         axes = [machine.axis(name) for name in path.axes]
         greatest = 2.0 * float(np.linalg.norm([sizes_of(axis.max_velocity)[1] for axis in axes]))

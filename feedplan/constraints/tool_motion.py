@@ -89,6 +89,15 @@ class ToolMotion:
         return np.zeros(len(u)) if self._table is None else self._table.length(piece, u)
 
 
+def linear_motion(curve: CompositeCurve, axes: tuple[str, ...]) -> CompositeCurve:
+    """The motion of a curve in `axes` along X, Y and Z alone, at rest in those of the three that it lacks."""
+    points = np.zeros((len(curve.control_points), 3))
+    for column, name in enumerate(axes):
+        if name in ("X", "Y", "Z"):
+            points[:, "XYZ".index(name)] = curve.control_points[:, column]
+    return replace(curve, control_points=points)
+
+
 def _counted(path: Path) -> tuple[Floats, Flags]:
     """`ToolMotion.share` and `ToolMotion.turns` of a path with other axes than X, Y, Z."""
     axes, points, first = path.axes, path.curve.control_points, path.curve.offsets[:-1]
