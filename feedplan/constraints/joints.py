@@ -145,29 +145,17 @@ class _Motion:
 
     @classmethod
     def joined(cls, motions: Sequence[_Motion]) -> _Motion:
-        """Motions one after the other as one, in the words of the first."""
+        """Motions as one, in the order of their pieces and in the words of the first."""
+        piece = np.concatenate([motion.piece for motion in motions])
+        order = np.argsort(piece, kind="stable")
         return cls(
             motions[0].words,
-            np.concatenate([motion.piece for motion in motions]),
-            np.concatenate([motion.part for motion in motions]),
-            CompositeCurve.joined([motion.tool for motion in motions], math.inf),
-            CompositeCurve.joined([motion.joints for motion in motions], math.inf),
-            np.concatenate([motion.origin for motion in motions]),
-            SpeedPolynomial.joined(row for motion in motions for row in motion.speed.rows()),
-        )
-
-    def in_order(self) -> _Motion:
-        """The same with the parts in the order of their pieces."""
-        order = np.argsort(self.piece, kind="stable")
-        rows = self.speed.rows()
-        return _Motion(
-            self.words,
-            self.piece[order],
-            self.part[order],
-            self.tool.take(order),
-            self.joints.take(order),
-            self.origin[order],
-            SpeedPolynomial.joined(rows[i] for i in order.tolist()),
+            piece[order],
+            np.concatenate([motion.part for motion in motions])[order],
+            CompositeCurve.joined([motion.tool for motion in motions], math.inf).take(order),
+            CompositeCurve.joined([motion.joints for motion in motions], math.inf).take(order),
+            np.concatenate([motion.origin for motion in motions])[order],
+            SpeedPolynomial.joined([motion.speed for motion in motions]).take(order),
         )
 
 
@@ -216,7 +204,7 @@ def _affine(task: _Task) -> _Motion:
         if rational.all():
             return curved
         straight = _affine(replace(task, pieces=task.pieces[~rational]))
-        return _Motion.joined([straight, curved]).in_order()
+        return _Motion.joined([straight, curved])
     tool = replace(tool, weights=None)
     tips = replace(tool, control_points=words.tip(tool.control_points))
     joints = replace(tool, control_points=positions(words.kinematics, tips.control_points))
@@ -277,7 +265,7 @@ def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) ->
     """The speed of the rotary joints, or of the tool's direction: the feed limits it where X, Y, Z rest."""
     if task.words.coordinate_mode is CoordinateMode.VECTOR:
         square = interpolated_squares(_turning_of(task.direction(tool)), np.arange(len(tool)), tool.width)
-        return SpeedPolynomial.joined((1 + SPEED_SHARE) * square)
+        return SpeedPolynomial((1 + SPEED_SHARE) * square.ravel(), np.arange(len(tool) + 1) * square.shape[1])
     rotary = np.array(task.words.kinematics.rotary)
     columns = rotary if rotary.any() else ~rotary
     return SpeedPolynomial.of(replace(joints, control_points=joints.control_points[:, columns]))
@@ -338,5 +326,5 @@ def _either(first: SpeedPolynomial, second: SpeedPolynomial, chosen: Flags) -> S
     """The first where it is chosen, piece by piece, and else the second."""
     if chosen.all():
         return first
-    pairs = zip(first.rows(), second.rows(), chosen, strict=True)
-    return SpeedPolynomial.joined(one if own else other for one, other, own in pairs)
+    pieces = np.arange(len(chosen))
+    return SpeedPolynomial.joined([first, second]).take(np.where(chosen, pieces, len(chosen) + pieces))

@@ -168,11 +168,9 @@ class CompositeCurve(OfNative[Curve]):
 
     def take(self, pieces: NDArray[np.integer]) -> CompositeCurve:
         """These pieces (m,) in this order, whether or not they meet."""
-        counts = np.diff(self.offsets)[pieces]
-        offsets = np.concatenate([[0], np.cumsum(counts)])
-        own = np.repeat(self.offsets[pieces] - offsets[:-1], counts) + np.arange(offsets[-1])
-        weights = None if self.weights is None else self.weights[own]
-        return CompositeCurve(self.control_points[own], weights, offsets, self.width[pieces])
+        rows, offsets = rows_of(self.offsets, pieces)
+        weights = None if self.weights is None else self.weights[rows]
+        return CompositeCurve(self.control_points[rows], weights, offsets, self.width[pieces])
 
     @property
     def rational(self) -> Flags:
@@ -249,6 +247,14 @@ class CompositeCurve(OfNative[Curve]):
         first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         apart = (self.control_points != first).any(axis=1)
         return np.logical_or.reduceat(apart, self.offsets[:-1])
+
+
+def rows_of(offsets: Integers, pieces: NDArray[np.integer]) -> tuple[Integers, Integers]:
+    """The rows of these pieces (m,), piece i having those from `offsets[i]` to `offsets[i + 1]`, and their
+    offsets (m + 1,) where they are taken in this order."""
+    counts = np.diff(offsets)[pieces]
+    taken = np.concatenate([[0], np.cumsum(counts)])
+    return np.repeat(offsets[pieces] - taken[:-1], counts) + np.arange(taken[-1]), taken
 
 
 def _degree(degree: int) -> int:

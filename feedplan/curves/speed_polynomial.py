@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.arrays import Floats, Integers
-from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.composite import CompositeCurve, rows_of
 
 # Chebyshev points of |C'|² of rational pieces.
 SPEED_NODES = 12
@@ -56,19 +56,20 @@ class SpeedPolynomial:
         return cls(coefficients, offsets)
 
     @classmethod
-    def joined(cls, rows: Iterable[Floats]) -> SpeedPolynomial:
-        """The polynomials with these coefficients, one row a piece."""
-        rows = list(rows)
-        return cls(np.concatenate(rows), np.concatenate([[0], np.cumsum([len(row) for row in rows])]))
-
-    def rows(self) -> list[Floats]:
-        """The coefficients of each piece."""
-        return np.split(self.coefficients, self.offsets[1:-1])
+    def joined(cls, parts: Sequence[SpeedPolynomial]) -> SpeedPolynomial:
+        """Those of pieces one after the other."""
+        counts = np.concatenate([np.diff(part.offsets) for part in parts])
+        coefficients = np.concatenate([part.coefficients for part in parts])
+        return cls(coefficients, np.concatenate([[0], np.cumsum(counts)]))
 
     def __getitem__(self, pieces: slice) -> SpeedPolynomial:
         """Those of neighbouring pieces."""
-        offsets = self.offsets[pieces.start : pieces.stop + 1]
-        return SpeedPolynomial(self.coefficients[offsets[0] : offsets[-1]], offsets - offsets[0])
+        return self.take(np.arange(pieces.start, pieces.stop))
+
+    def take(self, pieces: NDArray[np.integer]) -> SpeedPolynomial:
+        """Those of these pieces (m,) in this order."""
+        rows, offsets = rows_of(self.offsets, pieces)
+        return SpeedPolynomial(self.coefficients[rows], offsets)
 
     def evaluate(self, piece: NDArray[np.integer], t: Floats) -> Floats:
         """The square at fractions t (m,) of the parameter intervals of pieces (m,)."""
@@ -88,14 +89,8 @@ def interpolated_squares(
 ) -> Floats:
     """Bernstein coefficients (n, SPEED_NODES) through a function of piece and u, on these pieces (n,)."""
     u = (width[:, None] * chebyshev(SPEED_NODES)).ravel()
-    values = square(np.repeat(piece, SPEED_NODES), u)
-    return from_chebyshev(values.reshape(-1, SPEED_NODES))
-
-
-def from_chebyshev(values: Floats) -> Floats:
-    """Bernstein coefficients (n, m, …) of the polynomials with these values (n, m, …) at `chebyshev(m)`."""
-    coefficients: Floats = np.einsum("ij,nj...->ni...", to_bernstein(values.shape[1]), values)
-    return coefficients
+    values = square(np.repeat(piece, SPEED_NODES), u).reshape(-1, SPEED_NODES)
+    return np.asarray(np.einsum("ij,nj->ni", to_bernstein(SPEED_NODES), values))
 
 
 def to_bernstein(count: int) -> Floats:
