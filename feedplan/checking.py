@@ -69,7 +69,7 @@ def check(
         known = Machine.of(machine)
     _require_units(points, known)
     tell(reading, 1.0)
-    period = plan.period if plan else points.period or known.period
+    period = plan.rows[SETPOINTS][2] if plan else points.period or known.period
     limits_of_method = {
         "jerk": jerk or (plan is not None and limits_jerk(plan.method)),
         "corners": plan is not None and corners(plan.method) is Corners.PROGRAMMED,
@@ -113,23 +113,15 @@ def _recorded(values: Floats) -> Floats | None:
 
 @dataclass(frozen=True)
 class _Plan:
-    """The data of plan.json about its setpoints: `count` of them from 0 to `duration` [s], one every `period`
-    [s]; number, last time and longest step of its `knots`, None without knots; hashes of the `events` for
-    each kind of rows."""
+    """The data of plan.json about its setpoints and knots: number, last time [s] and period or longest step
+    [s] of each kind of `rows` that it has; hashes of the `events` for each kind."""
 
     file: FilePath
     machine: Machine
     method: str
     axes: tuple[str, ...]
-    count: int
-    duration: float
-    period: float
-    knots: tuple[int, float, float] | None
+    rows: dict[str, tuple[int, float, float]]
     events: dict[str, str]
-
-    def rows(self, kind: str) -> tuple[int, float, float] | None:
-        """Number, last time and period of rows of a kind; None if the plan has no such rows."""
-        return self.knots if kind == KNOTS else (self.count, self.duration, self.period)
 
 
 def _read(file: FilePath) -> _Plan:
@@ -153,29 +145,27 @@ def _read(file: FilePath) -> _Plan:
         raise InputError(f"{file}: the method '{method}' is unknown: use the feedplan that wrote it")
     points = _Entries(file, entries.take("setpoints", dict), "setpoints ")
     events = _Entries(file, entries.take("events", dict), "events ")
-    knots = None
+    machine = Machine.from_toml(text, f"in {file}", joints_only=True)
+    axes = tuple(map(str, points.take("axes", list)))
+    count, duration, period = points.take("count", int), points.number("duration"), points.number("period")
+    time, rows = entries.number("time"), {SETPOINTS: (count, duration, period)}
     if KNOTS in summary:
-        own = _Entries(file, entries.take(KNOTS, dict), "knots ")
-        knots = own.take("count", int), entries.number("time"), own.number("step")
-    plan = _Plan(
-        file=file,
-        machine=Machine.from_toml(text, f"in {file}", joints_only=True),
-        method=method,
-        axes=tuple(map(str, points.take("axes", list))),
-        count=points.take("count", int),
-        duration=points.number("duration"),
-        period=points.number("period"),
-        knots=knots,
-        events={name: events.take(f"sha256_of_{name}", str) for name in (SETPOINTS, KNOTS)},
-    )
+        knots = _Entries(file, entries.take(KNOTS, dict), "knots ")
+        rows[KNOTS] = knots.take("count", int), time, knots.number("step")
     # The setpoints wait less than one period in each run and in the pause before the first.
-    time, waits = entries.number("time"), (entries.take("runs", int) + 1) * plan.period
-    if not time * (1.0 - ROUNDING) <= plan.duration <= time + waits:
+    if not time * (1.0 - ROUNDING) <= duration <= time + (entries.take("runs", int) + 1) * period:
         raise InputError(
-            f"{file}: the time is {time:.9g} s, its setpoints take {plan.duration:.9g} s: "
+            f"{file}: the time is {time:.9g} s, its setpoints take {duration:.9g} s: "
             "one of them was changed, plan again"
         )
-    return plan
+    return _Plan(
+        file=file,
+        machine=machine,
+        method=method,
+        axes=axes,
+        rows=rows,
+        events={name: events.take(f"sha256_of_{name}", str) for name in (SETPOINTS, KNOTS)},
+    )
 
 
 def _require_program(file: FilePath, entries: _Entries, summary: Mapping[str, Any]) -> None:
@@ -216,19 +206,17 @@ class _Entries:
 
     def number(self, name: str) -> float:
         """A finite number that is not negative."""
-        value = self._table.get(name)
-        good = is_number(value) and 0 <= value < math.inf  # type: ignore[operator]
-        if not good:
+        value: Any = self._table.get(name)
+        if not (is_number(value) and 0 <= value < math.inf):
             raise InputError(f"{self._file}: {self._place}{name} is {shown(value)}: plan again")
-        return float(value)  # type: ignore[arg-type]
+        return float(value)
 
 
 def _require_same(plan: _Plan, points: SetpointFile) -> None:
     """Raises InputError unless the setpoints are those that plan.json describes."""
-    known = plan.rows(points.rows)
-    if known is None:
+    if points.rows not in plan.rows:
         raise _other(points, plan, "table", f"one of {points.rows}", "nothing of it")
-    count, duration, period = known
+    count, duration, period = plan.rows[points.rows]
     rows: list[tuple[str, Any, Any, str]] = [
         ("axes", " ".join(points.axes), " ".join(plan.axes), ""),
         (f"number of {points.rows}", len(points), count, ""),
