@@ -21,8 +21,8 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.speed_polynomial import SpeedPolynomial, interpolated_squares
 from feedplan.errors import InputError
 from feedplan.geometry.path import Cut, Path
-from feedplan.machine.axis import size_of
-from feedplan.machine.axis_words import DIRECTION, AxisWords, axis_words
+from feedplan.machine.axis import DIRECTION, size_of
+from feedplan.machine.axis_words import AxisWords, axis_words
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.joint_interpolants import (
     SPEED_SHARE,

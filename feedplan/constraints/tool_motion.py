@@ -20,9 +20,10 @@ from feedplan.curves.length import CurveLength
 from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
 from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
+from feedplan.machine.axis import DIRECTION
 
-# I, J, K are the tool's direction, a unit vector.
-_DEGREES = {name: math.degrees(1.0) for name in "IJK"}
+# The tool's direction is a unit vector.
+_DEGREES = dict.fromkeys(DIRECTION, math.degrees(1.0))
 
 # Differences of control points up to this many units in the last place of the greatest are rounding, not
 # motion.

@@ -25,7 +25,7 @@ from feedplan.geometry.fit_settings import FitSettings, tolerance_of
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.rules import Rules
 from feedplan.lazy import cached_property
-from feedplan.machine.axis import AXIS_NAME, NAME_REMEDY
+from feedplan.machine.axis import AXIS_NAME, DIRECTION, NAME_REMEDY
 from feedplan.program.program import MoveKind, PathControl, Program
 from feedplan.units import counted
 
@@ -440,7 +440,7 @@ def _names(axes: Sequence[str] | None, count: int) -> tuple[str, ...]:
         f"a list of names, such as {tuple(DEFAULT_AXES[:count])}",
     )
     for name in names:
-        if name not in ("I", "J", "K") and not AXIS_NAME.fullmatch(name):
+        if name not in DIRECTION and not AXIS_NAME.fullmatch(name):
             raise refuse_value("an axis name", name, f"{NAME_REMEDY} but for a direction")
     if len(names) != count or len(set(names)) != count:
         raise InputError(f"the axes are {' '.join(names)} for points of {count} coordinates: name each once")

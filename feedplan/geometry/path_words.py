@@ -8,7 +8,7 @@ import numpy as np
 
 from feedplan.arrays import Flags, Floats
 from feedplan.errors import MachineError
-from feedplan.machine.axis import AXIS_LETTERS, size_of
+from feedplan.machine.axis import AXIS_LETTERS, DIRECTION, size_of
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.program.program import Program
@@ -102,7 +102,7 @@ def _letters(machine: Machine, coordinate_mode: CoordinateMode) -> tuple[str, ..
     # Kinematics are loaded where they are needed.
     from feedplan.machine.axis_words import axis_words
 
-    return axis_words(machine, ("I", "J", "K"), coordinate_mode).kinematics.tip_names
+    return axis_words(machine, DIRECTION, coordinate_mode).kinematics.tip_names
 
 
 def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> Floats:

@@ -14,7 +14,8 @@ from feedplan.machine.checks import numbers, require, set_limit, set_within
 # The letters of programs, and which of them are rotary where an axis does not say.
 AXIS_LETTERS = "XYZABCUVW"
 ROTARY_LETTERS = ("A", "B", "C")
-# I, J and K are the tool's direction.
+# The letters of the tool's direction.
+DIRECTION = ("I", "J", "K")
 AXIS_NAME = re.compile(r"(?![IJK]\Z)[A-Za-z_][A-Za-z0-9_]{0,31}", re.ASCII)
 # The unit of an axis stands in tables, between brackets.
 _UNIT = re.compile(r"[^\s\[\]<>&\"'`\\,;]{1,12}")
@@ -138,4 +139,4 @@ def size_of(limit: Limit) -> float:
 
 def usual_units(names: Iterable[str]) -> tuple[str, ...]:
     """The units of axes and directions by their names alone: deg of A, B, C, I, J, K, else mm."""
-    return tuple("deg" if name in (*ROTARY_LETTERS, "I", "J", "K") else "mm" for name in names)
+    return tuple("deg" if name in (*ROTARY_LETTERS, *DIRECTION) else "mm" for name in names)

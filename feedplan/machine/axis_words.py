@@ -13,12 +13,11 @@ import numpy as np
 
 from feedplan.arrays import Floats
 from feedplan.errors import MachineError
+from feedplan.machine.axis import DIRECTION
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine
 from feedplan.machine.rotary import RotaryChain, ToolVector
-
-DIRECTION = ("I", "J", "K")
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from feedplan.errors import MachineError
-from feedplan.machine.axis import Axis
+from feedplan.machine.axis import DIRECTION, Axis
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.numbers import Number, atan2, degrees, hypot, radians, sin_cos
 from feedplan.machine.parameters import Parameters, Vector
@@ -109,7 +109,7 @@ class ToolVector(Kinematics):
     @property
     def tip_names(self) -> tuple[str, ...]:  # type: ignore[override]
         """The tip and the direction."""
-        return (*LINEAR, "I", "J", "K")
+        return (*LINEAR, *DIRECTION)
 
     @property
     def joint_names(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -17,11 +17,10 @@ from feedplan.arrays import Floats, Integers
 from feedplan.constraints.problem import Problem
 from feedplan.event_places import nearest
 from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
+from feedplan.machine.axis import DIRECTION
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
-# Columns of a program that are the direction of the tool.
-DIRECTION = ("I", "J", "K")
 # Places within each phase of the profile at which the speed is taken, beside both ends.
 _WITHIN = (0.25, 0.5, 0.75)
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from feedplan.errors import MachineError
-from feedplan.machine.axis import AXIS_LETTERS
-from feedplan.machine.axis_words import DIRECTION, axis_words
+from feedplan.machine.axis import AXIS_LETTERS, DIRECTION
+from feedplan.machine.axis_words import axis_words
 from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn

@@ -8,7 +8,7 @@ import numpy as np
 
 import feedplan
 from feedplan.curves.length import CurveLength
-from feedplan.planned_feeds.speeds import DIRECTION
+from feedplan.machine.axis import DIRECTION
 
 # A square whose sides are too short for its feed, between rapids.
 SQUARE = """%
