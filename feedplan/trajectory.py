@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan.array_arguments import within
 from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem, speed_square
-from feedplan.curves._arrays import within
 from feedplan.curves.length import CurveLength
 from feedplan.lazy import cached_property
 from feedplan.profile import SpeedProfile

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_joints, audit_plan
 from feedplan.arguments import callback, flag, instance, list_of_names, not_negative, number, positive
+from feedplan.array_arguments import floats, whole_numbers
 from feedplan.arrays import Floats
 from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.recorded import audit_recorded
 from feedplan.audit.verdict import PASS_MARK, Audit, LimitCheck, join
 from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
-from feedplan.curves._arrays import floats, whole_numbers
 from feedplan.errors import InputError
 from feedplan.machine.axis import Axis, size_of
 from feedplan.machine.machine import Machine

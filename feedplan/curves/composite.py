@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Curve
-from feedplan.arguments import flag, instance, is_number, is_whole, number, positive, shown
-from feedplan.arguments import refuse as refusal
+from feedplan.arguments import flag, instance, is_number, is_whole, number, positive, refuse, shown
+from feedplan.array_arguments import floats, places, point_array, refuse_where, whole_numbers
 from feedplan.arrays import Flags, Floats, Integers
-from feedplan.curves._arrays import floats, places, points, refuse, whole_numbers
 from feedplan.errors import InputError
 from feedplan.native import OfNative
 from feedplan.units import counted
@@ -39,7 +38,7 @@ class CompositeCurve(OfNative[Curve]):
     width: Floats
 
     def __post_init__(self) -> None:
-        control, weights = points(self.control_points, self.weights)
+        control, weights = point_array(self.control_points, self.weights)
         offsets = np.ascontiguousarray(whole_numbers(self.offsets, "offsets"), dtype=np.int64)
         self._hold(Curve(control, weights, offsets, floats(self.width, "widths", 1)))
 
@@ -57,7 +56,7 @@ class CompositeCurve(OfNative[Curve]):
         cls, control_points: ArrayLike, weights: ArrayLike | None = None, width: float = 1.0
     ) -> CompositeCurve:
         """One piece by its control points (degree + 1, axes), rational with `weights` (degree + 1,)."""
-        control, weight = points(control_points, weights)
+        control, weight = point_array(control_points, weights)
         if not 2 <= len(control) <= MAX_DEGREE + 1:
             raise InputError(
                 f"a Bézier curve of {len(control)} control points: 2 to {MAX_DEGREE + 1} are supported "
@@ -113,7 +112,7 @@ class CompositeCurve(OfNative[Curve]):
 
         Raises InputError for lists that do not fit together and values that cannot be used.
         """
-        control, weight = points(control_points, weights)
+        control, weight = point_array(control_points, weights)
         around = flag(periodic, "periodic")
         knots = floats(knots, "knots", 1)
         return cls.of(Curve.of_spline(control, weight, knots, _degree(degree), around))
@@ -123,7 +122,7 @@ class CompositeCurve(OfNative[Curve]):
         """Curves one after the other; the end of each is the start of the next within `gap` [mm]."""
         remedy = "a list of at least one CompositeCurve"
         if not isinstance(curves, Sequence) or not all(isinstance(curve, CompositeCurve) for curve in curves):
-            raise refusal("curves", curves, remedy)
+            raise refuse("curves", curves, remedy)
         if not curves:
             raise InputError("no curves to join: give at least one")
         number(gap, "the gap", "0 or more [mm]", lambda given: given >= 0)
@@ -199,7 +198,9 @@ class CompositeCurve(OfNative[Curve]):
         if len(self) == 0:
             return np.empty((0, 3, self.axes))
         degree = int(self.offsets[1] - self.offsets[0]) - 1
-        refuse(self.degree != degree, lambda i: f"piece {i} has degree {self.degree[i]}, others {degree}")
+        refuse_where(
+            self.degree != degree, lambda i: f"piece {i} has degree {self.degree[i]}, others {degree}"
+        )
         return np.ascontiguousarray(self.control_points).reshape(len(self), degree + 1, self.axes)
 
     @property

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import CurveLength as Native
+from feedplan.array_arguments import floats, places
 from feedplan.arrays import Floats
-from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.lazy import cached_property

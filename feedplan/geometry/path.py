@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import build_path
-from feedplan.arguments import instance, is_whole, list_of_names, number, shown
-from feedplan.arguments import refuse as refuse_value
+from feedplan.arguments import instance, is_whole, list_of_names, number, refuse, shown
+from feedplan.array_arguments import point_array, refuse_where, within
 from feedplan.arrays import Flags, Floats, Integers
-from feedplan.curves._arrays import points as point_array
-from feedplan.curves._arrays import refuse, within
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError
@@ -266,13 +264,13 @@ class Path:
         tolerance = tolerance_of(tolerance)
         instance(corners, Corners, "corners", "one of Corners")
         finite: Flags = np.logical_and.reduce(np.isfinite(array), axis=1)
-        refuse(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
+        refuse_where(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
         same: Flags = (array[1:] == array[:-1]).all(axis=1)
-        refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
+        refuse_where(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
         with np.errstate(over="ignore"):
             step = np.linalg.norm(np.diff(array, axis=0), axis=1)
         beyond: Flags = ~((step > 0.0) & (step < math.inf))
-        refuse(
+        refuse_where(
             beyond, lambda i: f"the distance of points {i} and {i + 1} is no number above 0: scale the points"
         )
         count, width = len(array) - 1, array.shape[1]
@@ -415,7 +413,7 @@ def _closed_gaps(curve: CompositeCurve) -> CompositeCurve:
     control = curve.control_points.copy()
     start, end = curve.offsets[1:-1], curve.offsets[1:-1] - 1
     gap = np.linalg.norm(control[start] - control[end], axis=1)
-    refuse(
+    refuse_where(
         gap > MAX_GAP,
         lambda i: (
             f"piece {i + 1} starts {gap[i]:g} mm from the end of piece {i}: at most {MAX_GAP:g} mm is "
@@ -441,7 +439,7 @@ def _names(axes: Sequence[str] | None, count: int) -> tuple[str, ...]:
     )
     for name in names:
         if name not in DIRECTION and not AXIS_NAME.fullmatch(name):
-            raise refuse_value("an axis name", name, f"{NAME_REMEDY} but for a direction")
+            raise refuse("an axis name", name, f"{NAME_REMEDY} but for a direction")
     if len(names) != count or len(set(names)) != count:
         raise InputError(f"the axes are {' '.join(names)} for points of {count} coordinates: name each once")
     return names

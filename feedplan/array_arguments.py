@@ -1,4 +1,4 @@
-"""Checks of the arrays that users give to geometry kernels: type, shape and range."""
+"""Checks arrays of users, of curves and setpoints: type, shape and range."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from feedplan.errors import InputError
 MAX_AXES = 9
 
 
-def points(control_points: ArrayLike, weights: ArrayLike | None) -> tuple[Floats, Floats | None]:
+def point_array(control_points: ArrayLike, weights: ArrayLike | None) -> tuple[Floats, Floats | None]:
     """Control points (n, axes), of one axis also (n,), and their weights."""
     control = floats(control_points, "control points")
     if control.ndim == 1:
@@ -35,7 +35,7 @@ def points(control_points: ArrayLike, weights: ArrayLike | None) -> tuple[Floats
 def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], Floats]:
     """Pieces and parameters of places (m,)."""
     pieces, at = whole_numbers(piece, "pieces"), floats(u, "parameters")
-    refuse(pieces < 0, lambda i: f"place {i} is on piece {pieces[i]}: pieces are counted from 0")
+    refuse_where(pieces < 0, lambda i: f"place {i} is on piece {pieces[i]}: pieces are counted from 0")
     if at.ndim > 1 or len({len(pieces), len(at)} - {1}) > 1:
         raise InputError(f"{len(pieces)} pieces and parameters of shape {at.shape}: give one for each place")
     pieces, at = np.broadcast_arrays(pieces, at)
@@ -95,7 +95,7 @@ def within(given: ArrayLike, name: str, end: float, unit: str) -> Floats:
     return values
 
 
-def refuse(bad: Flags, sentence: Callable[[int], str]) -> None:
+def refuse_where(bad: Flags, sentence: Callable[[int], str]) -> None:
     """Raises the sentence for the first index that is bad."""
     if bad.any():
         raise InputError(sentence(int(bad.argmax())))
