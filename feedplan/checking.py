@@ -10,13 +10,12 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.arguments import callback, flag, is_number, not_negative, number, shown
-from feedplan.arrays import Floats
+from feedplan.arguments import callback, flag, is_number, not_negative, number, positive, shown
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.audit.events import require_events
 from feedplan.audit.knots import audit_knots
@@ -70,45 +69,19 @@ def check(
     _require_units(points, known)
     tell(reading, 1.0)
     period = plan.rows[SETPOINTS][2] if plan else points.period or known.period
-    limits_of_method = {
+    how: dict[str, Any] = {
+        "resolution": resolution,
         "jerk": jerk or (plan is not None and limits_jerk(plan.method)),
         "corners": plan is not None and corners(plan.method) is Corners.PROGRAMMED,
+        "progress": auditing,
     }
     if points.rows == KNOTS:
-        audit = audit_knots(
-            points.t,
-            points.position,
-            points.velocity,
-            points.line,
-            known,
-            points.axes,
-            resolution=resolution,
-            progress=auditing,
-            **limits_of_method,
-        )
+        audit = audit_knots(points, known, **how)
     else:
-        audit = audit_setpoints(
-            points.t,
-            points.position,
-            known,
-            axes=points.axes,
-            velocity=_recorded(points.velocity),
-            acceleration=_recorded(points.acceleration),
-            recorded_jerk=_recorded(points.jerk),
-            line=points.line,
-            resolution=resolution,
-            period=period,
-            progress=auditing,
-            **limits_of_method,
-        )
+        audit = audit_setpoints(points, known, period=period, **how)
     if audit.ok:  # events are not checked against setpoints that fail
         require_events(points.file, points.events, points, resolution, ROUNDING * period)
     return audit
-
-
-def _recorded(values: Floats) -> Floats | None:
-    """The values; None if the format has none."""
-    return values if len(values) else None
 
 
 @dataclass(frozen=True)
@@ -147,11 +120,15 @@ def _read(file: FilePath) -> _Plan:
     events = _Entries(file, entries.take("events", dict), "events ")
     machine = Machine.from_toml(text, f"in {file}", joints_only=True)
     axes = tuple(map(str, points.take("axes", list)))
-    count, duration, period = points.take("count", int), points.number("duration"), points.number("period")
+    count, duration, period = (
+        points.take("count", int),
+        points.number("duration"),
+        points.number("period", positive),
+    )
     time, rows = entries.number("time"), {SETPOINTS: (count, duration, period)}
     if KNOTS in summary:
         knots = _Entries(file, entries.take(KNOTS, dict), "knots ")
-        rows[KNOTS] = knots.take("count", int), time, knots.number("step")
+        rows[KNOTS] = knots.take("count", int), time, knots.number("step", positive)
     # The setpoints wait less than one period in each run and in the pause before the first.
     if not time * (1.0 - ROUNDING) <= duration <= time + (entries.take("runs", int) + 1) * period:
         raise InputError(
@@ -204,10 +181,10 @@ class _Entries:
             raise InputError(f"{self._file}: {self._place}{name} is {what}: plan again")
         return value
 
-    def number(self, name: str) -> float:
-        """A finite number that is not negative."""
+    def number(self, name: str, within: Callable[[float], bool] = not_negative) -> float:
+        """A number for which `within` is true."""
         value: Any = self._table.get(name)
-        if not (is_number(value) and 0 <= value < math.inf):
+        if not (is_number(value) and within(value)):
             raise InputError(f"{self._file}: {self._place}{name} is {shown(value)}: plan again")
         return float(value)
 

@@ -15,7 +15,6 @@ import pytest
 
 import feedplan
 from feedplan import Axis, FeedplanError, Machine, Path
-from feedplan.audit import audit_setpoints
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.fit_settings import FitSettings
@@ -190,24 +189,6 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
             {"name": "odd", "factory": lambda axes, parameters: None},
         ),
         "FitSettings": (FitSettings, {own.name: own.default for own in fields(FitSettings)}),
-        "audit_setpoints": (
-            audit_setpoints,
-            {
-                "t": [0.0, 0.001, 0.002],
-                "position": np.zeros((3, 3)),
-                "machine": machine,
-                "axes": ("X", "Y", "Z"),
-                "velocity": np.zeros((3, 3)),
-                "acceleration": np.zeros((3, 3)),
-                "recorded_jerk": np.zeros((3, 3)),
-                "line": [1, 2, 3],
-                "resolution": 0.0,
-                "jerk": True,
-                "corners": False,
-                "period": 0.001,
-                "progress": None,
-            },
-        ),
         "load_setpoints": (load_setpoints, {"place": tmp_path / "part", "progress": None}),
         "Machine.load": (Machine.load, {"source": "mill"}),
         "Machine.from_toml": (

@@ -7,11 +7,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_joints, audit_plan
-from feedplan.arguments import callback, flag, instance, list_of_names, not_negative, number, positive
-from feedplan.array_arguments import floats, whole_numbers
 from feedplan.arrays import Floats
 from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.recorded import audit_recorded
@@ -211,78 +208,44 @@ def _seen(stream: SetpointAudit, setpoints: Chunks) -> Findings:
         stream.push(
             np.ascontiguousarray(chunk.t, np.float64),
             np.ascontiguousarray(chunk.position, np.float64),
-            np.ascontiguousarray(chunk.velocity, np.float64),
-            np.ascontiguousarray(chunk.acceleration, np.float64),
+            _known(chunk.velocity),
+            _known(chunk.acceleration),
             np.ascontiguousarray(chunk.line, np.int32),
             share,
         )
     return stream.finish()
 
 
+def _known(values: Floats) -> Floats | None:
+    """A column as the native audit takes it; None where it has no rows, and so is not known."""
+    return np.ascontiguousarray(values, np.float64) if len(values) else None
+
+
 def audit_setpoints(
-    t: ArrayLike,
-    position: ArrayLike,
+    points: SetpointChunk,
     machine: Machine,
     *,
-    axes: tuple[str, ...] | None = None,
-    velocity: ArrayLike | None = None,
-    acceleration: ArrayLike | None = None,
-    recorded_jerk: ArrayLike | None = None,
-    line: ArrayLike | None = None,
+    period: float,
     resolution: float = 0.0,
     jerk: bool = False,
     corners: bool = False,
-    period: float | None = None,
     progress: Listener | None = None,
 ) -> Audit:
-    """Measures setpoints from anywhere against the limits of a machine, by finite differences alone.
+    """Measures setpoints from files against the limits of a machine, by finite differences alone.
 
-    `t` (n,) [s] and `position` (n, axes) [mm]; optional `velocity` [mm/s], `acceleration` [mm/s²] and
-    `recorded_jerk` [mm/s³] of the same shape as position, and source `line` (n,). `axes` names the columns
-    (default: the machine's axes). Recorded velocities must be those of the positions, recorded accelerations
-    within the limit and those of the velocities, and where jerk is judged recorded jerks those of the
-    accelerations (`feedplan.audit.recorded`). `corners`: the velocity may jump from one period to the next
-    by what the acceleration limit gives in one, as where corners of lines are passed.
+    Velocity, acceleration and jerk may have no rows. Recorded velocities must be those of the positions,
+    recorded accelerations within the limit and those of the velocities, and where jerk is judged recorded
+    jerks those of the accelerations (`feedplan.audit.recorded`). `corners`: the velocity may jump from one
+    period to the next by what the acceleration limit gives in one, as where corners of lines are passed.
     `resolution` [mm] is the last digit of positions that were written as text: what its rounding adds to a
-    difference is allowed. The `period` [s] is that of the times unless given. Jerk is judged only if `jerk`
-    says so.
+    difference is allowed. The `period` [s] is that of the times. Jerk is judged only if `jerk` says so.
     A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
     where the direction turns; only there it is allowed for. `progress` is told how far it is; what it raises
-    ends the audit. Raises InputError for arrays that do not belong together.
+    ends the audit. Raises InputError for axes that the machine lacks, and for a single setpoint.
     """
-    instance(machine, Machine, "the machine", "a Machine")
-    names = machine.axis_names if axes is None else list_of_names(axes, "axes", "a list of axis letters")
-    machine_axes = _machine_axes(machine, names)
-    times, positions = floats(t, "times", 1), floats(position, "positions", 2)
-    if times.ndim != 1 or positions.shape != (len(times), len(names)):
-        raise InputError(
-            f"{positions.shape} positions at {times.shape} times: give one row for each time and one column "
-            f"for each of the axes {' '.join(names)}"
-        )
-    if len(times) < 2:
-        raise InputError(f"{len(times)} setpoints cannot be audited: give at least two")
-    resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
-    jerk, corners = flag(jerk, "jerk"), flag(corners, "corners")
-    callback(progress, "the part done")
-    recorded = {"velocity": velocity, "acceleration": acceleration, "jerk": recorded_jerk}
-    rates = {
-        name: None if values is None else floats(values, f"recorded values of the {name}")
-        for name, values in recorded.items()
-    }
-    for name, values in rates.items():
-        if values is not None and values.shape != positions.shape:
-            raise InputError(
-                f"the recorded {name} has the shape {values.shape}: give the shape of the positions, "
-                f"{positions.shape}"
-            )
-    lines = np.zeros(len(times), np.int32) if line is None else _lines(line)
-    if lines.shape != times.shape:
-        raise InputError(f"{len(lines)} source lines: give as many as the times, {len(times)}")
-    period = (
-        _period(times, machine.period)
-        if period is None
-        else number(period, "the period", "a positive number", positive, "s")
-    )
+    names, machine_axes = points.axes, _machine_axes(machine, points.axes)
+    if len(points) < 2:
+        raise InputError(f"{len(points)} setpoints cannot be audited: give at least two")
     own_jump = [axis.max_velocity_jump for axis in machine_axes]
     # What is no limit but a share of one is that of the smaller one of both directions.
     least = [size_of(axis.max_acceleration) for axis in machine_axes]
@@ -302,32 +265,29 @@ def audit_setpoints(
         period=period,
         end_speeds=(0.0, 0.0),
     )
-    stream = SetpointAudit(limits, resolution)
-    for start in range(0, len(times), CHUNK):
-        tell(progress, RECORDED_SHARE * start / len(times))
-        own = slice(start, start + CHUNK)
-        stream.push(
-            times[own],
-            positions[own],
-            None if rates["velocity"] is None else rates["velocity"][own],
-            None if rates["acceleration"] is None else rates["acceleration"][own],
-            lines[own],
-        )
-    results = [stream.finish()]
+    chunks = _in_chunks(points, part(progress, 0.0, RECORDED_SHARE))
+    results = [_seen(SetpointAudit(limits, resolution), chunks)]
     rest = part(progress, RECORDED_SHARE, 1.0)
-    pairs = [("recorded_change", "velocity", "acceleration", least, jump)]
+    pairs = [("recorded_change", points.velocity, points.acceleration, least, jump)]
     if jerk:
-        pairs += [("recorded_jerk", "acceleration", "jerk", limits.max_jerk, [0.0] * len(names))]
+        pairs += [("recorded_jerk", points.acceleration, points.jerk, limits.max_jerk, [0.0] * len(names))]
     for i, (check, rate, change, limit, steps) in enumerate(pairs):
-        of, by = rates[rate], rates[change]
         share = part(rest, i / len(pairs), (i + 1) / len(pairs))
-        if of is not None and by is not None:
-            results.append(
-                audit_recorded(check, times, of, by, np.array(limit), np.array(steps), lines, share)
+        if len(rate) and len(change):
+            found = audit_recorded(
+                check, points.t, rate, change, np.array(limit), np.array(steps), points.line, share
             )
+            results.append(found)
     tell(progress, 1.0)
     units = tuple(axis.unit for axis in machine_axes)
     return join(results, names, jerk, units, shared_unit(units, "mm"))
+
+
+def _in_chunks(points: SetpointChunk, report: Listener | None) -> Chunks:
+    """Setpoints in chunks, before each of which it is told how far they are."""
+    for start in range(0, len(points), CHUNK):
+        tell(report, start / len(points))
+        yield points.part(slice(start, start + CHUNK), points.axes), None
 
 
 def _with_shares(setpoints: Setpoints | Iterable[SetpointChunk], report: Listener | None) -> Chunks:
@@ -353,17 +313,3 @@ def _machine_axes(machine: Machine, names: tuple[str, ...]) -> list[Axis]:
             f"machine {machine.name} has no axis {missing[0]}: use a machine with {' '.join(names)}"
         )
     return [by_name[name] for name in names]
-
-
-def _lines(given: ArrayLike) -> NDArray[np.int32]:
-    lines = whole_numbers(given, "source lines")
-    narrow = len(lines) == 0 or np.can_cast(lines.dtype, np.int32)
-    if not narrow and not (lines.min() >= -(2**31) and lines.max() < 2**31):
-        raise InputError("source lines are beyond 2147483647: give the lines of a program")
-    return np.ascontiguousarray(lines, np.int32)
-
-
-def _period(times: Floats, default: float) -> float:
-    """The usual time step; the machine's where the times show none."""
-    step = float(np.median(np.diff(times[:CHUNK])))
-    return step if math.isfinite(step) and step > 0 else default

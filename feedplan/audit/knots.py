@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.arrays import Floats
 from feedplan.audit import Audit, audit_setpoints
@@ -14,15 +13,12 @@ from feedplan.audit.worst import Findings, Worst
 from feedplan.errors import InputError
 from feedplan.machine.machine import Machine
 from feedplan.progress import Listener, tell
+from feedplan.setpoints import SetpointChunk
 
 
 def audit_knots(
-    t: Floats,
-    position: Floats,
-    velocity: Floats,
-    line: NDArray[np.int32],
+    points: SetpointChunk,
     machine: Machine,
-    axes: tuple[str, ...],
     *,
     resolution: float = 0.0,
     jerk: bool = False,
@@ -36,12 +32,12 @@ def audit_knots(
     positions. The acceleration of the cubics that a drive makes of them is told, not judged. Raises
     InputError as `audit_setpoints`.
     """
+    t, axes = points.t, points.axes
     limits = [machine.axis(name).acceleration_range for name in axes if name in machine.axis_names]
     units = tuple(machine.axis(name).unit for name in axes if name in machine.axis_names)
     audits = []
-    for start, stop in _parts(velocity):
+    for start, stop in _parts(points.velocity):
         tell(progress, start / len(t))
-        own = slice(start, stop + 1)
         period = float(t[stop] - t[start]) / (stop - start)
         if not 0.0 < period < np.inf:
             raise InputError(
@@ -49,31 +45,26 @@ def audit_knots(
             )
         audits.append(
             audit_setpoints(
-                t[own],
-                position[own],
+                points.part(slice(start, stop + 1), axes),
                 machine,
-                axes=axes,
-                velocity=velocity[own],
-                line=line[own],
+                period=period,
                 resolution=resolution,
                 jerk=jerk,
                 corners=corners,
-                period=period,
             )
         )
     tell(progress, 1.0)
-    between = _between(t, position, velocity, line, np.array(limits))
+    between = _between(points, np.array(limits))
     return worst_of([*audits, join([between], axes, jerk, units, "")], axes)
 
 
-def _between(
-    t: Floats, position: Floats, velocity: Floats, line: NDArray[np.int32], limits: Floats
-) -> Findings:
+def _between(points: SetpointChunk, limits: Floats) -> Findings:
     """The greatest accelerations on the cubics between knots; they are at the ends of a step."""
     worst = Worst()
+    t, velocity, line = points.t, points.velocity, points.line
     step = np.diff(t)[:, None]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        mean, before, after = np.diff(position, axis=0) / step, velocity[:-1], velocity[1:]
+        mean, before, after = np.diff(points.position, axis=0) / step, velocity[:-1], velocity[1:]
         ends = (
             (6.0 * mean - 4.0 * before - 2.0 * after) / step,
             (2.0 * before + 4.0 * after - 6.0 * mean) / step,
