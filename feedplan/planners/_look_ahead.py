@@ -86,8 +86,8 @@ def _speed_at_ends(
     time = held[:-1] + held[1:]
     with np.errstate(divide="ignore"):
         whole = np.where(time > 0.0, parts.rate * (parts.u1 - parts.u0) / time, np.inf)
-    for ends, both in ((slice(None, -1), whole), (slice(1, None), whole)):
-        limit[ends] = np.where(held[ends] > 0.0, np.minimum(limit[ends], both), limit[ends])
+    for ends in (slice(None, -1), slice(1, None)):
+        limit[ends] = np.where(held[ends] > 0.0, np.minimum(limit[ends], whole), limit[ends])
     return limit, held
 
 

@@ -150,7 +150,11 @@ def read_dxf(content: bytes, name: str = "drawing.dxf", feed: float | None = Non
         except (_UnsupportedError, InputError, *_DAMAGED) as error:
             skipped[f"{entity.dxftype()} ({error})" if str(error) else str(entity.dxftype())] += 1
             continue
-        _check_reach(segments, name, number)
+        if not all(segment.reach <= _FARTHEST for segment in segments):
+            raise ProgramError(
+                f"{name} entity {number} goes farther than {_FARTHEST:g} mm: check the units of the drawing",
+                number,
+            )
         _add(moves, segments, number)
     if not len(moves):
         raise ProgramError(f"{name} has no line, arc or curve in its model space: draw some there")
@@ -180,15 +184,6 @@ def _hidden(document: Any, entity: Any) -> bool:
         return False
     row = document.layers.get(layer)
     return bool(row.is_off() or row.is_frozen())
-
-
-def _check_reach(segments: Sequence[_Segment], name: str, number: int) -> None:
-    for segment in segments:
-        if not segment.reach <= _FARTHEST:
-            raise ProgramError(
-                f"{name} entity {number} goes farther than {_FARTHEST:g} mm: check the units of the drawing",
-                number,
-            )
 
 
 def _segments(entity: Any, scale: float) -> list[_Segment]:
