@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from feedplan.errors import MachineError
 from feedplan.machine.axis import AXIS_LETTERS, DIRECTION
@@ -90,20 +90,23 @@ class TipControl:
         self, chain: RotaryChain, entry: Sequence[float], places: Sequence[Sequence[float]]
     ) -> list[float]:
         """The rotary joints after moves by directions, in the pose in which these begin."""
-        names = chain.joint_names[3:]
-        before = {name: entry[AXIS_LETTERS.index(name)] for name in names}
-        first = ToolVector(chain).from_part[0].name
-        side: float | None = None
+        joints = {name: entry[AXIS_LETTERS.index(name)] for name in chain.joint_names[3:]}
+        vector = ToolVector(chain)
+        first = vector.from_part[0].name
+        posed = False
         for place in places:
-            parallel = (
-                min(map(float, ToolVector(chain).singular((*place[:3], *place[9:])).values())) < _PARALLEL
-            )
-            if side is None and not parallel:
-                side = min((1.0, -1.0), key=lambda s: _turning(_angles(chain, s, before, place), before))
-            found = _angles(chain, 1.0 if side is None else side, before, place)
+            (sine,) = vector.singular((*place[:3], *place[9:])).values()
+            parallel = float(sine) < _PARALLEL
+            found = _angles(vector, joints, place)
+            if not (posed or parallel):
+                posed = True
+                other = replace(vector, side=-1.0)
+                others = _angles(other, joints, place)
+                if _turning(others, joints) < _turning(found, joints):
+                    vector, found = other, others
             # A tool parallel to the first axis from the part leaves that axis where it is.
-            before = {name: before[name] if parallel and name == first else found[name] for name in names}
-        return [before[name] for name in names]
+            joints = found | ({first: joints[first]} if parallel else {})
+        return list(joints.values())
 
 
 def _words(chain: RotaryChain, place: Sequence[float]) -> list[float]:
@@ -111,11 +114,9 @@ def _words(chain: RotaryChain, place: Sequence[float]) -> list[float]:
     return [place[AXIS_LETTERS.index(name)] for name in chain.joint_names]
 
 
-def _angles(
-    chain: RotaryChain, side: float, before: Mapping[str, float], place: Sequence[float]
-) -> dict[str, float]:
-    """The rotary joints [deg] for a place's direction, in the pose of that side, next to those before."""
-    found = ToolVector(chain, side).angles(place[9:])
+def _angles(vector: ToolVector, before: Mapping[str, float], place: Sequence[float]) -> dict[str, float]:
+    """The rotary joints [deg] for a place's direction, next to those before."""
+    found = vector.angles(place[9:])
     return {name: shortest_turn(angle, float(found[name])) for name, angle in before.items()}
 
 
