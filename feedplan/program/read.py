@@ -106,29 +106,18 @@ def read_program(
             readable_folder(file_path(folder, "a folder of subprograms", _FOLDER)) for folder in subprograms
         ]
         folders = [*([text.parent] if isinstance(text, Path) else []), *folders]
-        again: Mapping[str, Any] = {
-            "machine": known,
+        options: dict[str, Any] = {
             "block_delete": block_delete,
-            "tool_table": tool_table,
             "subprograms": tuple(folders),
             "feed": feed,
-            "whole_step": whole_step,
+            "whole_step": number(whole_step, "whole_step", "a positive number", positive),
             "max_bytes": max_bytes,
         }
+        tools = None if tool_table is None else read_tools(file_path(tool_table, "the tool table", _TABLE))
         program = read_gcode(
-            content,
-            known,
-            name,
-            block_delete=block_delete,
-            tools=None if tool_table is None else read_tools(file_path(tool_table, "the tool table", _TABLE)),
-            subprograms=folders,
-            feed=feed,
-            whole_step=number(whole_step, "whole_step", "a positive number", positive),
-            max_bytes=max_bytes,
-            max_moves=max_moves,
-            progress=progress,
+            content, known, name, tools=tools, max_moves=max_moves, progress=progress, **options
         )
-        program = program.with_others(reading=again)
+        program = program.with_others(reading={"machine": known, "tool_table": tool_table, **options})
     else:
         content_of(content, name, min(max_bytes, most))
         given = {"tool_table": tool_table, "whole_step": whole_step, "block_delete": block_delete}
