@@ -197,60 +197,46 @@ def _joined(
         for which in [int(better[begin])]
     ]
     if (first.path.group_feed is None) == (other.path.group_feed is None):
-        path = _joined_path([(each.path, own) for each, own in taken], (first.path, other.path))
+        path = _joined_path([(each.path, own) for each, own in taken], first.path, other.path)
         problem = join(path)
-        profile = _joined_profile([(each.problem.path, each.profile, own) for each, own in taken])
-        if len(problem.path) == sum(_pieces(each.problem.path, own) for each, own in taken):
-            return Followed(path, problem, profile)
+        pieces = [_pieces(each.problem.path, own) for each, own in taken]
+        ends = np.cumsum([own.stop - own.start for own in pieces])
+        if len(problem.path) == ends[-1]:
+            moved = (
+                (each.profile, runs, int(end - own.stop))
+                for (each, runs), own, end in zip(taken, pieces, ends, strict=True)
+            )
+            bounds = np.concatenate([each.profile.run_bounds[runs] for each, runs in taken])
+            excess = max(each.profile.excess for each, _ in taken)
+            return Followed(path, problem, joined_runs(moved, excess=excess, run_bounds=bounds))
     # Feeds or joints make other pieces of both paths together.
     return min(both, key=lambda each: each.time)
 
 
-def _pieces(path: Path, own: slice) -> int:
-    """The number of pieces of some runs."""
-    return int(path.runs[own.stop] - path.runs[own.start])
+def _pieces(path: Path, runs: slice) -> slice:
+    """The pieces of some runs."""
+    return slice(int(path.runs[runs.start]), int(path.runs[runs.stop]))
 
 
-def _joined_path(taken: list[tuple[Path, slice]], both: tuple[Path, Path]) -> Path:
-    def pieces(path: Path, own: slice) -> slice:
-        return slice(int(path.runs[own.start]), int(path.runs[own.stop]))
+def _joined_path(taken: list[tuple[Path, slice]], first: Path, other: Path) -> Path:
+    """Runs of two paths one after the other."""
+    pieces = [(path, _pieces(path, runs)) for path, runs in taken]
 
-    def column(name: str, of_runs: bool = False) -> Any:
-        parts = [getattr(path, name) for path, _ in taken]
-        if any(part is None for part in parts):
-            return None
-        where = [own if of_runs else pieces(path, own) for path, own in taken]
-        return np.concatenate([part[own] for part, own in zip(parts, where, strict=True)])
+    def columns(rows: list[tuple[Path, slice]], *names: str) -> dict[str, Any]:
+        known = [name for name in names if getattr(first, name) is not None]
+        return {name: np.concatenate([getattr(path, name)[own] for path, own in rows]) for name in known}
 
-    counts = np.concatenate([np.diff(path.runs)[own] for path, own in taken])
-    fits = [path.fit for path in both]
-    fit = replace(
-        fits[1],
-        deviation=max(fit.deviation for fit in fits),
-        inside=max(fit.inside or 0.0 for fit in fits),
-        outside=max(fit.outside or 0.0 for fit in fits),
-    )
-    warnings = dict.fromkeys(sentence for path in both for sentence in path.warnings)
     return replace(
-        both[1],
-        curve=CompositeCurve.joined([path.curve[pieces(path, own)] for path, own in taken]),
-        **{name: column(name) for name in ("feed", "group_feed", "move", "line", "tolerance")},
-        **{
-            name: column(name, of_runs=True)
-            for name in ("dwell", "coordinate_mode", "tool_length", "new_words")
-        },
-        runs=np.concatenate([[0], np.cumsum(counts)]),
-        fit=fit,
-        warnings=tuple(warnings),
+        other,
+        curve=CompositeCurve.joined([path.curve[own] for path, own in pieces]),
+        **columns(pieces, "feed", "group_feed", "move", "line", "tolerance"),
+        **columns(taken, "dwell", "coordinate_mode", "tool_length", "new_words"),
+        runs=np.cumsum(np.concatenate([[0], *(np.diff(path.runs)[own] for path, own in taken)])),
+        fit=replace(
+            other.fit,
+            deviation=max(first.fit.deviation, other.fit.deviation),
+            inside=max(first.fit.inside or 0.0, other.fit.inside or 0.0),
+            outside=max(first.fit.outside or 0.0, other.fit.outside or 0.0),
+        ),
+        warnings=tuple(dict.fromkeys(first.warnings + other.warnings)),
     )
-
-
-def _joined_profile(taken: list[tuple[Path, SpeedProfile, slice]]) -> SpeedProfile:
-    firsts = np.cumsum([0, *(_pieces(path, own) for path, _, own in taken)])
-    moved = (
-        (profile, own, int(first - path.runs[own.start]))
-        for (path, profile, own), first in zip(taken, firsts, strict=False)
-    )
-    bounds = [profile.run_bounds[own] for _, profile, own in taken]
-    excess = max(profile.excess for _, profile, _ in taken)
-    return joined_runs(moved, excess=excess, run_bounds=np.concatenate(bounds))
