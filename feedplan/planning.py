@@ -437,48 +437,39 @@ def plan(
             )
         report("fit", 1.0)
     share = of_stage(progress, "plan")
+    planned = 1.0 if planners.grid_error(method) else PLANNING
+    # Equal parts of the progress for each plan.
+    each = planned / (1 + rounds if refits else 1)
+    turns = count()
+
+    def follow(path: Path) -> Followed:
+        problem = stated(path)
+        own: dict[str, Any] = {}
+        if limit is not None:
+            own["time_limit"] = limit.left
+            # How long what follows will take is known from setpoints of a first plan.
+            own["reserve"] = lambda first: limit.keep_for(
+                Setpoints(problem, first, machine.period, interpolator, max_setpoints)
+            )
+        if planners.takes(method, planners.PROGRESS):
+            turn = next(turns)
+            own["progress"] = part(share, turn * each, (turn + 1) * each)
+        profile = solve(problem, **own)
+        if not math.isfinite(profile.time):
+            raise SolverError(f"{method} loses its digits on this path: take another method or machine")
+        return Followed(path, problem, profile)
+
     report("plan", 0.0)
     with _timed(compute, "plan"):
-        problem = stated(followed)
-        report("plan", 0.0)
-        planned = 1.0 if planners.grid_error(method) else PLANNING
-        # Equal parts of the progress for each plan.
-        each = planned / (1 + rounds if refits else 1)
-        turns = count()
-
-        def solved(problem: Problem) -> SpeedProfile:
-            own: dict[str, Any] = {}
-            if limit is not None:
-                own["time_limit"] = limit.left
-                # How long what follows will take is known from setpoints of a first plan.
-                own["reserve"] = lambda first: limit.keep_for(
-                    Setpoints(problem, first, machine.period, interpolator, max_setpoints)
-                )
-            if planners.takes(method, planners.PROGRESS):
-                turn = next(turns)
-                own["progress"] = part(share, turn * each, (turn + 1) * each)
-            profile = solve(problem, **own)
-            if not math.isfinite(profile.time):
-                raise SolverError(f"{method} loses its digits on this path: take another method or machine")
-            return profile
-
-        profile = solved(problem)
+        best = follow(followed)
     if refits and program is not None:
         fit = partial(build_path, program, machine, tolerance, corners=Corners.SMOOTH)
-
-        def follow(path: Path) -> Followed:
-            problem = stated(path)
-            return Followed(path, problem, solved(problem))
-
         with _timed(compute, "refit"):
             words = path_words(program, machine)
             jerk = words.max_jerk if planners.limits_jerk(method) else np.full_like(words.max_jerk, np.inf)
-            first_of_all = Followed(followed, problem, profile)
             limits = FitLimits(words.max_acceleration, jerk)
-            best, gain = faster(
-                first_of_all, limits, lambda motion: fit(motion=motion), follow, stated, rounds
-            )
-            followed, problem, profile = best.path, best.problem, best.profile
+            best, gain = faster(best, limits, lambda motion: fit(motion=motion), follow, stated, rounds)
+    problem, profile = best.problem, best.profile
     with _timed(compute, "bound"):
         least = profile.lower_bound
         if math.isnan(least):
@@ -493,14 +484,13 @@ def plan(
             time_limit=time_limit,
             left_to_grids=wanted * planners.grid_error(method),
         )
-        least += followed.pauses
+        least += best.path.pauses
     beside: Today | None = None
     unknown: tuple[str, ...] = ()
     if rival is not None:
-        settings_of_all = {"tolerance": tolerance, **speeds}
         with _timed(compute, "today"):
             beside, unknown = beside_plan(
-                rival, profile.time + followed.pauses, program or followed, machine, settings_of_all
+                rival, best.time, program or best.path, machine, {"tolerance": tolerance, **speeds}
             )
     report("plan", 1.0)
     return Plan(
@@ -514,7 +504,7 @@ def plan(
         interpolator=interpolator,
         max_setpoints=max_setpoints,
         warnings=(program.warnings if program else ())
-        + followed.warnings
+        + best.path.warnings
         + _one_path(method, path, refits)
         + short
         + unknown
