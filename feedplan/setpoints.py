@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
-from feedplan.arguments import is_whole, number, one_of, positive, shown, whole
+from feedplan.arguments import is_whole, number, one_of, positive, shown
 from feedplan.arrays import Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
@@ -110,20 +110,19 @@ class Setpoints:
     ) -> None:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
-        most = whole(max_setpoints, "max_setpoints", "a whole number from 1")
         self._sampler = (
             profile.sampler(problem, progress)
             if period == problem.period
             else Sampler(problem, profile, period, progress)
         )
-        self._source = (problem, profile, period, interpolator, most, None, events)
+        self._source = (problem, profile, period, interpolator, max_setpoints, None, events)
         self._events = events
-        if self.count > most:
+        if self.count > max_setpoints:
             raise InputError(
-                f"{self.count} setpoints, one every {period:g} s, are more than {most}: "
+                f"{self.count} setpoints, one every {period:g} s, are more than {max_setpoints}: "
                 "choose a longer period, or ask for so many by max_setpoints"
             )
-        self.period = float(period)
+        self.period = period
         self.axes = problem.axes
         self.interpolator: Interpolator = interpolator
         self.stats = SamplingStats()
