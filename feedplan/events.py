@@ -29,6 +29,10 @@ class Event(NamedTuple):
     text: str
 
 
+# Of the columns of events but the text.
+_DTYPES = (np.float64, np.int32, np.str_, np.float64, np.float64, np.bool_)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class TimedEvents:
     """Events in the order of time, one row each.
@@ -51,17 +55,9 @@ class TimedEvents:
     @classmethod
     def of(cls, rows: Iterable[Event]) -> TimedEvents:
         """From rows."""
-        columns = list(zip(*rows, strict=True)) or [()] * len(Event._fields)
-        time, line, kind, channel, value, stops, text = columns
-        return cls(
-            time=np.array(time, np.float64),
-            line=np.array(line, np.int32),
-            kind=np.array(kind, np.str_),
-            channel=np.array(channel, np.float64),
-            value=np.array(value, np.float64),
-            stops=np.array(stops, np.bool_),
-            text=tuple(text),
-        )
+        *columns, text = list(zip(*rows, strict=True)) or [()] * len(Event._fields)
+        arrays: list[Any] = [np.array(column, own) for column, own in zip(columns, _DTYPES, strict=True)]
+        return cls(*[*arrays, tuple(text)])
 
     @classmethod
     def none(cls) -> TimedEvents:
