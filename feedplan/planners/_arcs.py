@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
-from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
+from feedplan.profile import NO_AXIS, OF_PHASES, PhaseLaw, SpeedProfile
 
 # The joint of an arc of constant joint acceleration has a q' that varies by at most this factor.
 _VARIES = 1e3
@@ -149,16 +150,9 @@ class _Motion:
 
 def profile(parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
     """The arcs of all subruns as one profile; `runs` are the arcs' offsets of the runs."""
-    meshes, arcs = [mesh for mesh, _ in parts], [part for _, part in parts]
-    return SpeedProfile(
-        piece=np.concatenate([mesh.piece for mesh in meshes]).astype(np.uint32),
-        kind=np.concatenate([part.kind for part in arcs]),
-        axis=np.concatenate([part.axis for part in arcs]),
-        value=np.concatenate([part.value for part in arcs]),
-        u0=np.concatenate([mesh.ends[0] for mesh in meshes]),
-        u1=np.concatenate([mesh.ends[1] for mesh in meshes]),
-        p0=np.concatenate([part.ends[0] for part in arcs]),
-        p1=np.concatenate([part.ends[1] for part in arcs]),
-        duration=np.concatenate([part.duration for part in arcs]),
-        runs=np.array(runs, dtype=np.int64),
+    rows = (
+        (mesh.piece, arcs.kind, arcs.axis, arcs.value, *mesh.ends, *arcs.ends, arcs.duration)
+        for mesh, arcs in parts
     )
+    columns: list[Any] = [np.concatenate(column) for column in zip(*rows, strict=True)]
+    return SpeedProfile(**dict(zip(OF_PHASES, columns, strict=False)), runs=np.array(runs))
