@@ -63,7 +63,7 @@ def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> Float
     try:
         given = np.asarray(values)
         # Objects may be numbers, such as fractions. NumPy alone would accept texts and truth values too.
-        # The hidden numbers of a masked array are none.
+        # Masked values of an array are not numbers.
         if (
             given.dtype.kind not in "iufO"
             or (given.dtype.kind == "O" and not all(map(is_number, given.flat)))

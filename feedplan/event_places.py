@@ -19,9 +19,9 @@ from feedplan.program.program import Program
 
 # Places of a piece that are tried, and steps from the nearest of them to the nearest place.
 _TRIED, _STEPS = 9, 8
-# A step of this part of a piece leads nowhere else.
+# A step shorter than this part of a piece ends the search.
 _FOUND = 1e-9
-# Pairs of a programmed point and a piece that are looked at together.
+# Number of pairs of a programmed point and a piece that are searched at once.
 _AT_ONCE = 100_000
 
 
@@ -69,7 +69,7 @@ def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
 
 
 def _places(program: Program, path: Path, moves: Integers) -> tuple[Integers, Integers, Floats]:
-    """Run, piece and parameter where the path has followed so many `moves` (k,), sorted, and no more.
+    """Run, piece and parameter where the path has followed the first `moves` (k,) moves, sorted.
 
     The piece is −1 where that is a stop, at the end of the run, or at the start of the path for run −1.
     """

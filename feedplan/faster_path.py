@@ -28,11 +28,12 @@ from feedplan.refit import FitLimits, along_gradient, at_speed_of, promise
 
 # The most rounds: later ones hardly gain.
 MAX_ROUNDS = 3
-# A section that takes no more than this over its time at the feed and at the speed of the axes gains nothing.
+# A path is fitted anew only if some run takes longer, by more than this part, than it would at the feed and
+# at the greatest speeds of the axes.
 _WORTH_TRYING = 1e-3
-# A section that is shorter by less than this part is none the faster.
+# Times of a section that differ by less than this part count as equal (rounding).
 _ROUNDING = 1e-9
-# A step is planned only if it promises to save this part of the time.
+# A step along the gradient is planned only if it promises to save this part of the time.
 _PROMISING = 1e-5
 # Where a step does not gain, the next one is shorter by this factor.
 _SHORTER = 0.3
@@ -93,9 +94,9 @@ def faster(
     sections, count, stopped = _Sections(first.path, first.path), 0, first.profile.stopped
     # The length of the next step, by move.
     step = np.ones(int(first.path.move.max()) + 1)
-    # What can be planned along one path need not be along another; the best so far holds.
+    # Where no plan is found along a new path, the best one so far is kept.
     with suppress(InfeasibleError, SolverError):
-        # Of a step after the last round only the promise is wanted.
+        # The turn after the last round only computes what one more step promises.
         for turn in range(rounds + (rounds > 1)):
             if stopped or not (_excess(best) > _WORTH_TRYING).any():
                 break

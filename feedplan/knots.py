@@ -12,7 +12,7 @@ from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
 from feedplan.setpoints import MAX_SETPOINTS, SetpointChunk, chunks
 
-# A run has so many steps at least, so that it shows how fast it goes.
+# Least number of steps of a run: with two the knot between its ends has the speed.
 LEAST_STEPS = 2
 
 

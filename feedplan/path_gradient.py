@@ -25,13 +25,15 @@ from feedplan.profile import SpeedProfile
 
 # Cells of the spline in each piece, and the places in a cell at which limits hold.
 _CELLS, _PLACES = 3, (0.05, 0.95)
-# An axis that uses less of a limit than this does not come to it.
+# A limit of which an axis uses a smaller share than this has no row in the quadratic program.
 _NEAR = 0.5
-# Where all axes use less of acceleration and jerk than the first, or a speed reaches the second, p stays.
+# p is kept where all axes use a smaller share of acceleration and jerk than the first number, and where a
+# speed uses a greater share of its limit than the second.
 _IDLE, _AT_SPEED = 0.9, 0.999
-# The greatest multiplier, in parts of the time that a place takes: where p has no room, any would do.
+# The greatest multiplier, in parts of the time that a place takes: where p cannot change, the multipliers are
+# not determined, and this bounds them.
 _DEAREST = 3.0
-# Next to rest, where p is less than this part of the greatest of the run, p stays too.
+# p is also kept next to rest, where it is less than this part of the greatest p of the run.
 _REST = 2e-3
 
 

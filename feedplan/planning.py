@@ -96,7 +96,7 @@ class Plan:
         return card(self.figures(), self.trajectory)
 
     def figures(self) -> dict[str, str]:
-        """The key figures by name, in words: what a notebook shows. The audit is told if it has been made."""
+        """The key figures by name, in words: what a notebook shows, with the audit if it was made."""
         verdict = self._verdict[0] if self._verdict else None
         judged = "not made yet" if verdict is None else "every limit holds" if verdict.ok else "failed"
         return {
@@ -134,9 +134,9 @@ class Plan:
         """Setpoints at the servo period [s] (the machine's unless given), computed as they are read.
 
         Where the curvature of the path jumps, third differences keep the limits of jerk at the machine's
-        period: over a shorter one a step of the acceleration is a greater jerk. `progress` is told how far
-        the laying out of their times is. Raises InputError for a period or an interpolator that cannot be
-        used.
+        period: over a shorter one a step of the acceleration is a greater jerk. `progress` is called
+        with the part of the laying out of their times that is done. Raises InputError for a period or an
+        interpolator that cannot be used.
         """
         callback(progress, "the part done")
         return Setpoints(
@@ -185,7 +185,7 @@ class Plan:
         return self.make_account()
 
     def make_account(self, progress: Listener | None = None) -> Account:
-        """The `account`, computed once; `progress` is told how far it is."""
+        """The `account`, computed once; `progress` is called with the part done."""
         callback(progress, "the part done")
         if not self._account:
             jerk = planners.limits_jerk(self.method)
@@ -195,7 +195,7 @@ class Plan:
     def operations(self, tool_change: float = 0.0) -> tuple[OperationTime, ...]:
         """The time of each tool and operation of the program; a tool change counts `tool_change` [s].
 
-        Raises InputError for a path, which has none, and for a time that is none.
+        Raises InputError for the plan of a path, and for a time that is negative or not a number.
         """
         if self.program is None:
             raise InputError("a path has no operations: give a program")
@@ -226,7 +226,8 @@ class Plan:
     def pass_setpoints(self, sinks: Sequence[Sink], progress: Listener | None = None) -> Audit:
         """Computes the setpoints once, for all `sinks` and, where it has not been made, for the audit.
 
-        They come in chunks of `feedplan.audit.CHUNK`. `progress` is told how far it is. Returns the audit.
+        They come in chunks of `feedplan.audit.CHUNK`. `progress` is called with the part done. Returns
+        the audit.
         """
         points, rest = self.setpoints(progress=part(progress, 0.0, LAID_OUT)), part(progress, LAID_OUT, 1.0)
         passed = points.teed(sinks)

@@ -127,8 +127,8 @@ class SpeedProfile(OfNative[Profile]):
     def sampler(self, problem: Problem, progress: Listener | None = None) -> Sampler:
         """The native reader of the motion along the problem's path, with setpoints at the problem's period.
 
-        It is made once for each problem; `progress` is told how far its laying out is. Raises InputError for
-        a profile of another path.
+        It is made once for each problem; `progress` is called with the part that is done. Raises InputError
+        for a profile of another path.
         """
         if problem not in self._samplers:
             self._samplers[problem] = Sampler(problem, self, problem.period, progress)

@@ -23,9 +23,9 @@ from feedplan.units import counted
 Interpolator = Literal["sarfraz", "newton"]
 INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
 
-# Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
+# The greatest number of setpoints in memory at once: with six axes they take 5 GB.
 MAX_CHUNK = 20_000_000
-# What more than so many setpoints need is asked for: a day at 1 kHz.
+# The greatest number of setpoints of a plan unless the user asks for more: a day at 1 kHz.
 MAX_SETPOINTS = 100_000_000
 
 
@@ -72,7 +72,7 @@ class SamplingStats:
     length_error: float = 0.0
 
 
-# Who takes setpoints chunk by chunk.
+# A function that takes setpoints chunk by chunk.
 Sink = Callable[[SetpointChunk], None]
 
 
@@ -88,12 +88,12 @@ class Setpoints:
     a setpoint has the values of the phase that begins there. `computing` is the time that this took
     so far, `passing` what those took to whom they were passed on [s].
 
-    By the `interpolator` sarfraz, where an axis moves at constant acceleration or speed its way tells the
-    place, in closed form on quadratic pieces; elsewhere a table of length or time does, with Sarfraz's
-    predictor and corrector, and the length at a time in closed form where the jerk on the path is constant.
-    By newton: steps of speed times period, to third order, and Newton–Raphson. Pieces may have any degree,
-    polynomial or rational. `progress` is told how far the laying out is; `events` are those of the plan
-    (`feedplan.event_places`).
+    By the `interpolator` sarfraz, where an axis moves at constant acceleration or speed the place follows
+    from its way, in closed form on quadratic pieces; elsewhere from a table of length or time, with Sarfraz's
+    predictor and corrector, and from the length at a time in closed form where the jerk on the path is
+    constant. By newton: steps of speed times period, to third order, and Newton–Raphson. Pieces may have any
+    degree, polynomial or rational. `progress` is called with the part of the laying out that is done;
+    `events` are those of the plan (`feedplan.event_places`).
     Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
     setpoints than `max_setpoints`.
     """

@@ -74,7 +74,7 @@ def audit(
     judged only if the method claims it (`jerk`): then in every third difference of the setpoints, and on the
     continuous profile as well, whose acceleration may jump only where the curvature of the path does, by no
     more than 4/3 of what the jerk limit makes in one servo period: more alone would break third differences.
-    `progress` is told how far it is; what it raises ends the audit.
+    `progress` is called with the part done; what it raises ends the audit.
 
     At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a
     jump is an acceleration over one period, judged like any other by second differences: only the jump
@@ -240,8 +240,8 @@ def audit_setpoints(
     `resolution` [mm] is the last digit of positions that were written as text: what its rounding adds to a
     difference is allowed. The `period` [s] is that of the times. Jerk is judged only if `jerk` says so.
     A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
-    where the direction turns; only there it is allowed for. `progress` is told how far it is; what it raises
-    ends the audit. Raises InputError for axes that the machine lacks, and for a single setpoint.
+    where the direction turns; only there it is allowed for. `progress` is called with the part done; what it
+    raises ends the audit. Raises InputError for axes that the machine lacks, and for a single setpoint.
     """
     names, machine_axes = points.axes, _machine_axes(machine, points.axes)
     if len(points) < 2:
@@ -284,14 +284,14 @@ def audit_setpoints(
 
 
 def _in_chunks(points: SetpointChunk, report: Listener | None) -> Chunks:
-    """Setpoints in chunks, before each of which it is told how far they are."""
+    """Setpoints in chunks; before each `report` is called with the part of them that is done."""
     for start in range(0, len(points), CHUNK):
         tell(report, start / len(points))
         yield points.part(slice(start, start + CHUNK), points.axes), None
 
 
 def _with_shares(setpoints: Setpoints | Iterable[SetpointChunk], report: Listener | None) -> Chunks:
-    """The setpoints in chunks, and who is told how far each is; nobody where their number is not known."""
+    """The setpoints in chunks, each with a listener for its progress; None where their number is unknown."""
     if not isinstance(setpoints, Setpoints):
         yield from ((chunk, None) for chunk in setpoints)
         return

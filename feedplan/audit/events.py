@@ -12,9 +12,9 @@ from feedplan.events import Event, TimedEvents
 from feedplan.program.actions import KINDS
 from feedplan.setpoints import SetpointChunk
 
-# Places of one stop may differ by so many roundings.
+# Greatest difference of positions at one stop, in roundings of the greatest coordinate.
 _ROUNDINGS = 4
-# A tool that stops within the rounding of a time has this part of its speed a period away.
+# A tool counts as at rest up to this part of its speed one period away: the time of a stop is rounded.
 _REST = 1e-6
 
 

@@ -34,7 +34,7 @@ def feed_limits(problem: Problem, program: Program | None, progress: Listener | 
     """The greatest of each speed on each piece (n, 4) [mm/s, deg/s]; infinite where it is not limited.
 
     Without a program the numbers are the problem's: along the axes that the piece moves if the problem counts
-    axes by shares, else in all axes together. `progress` is told when it is half done.
+    axes by shares, else in all axes together. `progress` is called when half of the work is done.
     """
     path = problem.path
     # Speed by speed, (4, n): much faster than four numbers for each of many pieces.
@@ -45,7 +45,7 @@ def feed_limits(problem: Problem, program: Program | None, progress: Listener | 
         goes = np.logical_or.reduce(moves)
         first, last = np.clip(path.move.T, 0, len(program) - 1)
         ends = np.stack([first, last + 1], axis=1).ravel()
-        # The blocks before and after that move anything; beyond the last one stands for none.
+        # The nearest blocks before and after that move anything; the index after the last one means no block.
         leads = np.append(np.flatnonzero(goes), len(program))
         count = np.concatenate([[0], np.cumsum(goes)])
         tell(progress, 0.5)

@@ -29,7 +29,7 @@ def audit_knots(
 
     Between two knots at rest all steps are one period of that part. What is measured is what the knots say:
     mean velocities, accelerations and jerks over one, two and three steps, and velocities that belong to the
-    positions. The acceleration of the cubics that a drive makes of them is told, not judged. Raises
+    positions. The acceleration of the cubics that a drive makes of them is reported, not judged. Raises
     InputError as `audit_setpoints`.
     """
     t, axes = points.t, points.axes

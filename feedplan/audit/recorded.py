@@ -22,7 +22,7 @@ STEPS = 16
 # What the mean may leave the recorded range by, as a share of the limit: four accelerations times a period.
 SHARE = 0.25
 
-# Steps whose means are looked at together.
+# Number of steps whose means are computed at once.
 _AT_ONCE = 100_000
 
 
@@ -40,7 +40,7 @@ def audit_recorded(
 
     `t` (n,) [s]; `rate` (n, axes) and what is recorded as its `change` by time, which the `limit` (axes,)
     holds for; `jump` (axes,) is what a rate may jump by in each step. `line` (n,) source lines.
-    `progress` is told how far it is.
+    `progress` is called with the part done.
     """
     worst = Worst()
     for start in range(0, len(t) - STEPS, _AT_ONCE):
@@ -59,7 +59,7 @@ def audit_recorded(
 
 
 def _over_steps(pick: np.ufunc, values: Floats) -> Floats:
-    """The least or greatest of each `STEPS` + 1 rows on end."""
+    """The least or greatest of each `STEPS` + 1 consecutive rows."""
     reach = 1
     while reach < STEPS:
         values = pick(values[:-reach], values[reach:])

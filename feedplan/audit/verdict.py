@@ -15,7 +15,7 @@ from feedplan.units import finite
 PASS_MARK = 1.0 + 1e-6
 
 
-# Longer times [s] are told by their first digits.
+# Times [s] from here on are shown by their first digits.
 _LONGEST = 1e12
 
 
@@ -52,7 +52,7 @@ _KINDS = {
     "numbers": _Kind("number that is not finite or out of its range", ""),
 }
 
-# What is told and never judged: it is no part of a plan.
+# Checks that are reported and never judged: what they measure is not part of a plan.
 _TOLD = ("cubic_acceleration",)
 
 # What None stands for in JSON.
@@ -170,7 +170,7 @@ class Audit:
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any], units: Mapping[str, str], length: str) -> Audit:
-        """The audit that `to_json` tells; `units` are those of the axes, `length` that of the path."""
+        """The audit from `to_json`; `units` are those of the axes, `length` is that of the path."""
         checks = []
         for name, entry in table.items():
             if name not in _KINDS:

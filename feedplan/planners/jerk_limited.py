@@ -149,7 +149,7 @@ class _Task:
 def plan_part(
     part: Part, limits: Floats, resolution: float, gap: float, proves: bool, progress: Listener
 ) -> tuple[tuple[SpeedProfile, Floats] | None, tuple[Any, ...]]:
-    """The profile of a part and the excess of each of its runs, or None and what the fault tells."""
+    """The profile of a part and the excess of each of its runs, or None and the arguments of the fault."""
     try:
         native, _, excess, bounds = plan_jerk_limited(part, limits, resolution, gap, proves, None, progress)
         return (SpeedProfile.of(native, run_bounds=bounds), excess), ()

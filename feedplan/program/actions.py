@@ -92,11 +92,11 @@ def actions(events: Events) -> Actions:
 
 
 def _last(marks: Flags) -> Integers:
-    """The last marked row up to each row; −1 where there is none."""
+    """The last marked row up to each row; −1 before the first."""
     return np.maximum.accumulate(np.where(marks, np.arange(len(marks)), -1))
 
 
 def _latest(values: Floats, marks: Flags) -> Floats:
-    """The value of the last marked row up to each row; 0 where there is none."""
+    """The value of the last marked row up to each row; 0 before the first."""
     last = _last(marks)
     return np.where(last >= 0, values[last], 0.0) if len(values) else values
