@@ -28,7 +28,6 @@ from feedplan.geometry.path import Path
 from feedplan.planners import jerk_limited, planner
 from feedplan.planners._jerk import jerk_limits
 
-NAME = "against-copp"
 Array = NDArray[np.float64]
 VELOCITY, ACCELERATION, JERK = 250.0, 3000.0, 50_000.0
 # Stations of copp, about uniform in length. Programs follow each other until one gains less than GAIN of the
@@ -81,7 +80,6 @@ def run(quick: bool = False) -> Result:
         times, ratio = time / profile.time, spent / ours.processor
         rows.append(_row(name, f"copp, {programs} programs", time, excess, spent, times, ratio))
     return Result(
-        NAME,
         f"Jerk-limited plans against copp {_version()}",
         tuple(rows),
         (

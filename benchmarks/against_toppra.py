@@ -10,8 +10,6 @@ from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
 from feedplan.planners import bang_bang
 
-NAME = "against-toppra"
-
 
 def run(quick: bool = False) -> Result:
     """Refines toppra's mesh until its time is close enough to the exact one; compares computing times."""
@@ -38,7 +36,6 @@ def run(quick: bool = False) -> Result:
             }
         )
     return Result(
-        NAME,
         f"Exact planner against toppra {toppra_mesh.VERSION} at equal accuracy",
         tuple(rows),
         (

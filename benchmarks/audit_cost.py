@@ -13,7 +13,6 @@ from feedplan import Plan
 from feedplan.audit import CHUNK, audit
 from feedplan.planners import limits_jerk
 
-NAME = "audit-cost"
 METHODS = ("bang-bang", "jerk-limited")
 
 
@@ -26,7 +25,6 @@ def run(quick: bool = False) -> Result:
             plan = feedplan.plan(program, machine, method=method)
             rows.append({"part": name, "method": method, **cost(plan)})
     return Result(
-        NAME,
         "Sampling and audit: processor time for each setpoint at 1 kHz",
         tuple(rows),
         ("profile: with the path against the program; setpoints: sampled once more, and that subtracted.",),

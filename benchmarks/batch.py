@@ -16,7 +16,6 @@ from typing import Any
 from benchmarks.results import Cell, Result
 from feedplan import Machine, plan, write_plan
 
-NAME = "batch"
 WORKERS = 2
 
 
@@ -34,7 +33,6 @@ def run(quick: bool = False) -> Result:
             other = _batch(programs, folder / "spread", "--cluster", address)
         rows.append(_row("Dask cluster", WORKERS, *other, _equal(one, folder / "spread"), count))
     return Result(
-        NAME,
         f"{count} programs of 40 moves, bang-bang on mill, with setpoints and report",
         tuple(rows),
         (

@@ -20,8 +20,6 @@ from feedplan.planners._jerk import jerk_limits
 from feedplan.planners.jerk_limited import RESOLUTION
 from feedplan.profile import SpeedProfile
 
-NAME = "certificate-cost"
-
 
 def run(quick: bool = False) -> Result:
     """Times the native calls on one path of each kind: the best of five, plan and bound in one process."""
@@ -42,7 +40,6 @@ def run(quick: bool = False) -> Result:
         problem = build_problem(ToolPath.from_curve(curve_of(), feed=FREE), JERK_MACHINE)
         rows.append(_jerk_row(f"{name}, jerk-limited", problem))
     return Result(
-        NAME,
         "Lower bound beside its plan",
         tuple(rows),
         (

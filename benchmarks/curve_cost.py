@@ -18,7 +18,6 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.profile import SpeedProfile
 
-NAME = "curve-cost"
 SEED = 1
 FEEDS = (100.0, 1e5)
 # Number of calls of each; the calls alternate.
@@ -42,7 +41,6 @@ def run(quick: bool = False) -> Result:
     costs = [taken.processor for taken in best_of_each(calls, ROUNDS)]
     of_quadratics = costs[0] / len(quadratics.path)
     return Result(
-        NAME,
         "Exact planner on curves, one thread",
         tuple(
             _row(name, problem, cost, of_quadratics)

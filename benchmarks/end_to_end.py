@@ -14,7 +14,6 @@ from pathlib import Path
 from benchmarks.named import example
 from benchmarks.results import Cell, Result
 
-NAME = "end-to-end"
 # Example, its machine, number of blocks. The lettering has a tenth: its strokes are so much longer than the
 # blocks of the finishing parts that it takes hours of machining and millions of setpoints.
 PARTS = (("vase", "vase", 500_000), ("head", "mill", 500_000), ("lettering", "router", 50_000))
@@ -31,7 +30,6 @@ def run(quick: bool = False) -> Result:
             rows.append(_plan(program, machine, Path(directory, part)))
             shutil.rmtree(Path(directory, part))
     return Result(
-        NAME,
         f"From program to audited setpoints at 1 kHz, {os.cpu_count()} cores",
         tuple(rows),
         ("command: the whole of `feedplan plan`, with Python's start, the report and all files.",),

@@ -15,7 +15,6 @@ from feedplan.planning import Plan, plan
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 
-NAME = "faster-path"
 # Velocity [mm/s], acceleration [mm/s²] and jerk [mm/s³] of both axes; on the fast machine jerk governs.
 LIMITS = {"slow": (100.0, 500.0, 5e4), "fast": (250.0, 3000.0, 5e4)}
 TOLERANCES = (0.01, 0.05, 0.1)
@@ -98,7 +97,6 @@ def run(quick: bool = False) -> Result:
         for tolerance in tolerances
     ]
     return Result(
-        NAME,
         "Times along the path as fitted and along one fitted to the speed, with up to three rounds [s]",
         tuple(rows),
         (

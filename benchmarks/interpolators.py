@@ -16,7 +16,6 @@ from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, Setpoints
 
-NAME = "interpolators"
 FEED = 50.0  # [mm/s]
 
 
@@ -119,7 +118,6 @@ def run(quick: bool = False) -> Result:
     for name, path in curves().items():
         rows += stream_rows(name, path, steps)
     return Result(
-        NAME,
         f"Interpolators at {FEED:g} mm/s",
         tuple(rows),
         ("The error is the proven bound.",),

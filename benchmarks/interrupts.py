@@ -28,7 +28,6 @@ from feedplan.program.read import read_program
 from feedplan.progress import Listener, part
 from feedplan.setpoints import Setpoints
 
-NAME = "interrupts"
 METHODS = ("bang-bang", "s-curve", "jerk-limited")
 PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 1000
 # Time between signals in a stage [s], and time of the signal that ends a stage over the stage's time.
@@ -48,7 +47,6 @@ def run(quick: bool = False) -> Result:
             for name, stage in _stages(program, Machine.load(MACHINE), method, Path(directory, "out")):
                 rows.append({"method": method, "stage": name, **_measured(stage)})
     return Result(
-        NAME,
         f"From Ctrl-C to the prompt in {blocks} blocks, {os.cpu_count()} cores",
         tuple(rows),
         (

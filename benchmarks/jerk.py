@@ -22,7 +22,6 @@ from feedplan.geometry.path import Path
 from feedplan.planners import planner
 from feedplan.profile import SpeedProfile
 
-NAME = "jerk"
 AXES = tuple(Axis(name, 250.0, 3000.0, max_jerk=50_000.0) for name in "XYZ")
 MACHINE = Machine("jerk", AXES, chord_tolerance=float("inf"))
 METHODS = ("jerk-limited", "ruckig", "s-curve", "bang-bang")
@@ -76,7 +75,6 @@ def run(quick: bool = False) -> Result:
             rows.append(_row(name, f"{solver}, the same grid", found, best.time, 0.0, 0.0, cost, spent))
     rows.extend(_cost(length) for length in (WINDING[:1] if quick else WINDING))
     return Result(
-        NAME,
         "Limits of jerk",
         tuple(rows),
         (

@@ -16,7 +16,6 @@ from feedplan.machine.path_derivatives import TipPieces, derivatives, positions
 from feedplan.machine.rotary import RotaryChain, ToolVector
 from feedplan.machine.singularities import joint_path
 
-NAME = "kinematics-cost"
 SEED = 1
 
 
@@ -31,7 +30,6 @@ def run(quick: bool = False) -> Result:
             if isinstance(machine.inverse, RotaryChain) and len(machine.axes) == 5:
                 machines[f"{name}, I J K"] = ToolVector(machine.inverse)
     return Result(
-        NAME,
         "Kinematics: CPU per point or piece [µs]",
         tuple({"machine": name, **_row(machine, count)} for name, machine in machines.items()),
         (

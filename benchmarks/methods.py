@@ -11,7 +11,6 @@ from feedplan.audit import Audit, audit
 from feedplan.errors import InfeasibleError, SolverError
 from feedplan.planners import limits_jerk, methods, options_of
 
-NAME = "methods"
 EXACT = "bang-bang"
 # Most pieces for slow methods, which take minutes for more pieces.
 MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100, "ruckig": 100}
@@ -46,7 +45,6 @@ def run(quick: bool = False) -> Result:
             numbers = (made.time, over, 100.0 * made.gap, spent, spent / cost)
             rows.append(_row(name, len(made.path), method, _worst(verdict), numbers))
     return Result(
-        NAME,
         "Every method on every problem",
         tuple(rows),
         (

@@ -9,8 +9,6 @@ from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
 from feedplan.planners import bang_bang
 
-NAME = "planner-cost"
-
 
 def run(quick: bool = False) -> Result:
     """Plans one random spline of each size on one thread (one run); the best of several times."""
@@ -30,7 +28,6 @@ def run(quick: bool = False) -> Result:
             }
         )
     return Result(
-        NAME,
         "Exact planner, one thread: cost per quadratic piece",
         tuple(rows),
         ("The whole Python call, profile included; below about 1000 pieces the call itself dominates.",),

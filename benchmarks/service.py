@@ -21,7 +21,6 @@ from benchmarks.results import Cell, Result
 from feedplan import Client, plan
 from feedplan.client.transport import form
 
-NAME = "service"
 SMALL = "G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nM2\n"
 # Time between requests [s], as of a page that follows a job.
 PAUSE = 0.01
@@ -43,7 +42,6 @@ def run(quick: bool = False) -> Result:
             client.cancel(job["id"])
         rows.append(_overhead(client, 3 if quick else 30))
     return Result(
-        NAME,
         f"Requests to the service, {os.cpu_count()} cores",
         tuple(rows),
         (

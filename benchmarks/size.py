@@ -15,7 +15,6 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 
-NAME = "size"
 RADII = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 TOLERANCES = (0.001, 0.01, 0.1)
 # Samples of each piece of the path.
@@ -89,7 +88,6 @@ def run(quick: bool = False) -> Result:
     radii, tolerances = ((2.0,), (0.1,)) if quick else (RADII, TOLERANCES)
     rows = [_row(shape, r, tol) for shape in SHAPES for tol in tolerances for r in radii]
     return Result(
-        NAME,
         "Radius of arcs on smooth paths, in their middle halves [mm]",
         tuple(rows),
         (

@@ -17,7 +17,6 @@ from feedplan.plan_folder import write_plan
 from feedplan.planners import planner
 from feedplan.time_limit import FOLLOWING
 
-NAME = "time-limit"
 # Feeds along a winding path [mm/s], and its length [mm].
 FEEDS, LENGTH = (1.0, 10.0, 100.0), 100.0
 
@@ -28,7 +27,6 @@ def run(quick: bool = False) -> Result:
     if not quick:
         rows += [_row(f"winding at {feed:g} mm/s", winding(LENGTH), feed) for feed in FEEDS]
     return Result(
-        NAME,
         "Without time",
         tuple(rows),
         (

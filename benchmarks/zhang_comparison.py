@@ -6,7 +6,6 @@ from benchmarks.named import part
 from benchmarks.results import Cell, Result
 from feedplan import Program, plan
 
-NAME = "zhang-comparison"
 # Our examples of the parts in the paper's figure 8, with their number of blocks.
 PARTS = {"vase": 20_000, "lettering": 10_000, "head": 20_000}
 QUICK = 20  # times fewer blocks
@@ -24,7 +23,6 @@ def run(quick: bool = False) -> Result:
         program, _ = part(name, blocks // (QUICK if quick else 1), MACHINE)
         rows += [_row(name, program, feed, period) for feed in FEEDS for period in PERIODS]
     return Result(
-        NAME,
         "Machining time of transitions at corners over that of the optimum on fitted splines",
         tuple(rows),
         (

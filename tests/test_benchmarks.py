@@ -63,7 +63,6 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
     assert all(table["computer"]["cores"] for table in tables.values())
 
 
-@needs_toppra
 def test_an_unknown_benchmark_is_refused_with_the_known_ones() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks", "speed"], cwd=ROOT, capture_output=True, text=True, timeout=60

@@ -151,9 +151,9 @@ def main() -> None:
         rows = [found for found in pool.map(one, arguments.programs) if found is not None]
     if not rows:
         sys.exit(1)
-    result = Result("simulator", "LinuxCNC's simulator, and the model of LinuxCNC", tuple(rows))
+    result = Result("LinuxCNC's simulator, and the model of LinuxCNC", tuple(rows))
     results.show(result, Console(width=240))
-    results.store(result, arguments.output)
+    results.store("simulator", result, arguments.output)
 
 
 if __name__ == "__main__":
