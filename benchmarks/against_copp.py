@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.jerk_excess import derivatives_by_length, jerk_excess, lengths
-from benchmarks.named import FREE, butterfly, lemniscate, trefoil
+from benchmarks.named import FREE, butterfly, cubic_by_chord, lemniscate, trefoil
 from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
 from feedplan import Axis, Machine
@@ -40,16 +40,7 @@ ACCURACY = 1e-4
 
 def six_joints() -> CompositeCurve:
     """A C2 cubic spline of six joints through 12 random points in a cube of 100 mm (seed 6)."""
-    from scipy.interpolate import CubicSpline
-
-    points = np.random.default_rng(6).uniform(0.0, 100.0, (12, 6))
-    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    spline = CubicSpline(knots, points, bc_type="natural")
-    h, slope = np.diff(knots)[:, None], spline(knots, 1)
-    control = np.stack(
-        [points[:-1], points[:-1] + slope[:-1] * h / 3, points[1:] - slope[1:] * h / 3, points[1:]], 1
-    )
-    return CompositeCurve.from_pieces(control, h[:, 0])
+    return cubic_by_chord(np.random.default_rng(6).uniform(0.0, 100.0, (12, 6)), "natural")
 
 
 CURVES: dict[str, Callable[[], CompositeCurve]] = {

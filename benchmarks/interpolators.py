@@ -6,38 +6,16 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.problems import quadratic_spline
 from benchmarks.results import Cell, Result
 from feedplan.constraints.problem import Problem
-from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, Setpoints
 
 FEED = 50.0  # [mm/s]
-
-
-def spline(points: NDArray[np.float64]) -> Path:
-    """The C1 quadratic B-spline of control points (n + 2, axes)."""
-    edges = np.diff(points, axis=0)
-    lengths = np.linalg.norm(edges, axis=1)
-    width = (lengths[:-1] + lengths[1:]) / 2
-    share = np.concatenate(([0.0], width, [0.0]))
-    joints = points[:-1] + edges * (share[:-1] / (share[:-1] + share[1:]))[:, None]
-    control = np.stack([joints[:-1], points[1:-1], joints[1:]], axis=1)
-    count = len(width)
-    return Path(
-        axes=("X", "Y", "Z")[: points.shape[1]],
-        curve=CompositeCurve.from_pieces(control, width),
-        feed=np.full(count, FEED),
-        move=np.zeros((count, 2), np.int64),
-        line=np.arange(1, count + 1, dtype=np.int32),
-        runs=np.array([0, count]),
-        dwell=np.zeros(1),
-        tolerance=np.zeros(count),
-    )
 
 
 def curves() -> dict[str, Path]:
@@ -48,7 +26,8 @@ def curves() -> dict[str, Path]:
     angle = np.linspace(0, 6 * np.pi, 19)
     large = np.stack([100 * np.cos(angle), 40 * np.sin(2 * angle)], axis=1)
     fold = np.stack([np.tile([0.0, 10.0], 40), np.arange(80) * 1e-3], axis=1)
-    return {"surface pass": spline(surface), "large curves": spline(large), "folds": spline(fold)}
+    named = {"surface pass": surface, "large curves": large, "folds": fold}
+    return {name: quadratic_spline(points, FEED) for name, points in named.items()}
 
 
 def constant_feed(path: Path) -> SpeedProfile:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, butterfly, lemniscate, trefoil
@@ -90,16 +91,11 @@ def run(quick: bool = False) -> Result:
 
 def winding(length: float) -> CompositeCurve:
     """A C2 cubic spline of about this length [mm], whose direction has two angles that are sums of sines."""
-    from scipy.interpolate import CubicSpline
-
     s = np.arange(0.0, length + 0.5)
     yaw = 0.9 * np.sin(s / 3.1) + 0.3 * np.sin(s / 1.7) + 1.5 * np.sin(s / 7.3)
     pitch = 0.3 * np.sin(s / 1.7) + 0.5 * np.cos(s / 7.3)
     way = np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], axis=1)
-    spline = CubicSpline(s, np.cumsum(way, axis=0))
-    points, slope = spline(s), spline(s, 1)
-    control = np.stack([points[:-1], points[:-1] + slope[:-1] / 3, points[1:] - slope[1:] / 3, points[1:]], 1)
-    return CompositeCurve.from_pieces(control, np.ones(len(control)))
+    return CompositeCurve.from_bspline(make_interp_spline(s, np.cumsum(way, axis=0)))
 
 
 def _cost(length: float) -> dict[str, Cell]:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from benchmarks.problems import MACHINE, random_spline
 from feedplan import Axis, Machine, Path
@@ -50,23 +51,14 @@ def butterfly() -> CompositeCurve:
 
 def fan() -> CompositeCurve:
     """Closed C2 cubic spline through the fan's points, the parameter being the chord length."""
-    from scipy.interpolate import CubicSpline
-
     points = np.array(_published("fan")["points"], dtype=float)
+    return cubic_by_chord(points, "periodic")
+
+
+def cubic_by_chord(points: Array, ends: str) -> CompositeCurve:
+    """The C2 cubic spline through points (n, axes) by chord length; `ends` as for scipy's `bc_type`."""
     chord = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
-    spline = CubicSpline(chord, points, bc_type="periodic")
-    width = np.diff(chord)
-    start, slope = points[:-1], spline(chord, 1)
-    control = np.stack(
-        (
-            start,
-            start + slope[:-1] * width[:, None] / 3,
-            points[1:] - slope[1:] * width[:, None] / 3,
-            points[1:],
-        ),
-        axis=1,
-    )
-    return CompositeCurve.from_pieces(control, width)
+    return CompositeCurve.from_bspline(make_interp_spline(chord, points, bc_type=ends))
 
 
 def lemniscate() -> CompositeCurve:
