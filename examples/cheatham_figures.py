@@ -25,7 +25,6 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from panel import FEED, panel
@@ -126,16 +125,12 @@ def draw_speed(motions: dict[str, Motion], path: Path) -> Path:
 def draw_use(motion: Motion, order: int, title: str, path: Path) -> Path:
     """Draws a derivative of every axis over its limit."""
     drawing, rows = plt.subplots(len(motion.axes), 1, figsize=(9.0, 6.0), sharex=True)
-
-    def draw(axes: Axes, use: Array, name: str) -> None:
+    for axes, use, name in zip(rows, motion.use[order].T, motion.axes, strict=True):
         for limit in (-1.0, 1.0):
             axes.axhline(limit, color=RED, linewidth=0.9, linestyle=(0, (4, 3)))
         axes.plot(motion.t, use, color=BLUE, linewidth=0.6)
         axes.set_ylim(-1.2, 1.2)
         axes.set_ylabel(f"{name} axis")
-
-    for axes, use, name in zip(rows, motion.use[order].T, motion.axes, strict=True):
-        draw(axes, use, name)
     rows[0].set_title(title, loc="left", fontsize=11, fontweight="bold")
     rows[-1].set_xlim(0.0, motion.t[-1])
     rows[-1].set_xlabel("time [s]")

@@ -95,24 +95,16 @@ def pass_points(x: float, chord: float) -> Array:
 
 
 def program(
-    blocks: int = 5000,
-    *,
-    chord: float = 0.002,
-    feed: float = 4000.0,
-    tolerance: float = 0.01,
-    decimals: int = 4,
+    blocks: int = 5000, *, chord: float = 0.002, feed: float = 4000.0, tolerance: float = 0.01
 ) -> str:
     """The part program with about `blocks` blocks, which decide the number of passes over the head.
 
-    `chord` error of a block [mm], `feed` [mm/min], `tolerance` of the path control [mm], `decimals` of the
-    coordinates.
+    `chord` error of a block [mm], `feed` [mm/min], `tolerance` of the path control [mm].
     """
     sample = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, 41)
     per_pass = float(np.mean([len(pass_points(x, chord)) for x in sample]))
     xs = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, max(1, round(blocks / per_pass)) + 2)[1:-1]
     start = pass_points(xs[0], chord)[0]
-    number = f"%.{decimals}f"
-    row = f"X{number} Y{number} Z{number}"
     lines = [
         "%",
         f"(Head, {len(xs)} finishing passes, blocks of at most {chord:g} mm chord error)",
@@ -122,17 +114,17 @@ def program(
         "T1 M6",
         "S20000 M3",
         "G0 Z60.",
-        f"G0 X{number} Y{number}" % (start[0], start[1]),
-        f"G0 Z{number}" % (start[2] + 5.0),
-        f"G1 Z{number} F1000." % start[2],
+        f"G0 X{start[0]:.4f} Y{start[1]:.4f}",
+        f"G0 Z{start[2] + 5.0:.4f}",
+        f"G1 Z{start[2]:.4f} F1000.",
         f"G1 F{feed:g}",
     ]
-    for index, x in enumerate(xs):
-        points = pass_points(x, chord)
+    for index, plane in enumerate(xs):
+        points = pass_points(plane, chord)
         if index % 2:
             points = points[::-1]
         lines.append(f"(pass {index + 1})")
-        lines.extend(row % tuple(point) for point in points.tolist())
+        lines.extend(f"X{x:.4f} Y{y:.4f} Z{z:.4f}" for x, y, z in points.tolist())
     lines += ["G0 Z60.", "M5", "M30", "%"]
     return "\n".join(lines) + "\n"
 
@@ -143,20 +135,14 @@ def main() -> None:
     parser.add_argument("--chord", type=float, default=0.002, help="that a block may cut off [mm] (0.002)")
     parser.add_argument("--feed", type=float, default=4000.0, help="[mm/min] (default 4000)")
     parser.add_argument("--tolerance", type=float, default=0.01, help="G64 P [mm] (default 0.01)")
-    parser.add_argument("--decimals", type=int, default=4, help="of the coordinates (default 4)")
     parser.add_argument("--output", type=Path, default=Path("out/head.ngc"))
-    arguments = parser.parse_args()
+    options = vars(parser.parse_args())
+    output: Path = options.pop("output")
 
-    text = program(
-        arguments.blocks,
-        chord=arguments.chord,
-        feed=arguments.feed,
-        tolerance=arguments.tolerance,
-        decimals=arguments.decimals,
-    )
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(text, encoding="ascii")
-    print(f"{arguments.output}: {text.count(chr(10))} lines")
+    text = program(**options)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(text, encoding="ascii")
+    print(f"{output}: {text.count(chr(10))} lines")
 
 
 if __name__ == "__main__":

@@ -180,18 +180,13 @@ def main() -> None:
     parser.add_argument("--levels", type=int, default=3, help="passes a blade (default 3)")
     parser.add_argument("--feed", type=float, default=3000.0, help="of the tip [mm/min] (default 3000)")
     parser.add_argument("--output", type=Path, default=Path("out/impeller.ngc"))
-    arguments = parser.parse_args()
+    options = vars(parser.parse_args())
+    machine, output = Machine.load(options.pop("machine")), options.pop("output")
 
-    text = program(
-        Machine.load(arguments.machine),
-        arguments.form,
-        arguments.blocks,
-        levels=arguments.levels,
-        feed=arguments.feed,
-    )
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(text, encoding="ascii")
-    print(f"{arguments.output}: {text.count(chr(10))} lines")
+    text = program(machine, **options)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(text, encoding="ascii")
+    print(f"{output}: {text.count(chr(10))} lines")
 
 
 if __name__ == "__main__":

@@ -158,22 +158,16 @@ def main() -> None:
     parser.add_argument("--feed", type=float, default=2400.0, help="[mm/min] (default 2400)")
     parser.add_argument("--tolerance", type=float, default=0.05, help="G64 P [mm] (default 0.05)")
     parser.add_argument("--output", type=Path, default=Path("out/lettering.ngc"))
-    arguments = parser.parse_args()
+    options = vars(parser.parse_args())
+    output: Path = options.pop("output")
 
     try:
-        text = program(
-            arguments.blocks,
-            text=arguments.text,
-            height=arguments.height,
-            depth=arguments.depth,
-            feed=arguments.feed,
-            tolerance=arguments.tolerance,
-        )
+        text = program(**options)
     except ValueError as error:
         parser.error(str(error))
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(text, encoding="ascii")
-    print(f"{arguments.output}: {text.count(chr(10))} lines")
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(text, encoding="ascii")
+    print(f"{output}: {text.count(chr(10))} lines")
 
 
 if __name__ == "__main__":

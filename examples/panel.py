@@ -26,10 +26,8 @@ Array = NDArray[np.float64]
 
 JOINTS = ("tangent", "curvature")
 LENGTH, WIDTH = 420.0, 260.0  # size of the panel along x and y [mm]
-STEP, MIDDLE = (
-    3.0,
-    95.0,
-)  # distance of passes, unless there are too many; x of few passes, over the handle [mm]
+STEP = 3.0  # distance of passes, unless there are too many [mm]
+MIDDLE = 95.0  # x of the middle of few passes, over the handle [mm]
 TOOL_RADIUS = 6.0  # radius of the ball [mm]
 SPACING = 4.0  # distance of the interpolated points along a pass [mm]
 REACH = 12.0  # length of the loops' handles [mm]

@@ -87,17 +87,11 @@ def planes(count: int, step_over: float) -> Array:
 
 
 def program(
-    blocks: int = 2000,
-    *,
-    step_over: float = 0.1,
-    feed: float = 6000.0,
-    tolerance: float = 0.02,
-    decimals: int = 4,
+    blocks: int = 2000, *, step_over: float = 0.1, feed: float = 6000.0, tolerance: float = 0.02
 ) -> str:
     """The part program with about `blocks` blocks: whole passes of 486 points each.
 
-    `step_over` between passes [mm], `feed` [mm/min], `tolerance` of the path control [mm], `decimals` of the
-    coordinates.
+    `step_over` between passes [mm], `feed` [mm/min], `tolerance` of the path control [mm].
     """
     xs = planes(max(1, round(blocks / POINTS_PER_PASS)), step_over)
     start = pass_points(xs[0])[0]
@@ -110,19 +104,18 @@ def program(
         "T1 M6",
         "S18000 M3",
         "G0 Z60.",
-        f"G0 X{xs[0]:.{decimals}f} Y{start[0]:.{decimals}f}",
-        f"G0 Z{start[1] + 5.0:.{decimals}f}",
-        f"G1 Z{start[1]:.{decimals}f} F1200.",
+        f"G0 X{xs[0]:.4f} Y{start[0]:.4f}",
+        f"G0 Z{start[1] + 5.0:.4f}",
+        f"G1 Z{start[1]:.4f} F1200.",
         f"G1 F{feed:g}",
     ]
-    row = f"Y%.{decimals}f Z%.{decimals}f"
     for number, x in enumerate(xs):
         points = pass_points(x)
         if number % 2:
             points = points[::-1]
         lines.append(f"(pass {number + 1})")
-        lines.append(f"G1 X{x:.{decimals}f} " + row % tuple(points[0]))
-        lines.extend(row % (y, z) for y, z in points[1:].tolist())
+        rows = [f"Y{y:.4f} Z{z:.4f}" for y, z in points.tolist()]
+        lines += [f"G1 X{x:.4f} {rows[0]}", *rows[1:]]
     lines += ["G0 Z60.", "M5", "M30", "%"]
     return "\n".join(lines) + "\n"
 
@@ -147,20 +140,14 @@ def main() -> None:
     parser.add_argument("--step-over", type=float, default=0.1, help="between passes [mm] (default 0.1)")
     parser.add_argument("--feed", type=float, default=6000.0, help="[mm/min] (default 6000)")
     parser.add_argument("--tolerance", type=float, default=0.02, help="G64 P [mm] (default 0.02)")
-    parser.add_argument("--decimals", type=int, default=4, help="of the coordinates (default 4)")
     parser.add_argument("--output", type=Path, default=Path("out/vase.ngc"))
-    arguments = parser.parse_args()
+    options = vars(parser.parse_args())
+    output: Path = options.pop("output")
 
-    text = program(
-        arguments.blocks,
-        step_over=arguments.step_over,
-        feed=arguments.feed,
-        tolerance=arguments.tolerance,
-        decimals=arguments.decimals,
-    )
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(text, encoding="ascii")
-    print(f"{arguments.output}: {text.count(chr(10))} lines")
+    text = program(**options)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text(text, encoding="ascii")
+    print(f"{output}: {text.count(chr(10))} lines")
 
 
 if __name__ == "__main__":
