@@ -35,6 +35,7 @@ PLANE = 0.0  # x of the pass [mm]
 FEED = 6000.0  # [mm/min]
 DETAIL = (57.0, 69.0)  # y of the detail [mm]
 FINE = 2e-5  # period of the points of drawn curves [s]
+SAMPLES = 24  # points at which a piece is drawn
 
 INK, SHADE, BLUE, RED = "#1b1f24", "#9aa3ad", "#1f6fd0", "#d1495b"
 
@@ -49,37 +50,6 @@ def program() -> str:
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """The quadratic pieces of the pass in y and z: C = start + first·u + second·u²/2, u in [0, width]."""
-
-    start: Array
-    first: Array
-    second: Array
-    width: Array
-
-    def at(self, samples: int) -> tuple[Array, Array]:
-        """Positions and derivatives at even parameters of each piece, shape (pieces, samples, 2) both."""
-        u = (self.width[:, None] * np.linspace(0.0, 1.0, samples))[..., None]
-        first, second = self.first[:, None], self.second[:, None]
-        return self.start[:, None] + u * (first + 0.5 * u * second), first + u * second
-
-    def speed_limit(self, samples: int, acceleration: Array) -> Array:
-        """The limit curve at the same points [mm/s]: above it no acceleration keeps both limits.
-
-        By equations 7 and 8 of the paper the squared parameter speed is at most
-        (A_y |z'| + A_z |y'|) / |y'' z' - z'' y'|.
-        """
-        derivative = self.at(samples)[1]
-        twist = np.abs(
-            self.second[:, None, 0] * derivative[..., 1] - self.second[:, None, 1] * derivative[..., 0]
-        )
-        reach = np.abs(derivative[..., 1]) * acceleration[0] + np.abs(derivative[..., 0]) * acceleration[1]
-        straight = twist <= 1e-12 * reach
-        limit_sq = np.where(straight, np.inf, reach / np.where(straight, 1.0, twist))
-        return np.asarray(np.linalg.norm(derivative, axis=2) * np.sqrt(limit_sq))
-
-
-@dataclass(frozen=True)
 class Motion:
     """The motion: `y` [mm], `speed` [mm/s], `acceleration` (n, 2) in y and z [mm/s²]."""
 
@@ -88,13 +58,28 @@ class Motion:
     acceleration: Array
 
 
-def pieces_of(path: feedplan.Path, begin: int) -> Pieces:
-    """The pieces from index `begin` on."""
-    points = path.curve.by_piece[begin:][:, :, [path.axes.index("Y"), path.axes.index("Z")]]
-    width = path.width[begin:]
-    first = 2.0 * (points[:, 1] - points[:, 0]) / width[:, None]
-    last = 2.0 * (points[:, 2] - points[:, 1]) / width[:, None]
-    return Pieces(points[:, 0], first, (last - first) / width[:, None], width)
+def curve_of(path: feedplan.Path, begin: int, samples: int) -> tuple[Array, Array, Array]:
+    """The pass from piece `begin` on at even parameters of each piece: y and z and their derivatives to the
+    second, each (pieces, samples, 2)."""
+    piece = np.arange(begin, len(path))
+    u = path.width[begin:, None] * np.linspace(0.0, 1.0, samples)
+    found = path.curve.evaluate(np.repeat(piece, samples), u.ravel(), 2)
+    axes = [path.axes.index("Y"), path.axes.index("Z")]
+    place, first, second = (values[:, axes].reshape(*u.shape, 2) for values in found)
+    return place, first, second
+
+
+def speed_limit(first: Array, second: Array, acceleration: Array) -> Array:
+    """The limit curve [mm/s]: above it no acceleration keeps both limits.
+
+    By equations 7 and 8 of the paper the squared parameter speed is at most
+    (A_y |z'| + A_z |y'|) / |y'' z' - z'' y'|.
+    """
+    twist = np.abs(second[..., 0] * first[..., 1] - second[..., 1] * first[..., 0])
+    reach = np.abs(first[..., 1]) * acceleration[0] + np.abs(first[..., 0]) * acceleration[1]
+    straight = twist <= 1e-12 * reach
+    limit_sq = np.where(straight, np.inf, reach / np.where(straight, 1.0, twist))
+    return np.asarray(np.linalg.norm(first, axis=-1) * np.sqrt(limit_sq))
 
 
 def motion_of(plan: feedplan.Plan, begin: int, period: float) -> Motion:
@@ -137,27 +122,26 @@ def draw_all(plan: feedplan.Plan, begin: int, output: Path) -> list[Path]:
     """Draws the four figures of the pass that starts at piece `begin`."""
     machine = plan.machine
     limits = axis_limits(machine)
-    pieces = pieces_of(plan.path, begin)
+    place, first, second = curve_of(plan.path, begin, SAMPLES)
     fine, servo = motion_of(plan, begin, FINE), motion_of(plan, begin, machine.period)
     programmed = np.round(pass_points(PLANE), 4)
 
     def fit(axes: Axes, close: bool) -> None:
-        curve = pieces.at(24)[0]
         for shade, colour in enumerate((BLUE, RED)):
-            alternate = np.insert(curve[shade::2], 24, np.nan, axis=1).reshape(-1, 2)
+            alternate = np.insert(place[shade::2], SAMPLES, np.nan, axis=1).reshape(-1, 2)
             axes.plot(*alternate.T, color=colour, linewidth=1.4)
         if close:
             axes.plot(*programmed.T, "o", markersize=3.4, fillstyle="none", color=INK, markeredgewidth=0.7)
-            axes.plot(*pieces.start.T, "|", markersize=11, color=SHADE, zorder=1)
+            axes.plot(*place[:, 0].T, "|", markersize=11, color=SHADE, zorder=1)
             seen = (programmed[:, 0] >= DETAIL[0]) & (programmed[:, 0] <= DETAIL[1])
             low, high = programmed[seen, 1].min(), programmed[seen, 1].max()
             axes.set_ylim(low - 0.06 * (high - low), high + 0.06 * (high - low))
 
     def speed(axes: Axes, close: bool) -> None:
         ceiling = 1.6 * fine.speed.max()
-        place = pieces.at(24)[0][..., 0].ravel()
-        limit = np.minimum(pieces.speed_limit(24, limits), 10.0 * ceiling).ravel()
-        axes.plot(place, limit, color=SHADE, linewidth=0.9 if close else 0.5, label="velocity limit curve")
+        y, limit = place[..., 0], np.minimum(speed_limit(first, second, limits), 10.0 * ceiling)
+        width = 0.9 if close else 0.5
+        axes.plot(y.ravel(), limit.ravel(), color=SHADE, linewidth=width, label="velocity limit curve")
         axes.plot(fine.y, fine.speed, color=BLUE, linewidth=1.5, label="planned speed")
         axes.axhline(FEED / 60.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="programmed feed")
         if close:
