@@ -99,9 +99,9 @@ class Client:
             "max_setpoints": max_setpoints,
             "path": path,
             "path_rounds": path_rounds,
-            "controller": _controller(controller),
+            "controller": controller,
+            **options,
         }
-        given = {name: value for name, value in given.items() if value != _USUAL[name]} | options
         callback(progress)
         return self._ended(*self._submitted(_program(source), machine, method, given, reading), progress)
 
@@ -119,16 +119,14 @@ class Client:
         that of its own plan."""
         chosen = all_methods() if methods is None else list_of_names(methods, "methods", "a list of names")
         reading = checked_reading(options.pop("reading", None))
-        own = {
-            name: value for name, value in {"time_limit": time_limit, **options}.items() if value is not None
-        }
+        options["time_limit"] = time_limit
         program = _program(source)  # a stream can be read only once
         jobs = [
             self._submitted(
                 program,
                 machine,
                 cast(MethodName, method),
-                {name: value for name, value in own.items() if name in _USUAL or name in options_of(method)},
+                {name: value for name, value in options.items() if name in (*_USUAL, *options_of(method))},
                 reading,
             )
             for method in chosen
@@ -211,9 +209,10 @@ class Client:
                 options = {**options, key: value}
             elif value:
                 raise InputError(f"the service takes no {key}: give the program as one file, or plan it here")
+        given = {key: value for key, value in options.items() if value != _USUAL.get(key, ...)}
         try:
-            fields["options"] = json.dumps({key: _plain(value) for key, value in options.items()})
-        except (TypeError, ValueError):
+            fields["options"] = json.dumps(given, default=_plain)
+        except (AttributeError, TypeError, ValueError):
             raise refuse("an option", options, "numbers and names") from None
         body, kind = form(fields, *program)
         # With this key a request that is sent again after a broken connection gives the same job.
@@ -270,13 +269,6 @@ def _machine(given: Machine | str | os.PathLike[str]) -> str:
     return Machine.of(given).to_toml()
 
 
-def _controller(given: Controller | Mapping[str, Any] | str | None) -> Any:
-    """A controller in the form of a machine file."""
-    if isinstance(given, Controller):
-        return {"type": given.name, **given.parameters}
-    return given
-
-
 def _text(file: str | os.PathLike[str]) -> str:
     place = file_path(file, "the tool table", "the path of a tool table (.tbl)")
     try:
@@ -286,7 +278,8 @@ def _text(file: str | os.PathLike[str]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
+    """A controller in the form of a machine file, or a number of numpy as one of Python."""
+    return {"type": value.name, **value.parameters} if isinstance(value, Controller) else value.item()
 
 
 def _address(job: object) -> str:

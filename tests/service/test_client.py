@@ -17,6 +17,7 @@ import pytest
 import feedplan
 from feedplan.audit.verdict import Audit
 from feedplan.cli import main
+from feedplan.machine.controller import Controller
 from tests.service.servers import PART, Server, long_part
 
 NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
@@ -140,6 +141,15 @@ def test_methods_are_compared(client: feedplan.Client, part: Path) -> None:
     for one, other in zip(ours, own, strict=True):
         assert (one.method, one.time, one.error) == (other.method, other.time, other.error)
         assert one.audit == other.audit
+
+
+def test_a_comparison_takes_a_controller_as_an_object(client: feedplan.Client, part: Path) -> None:
+    controller = Controller("grbl", {"junction_deviation": 0.02})
+    (ours,), (own,) = (
+        where.compare(part, "mill", ["bang-bang"], controller=controller) for where in (client, feedplan)
+    )
+    assert (ours.error, ours.time) == (None, own.time)
+    assert ours.plan.summary()["today"]["time"] == own.plan.summary()["today"]["time"]
 
 
 def test_jobs_are_found_by_their_ids(client: feedplan.Client, part: Path) -> None:
