@@ -22,13 +22,13 @@ _PRELOAD = f"""
 import os, signal, time
 from feedplan.jobs import cluster_task
 from feedplan.jobs.work import work_on
-def work_or_end(order, program, folder, progress, **options):
-    if order.name == {DEADLY!r}:
+def work_or_end(job, progress):
+    if job.order.name == {DEADLY!r}:
         os.kill(os.getpid(), signal.SIGKILL)
-    while order.name == {HELD!r} and not os.path.exists({_RELEASED!r}):
+    while job.order.name == {HELD!r} and not os.path.exists({_RELEASED!r}):
         progress("read", 0.0)
         time.sleep(0.05)
-    return work_on(order, program, folder, progress, **options)
+    return work_on(job, progress)
 cluster_task.work_on = work_or_end
 """
 

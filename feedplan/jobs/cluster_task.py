@@ -11,7 +11,7 @@ from typing import Any
 
 from feedplan.jobs.executor import JobLimits
 from feedplan.jobs.identity import identity
-from feedplan.jobs.order import Order
+from feedplan.jobs.order import Job, Order
 from feedplan.jobs.outcome import Outcome
 from feedplan.jobs.work import Stopped, paced, work_on
 
@@ -56,20 +56,17 @@ def _run_one(progress: _JobProgress, job: Sent) -> Returned:
     try:
         with tempfile.TemporaryDirectory(prefix="feedplan-") as temporary:
             scratch = FilePath(temporary)
-            folder, called, table = scratch / "plan", scratch / "called", scratch / "tools.tbl"
+            program, folder, called = scratch / "program", scratch / "plan", scratch / "called"
+            program.write_bytes(job.program)
             called.mkdir()
             for name, content in job.called.items():
                 (called / name).write_bytes(content)
+            table = None
             if job.tool_table is not None:
+                table = scratch / "tools.tbl"
                 table.write_bytes(job.tool_table)
-            outcome = work_on(
-                Order.of(job.order),
-                job.program,
-                folder,
-                progress.progress,
-                tool_table=None if job.tool_table is None else table,
-                subprograms=[called] if job.called else [],
-            )
+            own = Job(Order.of(job.order), program, folder, table, (called,) if job.called else ())
+            outcome = work_on(own, progress.progress)
             if outcome.state == "stopped" and progress.over_time:
                 outcome = progress.limits.over_time()
             text = outcome.text().replace(f"{scratch}/", "")

@@ -47,3 +47,27 @@ class Job:
     folder: FilePath
     tool_table: FilePath | None = None
     subprograms: tuple[FilePath, ...] = ()
+
+    def text(self) -> str:
+        """The job as JSON."""
+        return json.dumps(
+            {
+                "order": self.order.text(),
+                "program": str(self.program),
+                "folder": str(self.folder),
+                "tool_table": None if self.tool_table is None else str(self.tool_table),
+                "subprograms": [str(folder) for folder in self.subprograms],
+            }
+        )
+
+    @staticmethod
+    def of(text: str | bytes) -> Job:
+        """The job of such a text."""
+        table = json.loads(text)
+        return Job(
+            Order.of(table["order"]),
+            FilePath(table["program"]),
+            FilePath(table["folder"]),
+            None if table["tool_table"] is None else FilePath(table["tool_table"]),
+            tuple(map(FilePath, table["subprograms"])),
+        )

@@ -16,10 +16,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.jobs.order import Job, Order
-from feedplan.jobs.outcome import Outcome
+from feedplan.jobs.order import Job
 from feedplan.jobs.work import Stopped, paced, work_on
-from feedplan.program.source import content_of
+from feedplan.progress import Progress
 
 # Modules that most jobs need; the fork server imports them once. `__main__` is that of the command.
 LOADED = (
@@ -31,41 +30,13 @@ LONGEST_MESSAGE = 1 << 24
 STOP = b"stop"
 
 
-def message_of(job: Job) -> bytes:
-    """A job as a message to the process."""
-    return json.dumps(
-        {
-            "order": job.order.text(),
-            "program": str(job.program),
-            "folder": str(job.folder),
-            "tool_table": None if job.tool_table is None else str(job.tool_table),
-            "subprograms": [str(folder) for folder in job.subprograms],
-        }
-    ).encode()
-
-
 def main(connection: Connection, niceness: int) -> None:
     """Works on jobs until the connection is closed; sends the outcome of each."""
     _become_a_worker(niceness)
     parent = _Parent(connection)
     while True:
-        outcome = _work_on(parent.next_job(), parent)
+        outcome = work_on(parent.next_job(), parent.progress())
         parent.send({"outcome": outcome.text()})
-
-
-def _work_on(message: dict[str, Any], parent: _Parent) -> Outcome:
-    try:
-        content = content_of(FilePath(message["program"])).content
-    except Exception as error:
-        return Outcome.of_error(error)
-    return work_on(
-        Order.of(message["order"]),
-        content,
-        FilePath(message["folder"]),
-        parent.progress(),
-        tool_table=None if message["tool_table"] is None else FilePath(message["tool_table"]),
-        subprograms=[FilePath(folder) for folder in message["subprograms"]],
-    )
 
 
 def _become_a_worker(niceness: int) -> None:
@@ -100,16 +71,15 @@ class _Parent:
             else:
                 self._jobs.put(message)
 
-    def next_job(self) -> dict[str, Any]:
+    def next_job(self) -> Job:
         """Waits for the next job."""
-        message: dict[str, Any] = json.loads(self._jobs.get())
-        return message
+        return Job.of(self._jobs.get())
 
     def send(self, message: dict[str, Any]) -> None:
         with suppress(OSError):
             self._connection.send_bytes(json.dumps(message).encode())
 
-    def progress(self) -> Any:
+    def progress(self) -> Progress:
         """A progress function for one job, which raises Stopped after the process was told to stop."""
         tell = paced(lambda stage, part: self.send({"stage": stage, "part": part}))
 

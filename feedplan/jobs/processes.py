@@ -69,7 +69,7 @@ class Processes:
                 other.close()
                 while len(outcomes) < len(jobs) and not stop.is_set():
                     number = len(outcomes)
-                    own.send_bytes(work.message_of(jobs[number]))
+                    own.send_bytes(jobs[number].text().encode())
                     outcome, lives = self._look_after(process, own, number, report, stop)
                     outcomes.append(outcome)
                     if not lives:

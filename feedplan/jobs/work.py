@@ -1,14 +1,12 @@
-"""Plans one order: reads, plans, audits, writes. Every executor calls it."""
+"""Plans one job: reads, plans, audits, writes. Every executor calls it."""
 
 from __future__ import annotations
 
 import io
 import time
-from collections.abc import Sequence
-from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.jobs.order import Order
+from feedplan.jobs.order import Job
 from feedplan.jobs.outcome import Outcome
 from feedplan.machine.machine import Machine
 from feedplan.plan_folder import write_plan
@@ -16,6 +14,7 @@ from feedplan.planning import Plan, plan
 from feedplan.program.machine_for import AUTO, smallest_machine
 from feedplan.program.program import Program
 from feedplan.program.read import Reading, read_program
+from feedplan.program.source import content_of
 from feedplan.progress import Progress
 
 # Begin and end of each stage in the whole work (0 to 1).
@@ -43,28 +42,19 @@ class _Named(io.BytesIO):
         self.name = name
 
 
-def work_on(
-    order: Order,
-    content: bytes,
-    folder: FilePath,
-    progress: Progress,
-    *,
-    tool_table: FilePath | None = None,
-    subprograms: Sequence[FilePath] = (),
-) -> Outcome:
-    """Plans a program of this content and writes its plan to `folder`; errors are in the outcome.
-
-    `progress` may raise Stopped.
-    """
+def work_on(job: Job, progress: Progress) -> Outcome:
+    """Plans a job and writes its plan; errors are in the outcome. `progress` may raise Stopped."""
     start = time.perf_counter()
+    order = job.order
     reading = Reading(**order.reading)  # type: ignore[typeddict-item]
-    if tool_table is not None:
-        reading["tool_table"] = tool_table
-    if subprograms:
-        reading["subprograms"] = subprograms
+    if job.tool_table is not None:
+        reading["tool_table"] = job.tool_table
+    if job.subprograms:
+        reading["subprograms"] = job.subprograms
     method: Any = order.method
     formats: Any = order.formats
     try:
+        content = content_of(job.program).content
         source: Program | io.BytesIO = _Named(content, order.name)
         if order.machine == AUTO:
             feed = order.options.get("feed")
@@ -75,7 +65,7 @@ def work_on(
         else:
             machine = Machine.from_toml(order.machine, "of the order")
         made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
-        files = write_plan(made, folder, formats, drawing=order.drawing, progress=progress)
+        files = write_plan(made, job.folder, formats, drawing=order.drawing, progress=progress)
         size = sum(file.stat().st_size for file in files)
         return Outcome("done", _figures(made), seconds=time.perf_counter() - start, size=size)
     except Stopped:
