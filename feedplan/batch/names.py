@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import PurePath
 
@@ -30,14 +31,14 @@ class Names:
     """Gives each folder a different name; upper and lower case count as equal."""
 
     def __init__(self, taken: Iterable[str]) -> None:
-        self._count = {name.lower(): 1 for name in taken}
+        self._taken = {name.lower() for name in taken}
+        self._asked: Counter[str] = Counter()
 
     def own(self, name: str) -> str:
         """The name, with a number after it if it was used before."""
-        while True:
-            count = self._count.get(name.lower(), 0) + 1
-            self._count[name.lower()] = count
-            found = name if count == 1 else f"{name}-{count}"
-            if count == 1 or found.lower() not in self._count:
-                self._count.setdefault(found.lower(), 1)
-                return found
+        found = name
+        while found.lower() in self._taken:
+            self._asked[name.lower()] += 1
+            found = f"{name}-{self._asked[name.lower()] + 1}"
+        self._taken.add(found.lower())
+        return found

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,7 @@ from feedplan.program.tools import read_tools
 from feedplan.units import counted, duration_text
 
 if TYPE_CHECKING:
-    from feedplan.jobs.executor import Executor
+    from feedplan.jobs.executor import Executor, JobLimits
 
 # Help text of the options that are swept.
 _SWEPT = "may be given several times"
@@ -138,6 +137,7 @@ def batch(
     from feedplan.batch.run import run_batch
     from feedplan.batch.summary import HEADER, summary_of, table_rows, write_summary
     from feedplan.batch.sweep import JOURNAL, SUMMARY, TABLE, Sweep, machine_text
+    from feedplan.jobs.executor import JobLimits
     from feedplan.plan_folder import summary_text
 
     if cluster is not None and jobs is not None:
@@ -162,18 +162,16 @@ def batch(
     folder, start = FilePath(output).absolute(), time.monotonic()
     for program in programs:
         require_other(program, *(folder / name for name in (JOURNAL, TABLE, SUMMARY)))
-    with _executor(cluster, jobs, max_time, max_memory) as executor, terminal.progress_bar(quiet) as progress:
+    executor = _executor(cluster, jobs, JobLimits(max_time, max_memory))
+    with closing(executor), terminal.progress_bar(quiet) as progress:
         rows, kept = run_batch(sweep, folder, executor, progress)
     summary = summary_of(rows, kept, time.monotonic() - start)
     files = write_summary(summary, folder)
     if not quiet:
         for row in rows:
-            for warning in row["warnings"]:
-                print(f"{row['folder']}: warning: {warning}", file=sys.stderr)
-            if row["error"] is not None:
-                print(f"{row['folder']}: {row['error']}", file=sys.stderr)
-            for failure in row["failures"]:
-                print(f"{row['folder']}: {failure}", file=sys.stderr)
+            errors = [] if row["error"] is None else [row["error"]]
+            for told in (*(f"warning: {text}" for text in row["warnings"]), *errors, *row["failures"]):
+                print(f"{row['folder']}: {told}", file=sys.stderr)
     if as_json:
         sys.stdout.write(summary_text(summary))
     elif not quiet:
@@ -185,25 +183,15 @@ def batch(
     return BROKEN if any(row["error"] is not None or not row["ok"] for row in rows) else DONE
 
 
-@contextmanager
-def _executor(
-    cluster: ClusterAddress | None, jobs: int | None, max_time: float, max_memory: float
-) -> Iterator[Executor]:
+def _executor(cluster: ClusterAddress | None, jobs: int | None, limits: JobLimits) -> Executor:
     """The processes of this computer, or the cluster, on which plans are made."""
-    from feedplan.jobs.executor import JobLimits
-    from feedplan.jobs.processes import Processes
-
-    limits = JobLimits(max_time, max_memory)
-    executor: Executor
     if cluster is None:
-        executor = Processes(jobs or os.cpu_count() or 1, limits, niceness=0, grace=0.2)
-    else:
-        from feedplan.jobs.cluster import Cluster
+        from feedplan.jobs.processes import Processes
 
-        executor = Cluster(cluster, limits)
-        if executor.threads() == 0:
-            print(f"warning: the cluster at {cluster.url} has no workers yet: waiting", file=sys.stderr)
-    try:
-        yield executor
-    finally:
-        executor.close()
+        return Processes(jobs or os.cpu_count() or 1, limits, niceness=0, grace=0.2)
+    from feedplan.jobs.cluster import Cluster
+
+    executor = Cluster(cluster, limits)
+    if executor.threads() == 0:
+        print(f"warning: the cluster at {cluster.url} has no workers yet: waiting", file=sys.stderr)
+    return executor
