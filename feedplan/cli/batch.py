@@ -138,7 +138,6 @@ def batch(
     from feedplan.batch.summary import HEADER, summary_of, table_rows, write_summary
     from feedplan.batch.sweep import JOURNAL, SUMMARY, TABLE, Sweep, machine_text
     from feedplan.jobs.executor import JobLimits
-    from feedplan.plan_folder import summary_text
 
     if cluster is not None and jobs is not None:
         raise click.UsageError("--jobs is for processes of this computer: leave out --jobs or --cluster")
@@ -173,7 +172,7 @@ def batch(
             for told in (*(f"warning: {text}" for text in row["warnings"]), *errors, *row["failures"]):
                 print(f"{row['folder']}: {told}", file=sys.stderr)
     if as_json:
-        sys.stdout.write(summary_text(summary))
+        terminal.print_json(summary)
     elif not quiet:
         terminal.print_table(HEADER, table_rows(rows))
         before = f", {kept} of them before" if kept else ""
@@ -193,5 +192,5 @@ def _executor(cluster: ClusterAddress | None, jobs: int | None, limits: JobLimit
 
     executor = Cluster(cluster, limits)
     if executor.threads() == 0:
-        print(f"warning: the cluster at {cluster.url} has no workers yet: waiting", file=sys.stderr)
+        terminal.warn([f"the cluster at {cluster.url} has no workers yet: waiting"])
     return executor

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
 from feedplan.cli import terminal
@@ -31,12 +29,11 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     method limits it. Exit code 1: a limit is broken.
     """
     from feedplan.checking import check as check_files
-    from feedplan.plan_folder import summary_text
 
     with terminal.progress_bar(quiet=False) as progress:
         audit = check_files(place, machine, resolution=resolution, jerk=jerk, progress=progress)
     if as_json:
-        sys.stdout.write(summary_text(audit.to_json()))
+        terminal.print_json(audit.to_json())
     else:
         terminal.print_table(terminal.AUDIT_HEADER, terminal.audit_rows(audit))
     return DONE if audit.ok else fail(terminal.failure_sentence(audit), BROKEN)

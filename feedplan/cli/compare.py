@@ -69,7 +69,7 @@ def compare(
     from feedplan.comparison import LIMITS
     from feedplan.comparison import compare as make_comparison
     from feedplan.outputs._staging import require_folder
-    from feedplan.plan_folder import summary_text, write_comparison
+    from feedplan.plan_folder import write_comparison
     from feedplan.report.page import missing_pictures
 
     if output:
@@ -95,15 +95,14 @@ def compare(
         }
         files = write_comparison(rows, output, summary, progress) if output else ()
     if not quiet:
-        for warning in _warnings(rows):
-            print(f"warning: {warning}", file=sys.stderr)
+        terminal.warn(_warnings(rows))
         for row in rows:
             if row.error:
                 print(f"{row.method}: {row.error}", file=sys.stderr)
         if output and (missing := missing_pictures()):
-            print(f"warning: {missing}", file=sys.stderr)
+            terminal.warn([missing])
     if as_json:
-        sys.stdout.write(summary_text(summary))
+        terminal.print_json(summary)
     elif not quiet:
         terminal.print_table(*terminal.comparison_table(rows, LIMITS))
         if today:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import IO
 
 import click
@@ -34,7 +33,6 @@ def fit(
     from feedplan.constraints.problem import build_problem
     from feedplan.geometry.build import build_path
     from feedplan.geometry.corners import Corners
-    from feedplan.plan_folder import summary_text
     from feedplan.program.program import Program
     from feedplan.program.read import read_program
     from feedplan.progress import of_stage
@@ -46,12 +44,11 @@ def fit(
         if not isinstance(moves, Program):
             moves = read_program(moves, known, progress=of_stage(progress, "read"), **reading)
         path = build_path(moves, known, tolerance, corners=choice, progress=of_stage(progress, "fit"))
-    for warning in (*moves.warnings, *path.warnings):
-        print(f"warning: {warning}", file=sys.stderr)
+    terminal.warn((*moves.warnings, *path.warnings))
     ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
     summary = asdict(path.fit) | ratios | {"pieces": len(path), "runs": len(path.runs) - 1}
     if as_json:
-        sys.stdout.write(summary_text(summary))
+        terminal.print_json(summary)
     else:
         unit = build_problem(path, known).unit
         path_row = ("path", terminal.pieces_text(summary))

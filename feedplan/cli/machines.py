@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from itertools import groupby
 from pathlib import Path
 
@@ -69,8 +68,7 @@ def import_(file: str, limits: tuple[str, ...], name: str | None, output: str | 
     found = find_machine(file, by_name(map(_limit, limits), "--limit"), name=name)
     text = found.to_toml()
     Machine.from_toml(text, found.origin)
-    for note in found.notes():
-        print(f"warning: {note}", file=sys.stderr)
+    terminal.warn(found.notes())
     _write(text, output)
 
 

@@ -3,7 +3,6 @@ files."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path as FilePath
@@ -96,7 +95,7 @@ def plan(
     """
     from feedplan.one_step_more import one_step_more as steps_of
     from feedplan.outputs._staging import require_folder
-    from feedplan.plan_folder import files_of_plan, summary_text
+    from feedplan.plan_folder import files_of_plan
     from feedplan.report.page import missing_pictures
 
     if formats and not output:
@@ -156,14 +155,13 @@ def plan(
         warnings += [f"{file} is of an earlier plan" for file in earlier]
         warnings += filter(None, [missing_pictures()]) if server is None else ()
     if not quiet:
-        for warning in warnings:
-            print(f"warning: {warning}", file=sys.stderr)
+        terminal.warn(warnings)
     if as_json or not quiet:
         more = {"one_step_more": [each.to_json() for each in steps]} if one_step_more else {}
         summary = {**result.summary(), **more}
         if as_json:
             told = {} if planned is None else {"planned_program": planned.to_json()}
-            sys.stdout.write(summary_text({**summary, **told}))
+            terminal.print_json({**summary, **told})
         else:
             terminal.print_rows(terminal.plan_rows(summary, audit, files))
             if planned is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -66,6 +66,19 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     for row in (header, *rows):
         cells = [f"{cell:>{widths[k]}}" if k else f"{cell:<{widths[0]}}" for k, cell in enumerate(row)]
         print("  ".join(cells).rstrip())
+
+
+def print_json(summary: dict[str, Any]) -> None:
+    """Prints a result as JSON, for `--json`."""
+    from feedplan.plan_folder import summary_text
+
+    sys.stdout.write(summary_text(summary))
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Prints warnings on standard error."""
+    for sentence in sentences:
+        print(f"warning: {sentence}", file=sys.stderr)
 
 
 @contextmanager

@@ -56,7 +56,6 @@ def time(
     for plan. --controller adds today's time, without tool changes. Exit code 1: a limit is broken, or no plan
     is feasible.
     """
-    from feedplan.plan_folder import summary_text
     from feedplan.planning import plan
 
     with terminal.progress_bar(quiet=False) as progress, terminal.silenced():
@@ -73,8 +72,7 @@ def time(
         operations = result.operations(tool_change)
     tools = by_tool(operations)
     whole = sum(own.time for own in tools)
-    for warning in result.warnings:
-        click.echo(f"warning: {warning}", err=True)
+    terminal.warn(result.warnings)
     if as_json:
         summary = {
             "program": option.name_of(program),
@@ -86,11 +84,11 @@ def time(
             "tools": [own.to_json() for own in tools],
             "operations": [own.to_json() for own in operations],
         }
-        click.echo(summary_text(summary), nl=False)
+        terminal.print_json(summary)
     else:
         terminal.print_table(*_table(tools, operations, whole))
         if result.today:
-            click.echo(f"today: {terminal.today_text(result.today.to_json())}")
+            print(f"today: {terminal.today_text(result.today.to_json())}")
     if not audit.ok:
         raise InfeasibleError(terminal.failure_sentence(audit))
 
