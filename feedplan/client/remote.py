@@ -22,54 +22,29 @@ from feedplan.setpoints import SetpointChunk, chunks
 
 class RemotePlan:
     """A plan on a service, the result of the job `id`. Its attributes are those of `feedplan.planning.Plan`,
-    but without the exact motion (`at`)."""
+    but without the exact motion (`at`): `time` [s], dwells included; `lower_bound` [s], which no feasible
+    profile of this path can beat; `gap`, (time − lower_bound) / time; `method`, and the `options` that the
+    plan was made with; `compute`, the computing time of each stage [s]; `warnings`, sentences for the
+    user."""
 
     def __init__(self, transport: Transport, job: Mapping[str, Any]) -> None:
         self._transport = transport
         self.id = str(job["id"])
         self._address = f"/v1/jobs/{self.id}"
         self._summary: dict[str, Any] = transport.json("GET", f"{self._address}/result")[1]
+        self.time, self.lower_bound, self.gap = (
+            float(self._summary[name]) for name in ("time", "lower_bound", "gap")
+        )
+        self.method: str = self._summary["method"]
+        self.options: dict[str, Any] = self._summary["options"]
+        self.compute: dict[str, float] = self._summary["compute"]
+        self.warnings = tuple(self._summary["warnings"])
 
     def __repr__(self) -> str:
         return (
             f"<RemotePlan of {self._summary['program']} on {self._summary['machine']} by {self.method}: "
             f"{self.time:.6g} s, gap {100 * self.gap:.3g} %, at {self._transport.url}>"
         )
-
-    @property
-    def time(self) -> float:
-        """Time of the whole program, dwells included [s]."""
-        return float(self._summary["time"])
-
-    @property
-    def lower_bound(self) -> float:
-        """Lower bound of the time: no feasible profile of this path is faster [s]."""
-        return float(self._summary["lower_bound"])
-
-    @property
-    def gap(self) -> float:
-        """(time − lower_bound) / time, an upper limit of the part of the time that could be saved."""
-        return float(self._summary["gap"])
-
-    @property
-    def method(self) -> str:
-        """The method that made the plan."""
-        return str(self._summary["method"])
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences for the user."""
-        return tuple(self._summary["warnings"])
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """The options that the plan was made with."""
-        return dict(self._summary["options"])
-
-    @property
-    def compute(self) -> dict[str, float]:
-        """The computing time of each stage [s]."""
-        return dict(self._summary["compute"])
 
     def summary(self) -> dict[str, Any]:
         """The content of plan.json."""
