@@ -53,8 +53,8 @@ def setpoints_file(
     if len(set(axes)) < len(axes):
         raise Refusal(INPUT, "axes has an axis twice: give each once")
     units = tuple(points.units[points.axes.index(name)] for name in axes)
-    first = 0 if start is None else int(np.searchsorted(points.t, start, "left"))
-    last = len(points) if end is None else int(np.searchsorted(points.t, end, "right"))
+    low, high = -np.inf if start is None else start, np.inf if end is None else end
+    first, last = int(np.searchsorted(points.t, low, "left")), int(np.searchsorted(points.t, high, "right"))
     if first >= last:
         span = f"{points.t[0]:g} to {points.t[-1]:g} s"
         raise Refusal(INPUT, f"there are no setpoints from {start} to {end} s: give times within {span}")
@@ -63,11 +63,7 @@ def setpoints_file(
             INPUT, f"{format_name} has no rows at servo periods: give one of {', '.join(formats())}"
         )
     output = format_named(format_name)
-    within = TimedEvents.of(
-        event
-        for event in points.events
-        if (start is None or event.time >= start) and (end is None or event.time <= end)
-    )
+    within = TimedEvents.of(event for event in points.events if low <= event.time <= high)
     folder = new / secrets.token_hex(8)
     folder.mkdir()
     file = folder / output.FILE

@@ -272,30 +272,26 @@ class Store:
     ) -> None:
         """Records the end of a running job; without a result its result folder is removed."""
         size = sum(file.stat().st_size for file in self.folder(record).rglob("*") if file.is_file())
-        if result is None:
-            _remove(self.result(record))
-        with self._database.change() as db:
-            known = _set(
-                db,
-                record["id"],
-                "running",
-                record["attempt"],
-                state=state,
-                finished=time.time(),
-                done=1.0 if state == "done" else record["done"],
-                result=None if result is None else json.dumps(result),
-                problem=problem,
-                size=size + RECORD,
-            )
-        if not known:  # the job was deleted
-            _remove(self.folder(record))
-        self.changed(record["id"])
+        self._end_run(
+            record,
+            state=state,
+            finished=time.time(),
+            done=1.0 if state == "done" else record["done"],
+            result=None if result is None else json.dumps(result),
+            problem=problem,
+            size=size + RECORD,
+        )
 
     def wait_again(self, record: Record) -> None:
         """Sets a running job to waiting: the server ends, or the executor was lost."""
-        _remove(self.result(record))
+        self._end_run(record, **_WAITS)
+
+    def _end_run(self, record: Record, **columns: object) -> None:
+        """Sets columns of a running job; without a `result` in them its result folder is removed."""
+        if columns.get("result") is None:
+            _remove(self.result(record))
         with self._database.change() as db:
-            known = _set(db, record["id"], "running", **_WAITS)
+            known = _set(db, record["id"], "running", record["attempt"], **columns)
         if not known:  # the job was deleted
             _remove(self.folder(record))
         self.changed(record["id"])
