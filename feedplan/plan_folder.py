@@ -135,7 +135,6 @@ def write_plan(
             account=account,
             audit=audit,
             data=data,
-            setpoints=figures.count,
             text=plan.program.text if plan.program else None,
         )
         (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")

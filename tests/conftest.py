@@ -89,6 +89,7 @@ class SquarePlan:
             "program": "square <1>.ngc",
             "units": {"length": "mm", "angle": "deg", "time": "s"},
             **self.account.to_json(),
+            "setpoints": {"count": len(self.chunk.t)},
             "pieces": 4,
             "runs": 4,
             "stops": 5,

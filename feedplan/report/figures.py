@@ -37,7 +37,6 @@ class SetpointFigures:
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
         self.path = path
-        self.count = 0
         self.duration = 0.0
 
     def add(self, chunk: SetpointChunk) -> None:
@@ -47,7 +46,6 @@ class SetpointFigures:
         speed = self.path.add(chunk)
         rates = (chunk.velocity, chunk.acceleration, chunk.jerk)
         self._curves.add(chunk.t, chunk.line, speed[:, None], *rates)
-        self.count += len(chunk.t)
         self.duration = float(chunk.t[-1])
 
     def over_time(self) -> dict[str, Any]:
@@ -63,11 +61,7 @@ def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, 
     """A column as the page reads it: x, y, the mean, and the source lines if they are wanted."""
     x, y, line = curves.curve(column)
     mean_x, mean = curves.mean(column, _MEAN_POINTS)
-    result: dict[str, Any] = {
-        "x": x,
-        "y": y,
-        "mean": {"x": mean_x, "y": mean},
-    }
+    result: dict[str, Any] = {"x": x, "y": y, "mean": {"x": mean_x, "y": mean}}
     return result | ({"line": line} if with_line else {})
 
 

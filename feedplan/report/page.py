@@ -41,7 +41,6 @@ def write_report(
     account: Account,
     audit: Audit,
     data: Mapping[str, Any],
-    setpoints: int,
     text: FilePath | bytes | None = None,
 ) -> None:
     """Writes the page. `summary` is the content of plan.json, `data` the result of `chart_data`, `text` the
@@ -50,7 +49,7 @@ def write_report(
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
         tables.verdict(audit),
-        tables.numbers(summary, account, audit, setpoints),
+        tables.numbers(summary, account, audit),
         _warnings(summary.get("warnings") or ()),
     )
     charts = Template(asset("page_charts.html")).substitute(
@@ -102,20 +101,13 @@ def pictures(charts: str) -> str:
 
 
 def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
-    """The text of these lines; empty if the file is gone or is not text."""
-    texts: dict[int, str] = {}
+    """The text of these lines; empty if the file is gone."""
     try:
         with io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as stream:
-            at = 0
-            for number in sorted(number for number in wanted if number > 0):
-                line = next(islice(stream, number - at - 1, None), None)
-                if line is None:
-                    break
-                texts[number] = line.decode("utf-8", errors="replace")
-                at = number
+            lines = enumerate(islice(stream, max(wanted, default=0)), 1)
+            return {number: line.decode("utf-8", "replace") for number, line in lines if number in wanted}
     except OSError:
         return {}
-    return texts
 
 
 def asset(name: str) -> str:

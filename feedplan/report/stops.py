@@ -59,16 +59,10 @@ def stops_by_cause(problem: Problem, program: Program | None, activity: Activity
     pauses[np.searchsorted(rests, path.runs)] = [path.start_dwell, *path.dwell]
     before, after = _slow_parts(activity, rests)
     lost = np.concatenate(([0.0], before)) + np.concatenate((after, [0.0]))
-    found = [
-        Stops(
-            cause,
-            len(own),
-            float(pauses[own].sum()),
-            float(lost[own].sum()),
-        )
-        for cause in dict.fromkeys(causes)
-        for own in [[k for k, other in enumerate(causes) if other == cause]]
-    ]
+    found = []
+    for cause in dict.fromkeys(causes):
+        own = [k for k, other in enumerate(causes) if other == cause]
+        found.append(Stops(cause, len(own), float(pauses[own].sum()), float(lost[own].sum())))
     return sorted(found, key=lambda stops: -(stops.pause + stops.lost))
 
 

@@ -68,7 +68,7 @@ def verdict(audit: Audit) -> str:
     )
 
 
-def numbers(summary: Mapping[str, Any], account: Account, audit: Audit, setpoints: int) -> str:
+def numbers(summary: Mapping[str, Any], account: Account, audit: Audit) -> str:
     """The big numbers under the title."""
     time, whole = float(summary["time"]), account.all
     unit, turning = account.motion.units
@@ -84,7 +84,7 @@ def numbers(summary: Mapping[str, Any], account: Account, audit: Audit, setpoint
         ("Length", *length, turned or f"{summary['pieces']} pieces"),
         ("Mean speed", *mean, by_minute),
         ("Stops on the length", str(summary["stops"]), "", counted(summary["runs"], "run")),
-        ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
+        ("Setpoints", f"{summary['setpoints']['count']:,}".replace(",", " "), "", ""),
     ]
     if bound is not None:
         gap = float(summary.get("gap") or 0.0)

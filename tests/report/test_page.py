@@ -40,7 +40,6 @@ def page(plan: Any, file: Path, source: Path | None = None) -> str:
             plan.verdict,
             over_length(plan.problem, plan.profile),
         ),
-        setpoints=figures.count,
         text=source,
     )
     return file.read_text(encoding="utf-8")
