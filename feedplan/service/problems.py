@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sqlite3
-from typing import Any
 
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
@@ -29,52 +28,39 @@ from feedplan.service.requests import sentence_of
 def add_handlers(app: FastAPI) -> None:
     """Adds an answer for every error; unexpected errors also go to the log of the service."""
 
-    @app.exception_handler(Refusal)
-    async def refused(_: Request, refusal: Refusal) -> Response:
-        return _problem(refusal)
+    async def answer(_: Request, error: Exception) -> Response:
+        if isinstance(error, ClientDisconnect):
+            return Response(status_code=400)  # the client is gone
+        refusal = _refusal(error)
+        headers = {"Retry-After": "5"} if refusal.kind.status == 429 else {}
+        headers.update(getattr(error, "headers", None) or {})
+        return Response(refusal.text(), refusal.kind.status, headers, MEDIA_TYPE)
 
-    @app.exception_handler(FeedplanError)
-    async def failed(_: Request, error: FeedplanError) -> Response:
-        return _problem(refusal_of(error))
+    for kind in (
+        *(Refusal, FeedplanError, RequestValidationError, HTTPException, ClientDisconnect),
+        *(OSError, sqlite3.OperationalError, Exception),
+    ):
+        app.add_exception_handler(kind, answer)
 
-    @app.exception_handler(RequestValidationError)
-    async def wrong(_: Request, error: RequestValidationError) -> Response:
-        return _problem(Refusal(INPUT, sentence_of(error.errors()[0])))
 
-    @app.exception_handler(HTTPException)
-    async def not_there(_: Request, error: HTTPException) -> Response:
+def _refusal(error: Exception) -> Refusal:
+    """An error as a problem."""
+    if isinstance(error, Refusal):
+        return error
+    if isinstance(error, FeedplanError):
+        return refusal_of(error)
+    if isinstance(error, RequestValidationError):
+        return Refusal(INPUT, sentence_of(error.errors()[0]))
+    if isinstance(error, HTTPException):
         if error.status_code == 404:
-            refusal = Refusal(UNKNOWN, "there is no such address: /docs tells those there are")
-        elif error.status_code == 405:
-            refusal = Refusal(METHOD, "the address does not take this method: /docs tells those it does")
-        else:
-            kind = Kind("input", error.status_code, INPUT.title)
-            refusal = Refusal(kind, f"{str(error.detail)[:200].lower().rstrip('.')}: correct the request")
-        return _problem(refusal, error.headers)
-
-    @app.exception_handler(ClientDisconnect)
-    async def left(_: Request, error: Exception) -> Response:
-        return Response(status_code=400)  # the client is gone
-
-    @app.exception_handler(FileNotFoundError)
-    async def gone(_: Request, error: Exception) -> Response:
-        return _problem(Refusal(UNKNOWN, "the job was deleted meanwhile: send it again"))
-
-    @app.exception_handler(sqlite3.OperationalError)
-    @app.exception_handler(OSError)
-    async def broken(_: Request, error: Exception) -> Response:
-        return _problem(
-            Refusal(DISK, "the disk of the service is full or broken: tell its operator"),
-        )
-
-    @app.exception_handler(Exception)
-    async def defect(_: Request, error: Exception) -> Response:
-        said = "this is a defect in feedplan, the service's messages have more: please report it"
-        return _problem(Refusal(DEFECT, said))
-
-
-def _problem(refusal: Refusal, headers: Any = None) -> Response:
-    own = {"Retry-After": "5"} if refusal.kind.status == 429 else {}
-    return Response(
-        refusal.text(), refusal.kind.status, media_type=MEDIA_TYPE, headers={**own, **(headers or {})}
-    )
+            return Refusal(UNKNOWN, "there is no such address: /docs tells those there are")
+        if error.status_code == 405:
+            return Refusal(METHOD, "the address does not take this method: /docs tells those it does")
+        kind = Kind("input", error.status_code, INPUT.title)
+        return Refusal(kind, f"{str(error.detail)[:200].lower().rstrip('.')}: correct the request")
+    if isinstance(error, FileNotFoundError):
+        return Refusal(UNKNOWN, "the job was deleted meanwhile: send it again")
+    if isinstance(error, (OSError, sqlite3.OperationalError)):
+        return Refusal(DISK, "the disk of the service is full or broken: tell its operator")
+    said = "this is a defect in feedplan, the service's messages have more: please report it"
+    return Refusal(DEFECT, said)
