@@ -33,7 +33,8 @@ def run(quick: bool = False) -> Result:
                 continue
             if limits_jerk(method) and not all(math.isfinite(axis.max_jerk) for axis in machine.axes):
                 continue
-            mesh = {"accuracy": ACCURACY, "time_limit": TIME_LIMIT} if _has_mesh(method) else {}
+            has_mesh = "accuracy" in options_of(method)
+            mesh = {"accuracy": ACCURACY, "time_limit": TIME_LIMIT} if has_mesh else {}
             try:
                 made = optimum if method == EXACT else plan(source, machine, method, **mesh)
             except (InfeasibleError, SolverError) as error:
@@ -55,10 +56,6 @@ def run(quick: bool = False) -> Result:
         ),
         Chart("computing [ms]", "over optimum [%]", "method", "problem"),
     )
-
-
-def _has_mesh(method: str) -> bool:
-    return "accuracy" in options_of(method)
 
 
 def _row(
