@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -105,7 +104,8 @@ class _Batch:
         chunk: list[tuple[int, Item, str | None]] = []
         with self._lock:
             size = self._packing.count(self._left, self._slots)
-            for number, item in self._take():
+            for number, item in self._items:
+                self._left -= 1
                 fingerprint = _fingerprint(item)
                 row = None if fingerprint is None else self._journal.done(item.folder, fingerprint)
                 if row is not None:
@@ -115,11 +115,6 @@ class _Batch:
                 if len(chunk) == size:
                     break
         return chunk
-
-    def _take(self) -> Iterator[tuple[int, Item]]:
-        for numbered in self._items:
-            self._left -= 1
-            yield numbered
 
     def _run(self, chunk: list[tuple[int, Item, str | None]]) -> None:
         def report(index: int, stage: str, part: float) -> None:
@@ -147,7 +142,7 @@ def _fingerprint(item: Item) -> str | None:
 def row_of(item: Item, fingerprint: str | None, outcome: Outcome) -> Row:
     """A row of the batch's table: times in s; `error` is None if there is a plan."""
     figures, failure = outcome.figures or {}, outcome.failure
-    row: Row = {
+    return {
         "folder": item.folder,
         "program": item.program,
         "machine": figures.get("machine", item.machine),
@@ -162,4 +157,3 @@ def row_of(item: Item, fingerprint: str | None, outcome: Outcome) -> Row:
         "kind": failure.kind if failure else None,
         "fingerprint": fingerprint,
     }
-    return row

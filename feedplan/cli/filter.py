@@ -8,6 +8,7 @@ other text on standard error if the exit code is not 0.
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import sys
@@ -65,11 +66,7 @@ def filter_(
     from feedplan.planned_feeds.rewrite import planned_program
     from feedplan.planning import plan
 
-    def write(text: str) -> None:
-        sys.stderr.write(text)
-        sys.stderr.flush()
-
-    tell = filter_progress(write)
+    tell = filter_progress(functools.partial(print, end="", file=sys.stderr, flush=True))
     known: Machine
     source: Source | Program
     # LinuxCNC sets this variable for the filters that it starts.
@@ -83,8 +80,7 @@ def filter_(
     if not audit.ok:
         raise InfeasibleError(terminal.failure_sentence(audit))
     content = planned_program(result, dialect="linuxcnc").content
-    for warning in result.warnings:
-        write(f"warning: {warning}\n")
+    terminal.warn(result.warnings)
     tell("write", 1.0)
     sys.stdout.buffer.write(content)
 

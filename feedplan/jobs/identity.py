@@ -20,9 +20,7 @@ def identity() -> str:
     for file in sorted(package.rglob("*")):
         if file.is_file() and "__pycache__" not in file.parts:
             sha256.update(f"{file.relative_to(package).as_posix()} {file.stat().st_size}\n".encode())
-            with file.open("rb") as stream:
-                while part := stream.read(1 << 20):
-                    sha256.update(part)
+            sha256.update(file.read_bytes())
     python = ".".join(platform.python_version_tuple()[:2])
     libc = " ".join(platform.libc_ver()) or platform.system()
     others = f"Python {python}, numpy {np.__version__}, {libc}"

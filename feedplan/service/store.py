@@ -179,7 +179,8 @@ class Store:
             sync(upload.file)
             os.replace(upload.file, folder / "program")
             if order.tool_table is not None:
-                write_durably(folder / "tools.tbl", order.tool_table.encode())
+                (folder / "tools.tbl").write_bytes(order.tool_table.encode())
+                sync(folder / "tools.tbl")
             sync(folder)
             sync(self._jobs)
             with self._database.change() as db:
@@ -351,14 +352,6 @@ def _remove(path: FilePath) -> None:
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
-
-
-def write_durably(file: FilePath, content: bytes) -> None:
-    """Writes a file that survives a power failure once its folder is synced."""
-    with file.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
 
 
 def sync(path: FilePath) -> None:
