@@ -14,10 +14,12 @@ from typing import Any
 import pytest
 
 from benchmarks.named import EXAMPLES
-from feedplan.cli import main
+from feedplan.audit import Audit, LimitCheck
+from feedplan.cli import main, terminal
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
 from feedplan.machine.machine import Machine
 from feedplan.outputs import KNOTS, format_named
+from feedplan.report import tables
 from tests.outputs.parquet import FORMATS
 from tests.sentences import assert_one_sentence
 
@@ -48,6 +50,14 @@ def test_a_plan_prints_its_result_and_nothing_else(planned: Any, square: Any, ca
     assert rows["length"] == "80.000 mm, mean 40 mm/s (2400 mm/min)"
     assert rows["audit"] == "passed, 2001 samples, nearest X acceleration 100.00 %"
     assert err == ""
+
+
+def test_the_table_and_the_report_name_the_same_limit_as_the_nearest_one() -> None:
+    values = (("acceleration", "X", 0.5), ("acceleration_jump", "Y", 0.95), ("duration", None, 1.0))
+    checks = [LimitCheck(name, axis, ratio, 1.0, ratio, 0.1, 3, True) for name, axis, ratio in values]
+    audit = Audit(tuple(checks), 100)
+    assert terminal.audit_text(audit) == "passed, 100 samples, nearest Y acceleration jump 95.00 %"
+    assert "Y acceleration step where the curvature jumps, 95.00 %" in tables.verdict(audit)
 
 
 def test_all_options_reach_the_planner(planned: Any, square: Any) -> None:

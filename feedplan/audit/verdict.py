@@ -58,6 +58,15 @@ _TOLD = ("cubic_acceleration",)
 # What None stands for in JSON.
 _NOT_FINITE = {"worst": math.nan, "limit": math.inf, "ratio": math.nan, "time": math.nan}
 
+# Limits of the machine and the program; all other checks are checks of consistency.
+_LIMITS = {
+    *("feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel"),
+    *("jump", "acceleration_jump"),
+}
+
+# Jumps of velocity up to here are none [mm/s].
+_NO_JUMP = 1e-3
+
 # Where these fail, the differences over those times and numbers mean nothing.
 _EXPLAINING = ("numbers", "grid")
 
@@ -86,6 +95,12 @@ class LimitCheck:
     def ok(self) -> bool:
         """Whether the limit holds, or is not judged. What is not a number never holds."""
         return not self.judged or self.ratio <= PASS_MARK
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether it is a limit of the machine or the program, not a check of consistency."""
+        # If no velocity jump is allowed at corners, this check only confirms that there is none.
+        return self.name in _LIMITS and (self.name != "jump" or self.limit > _NO_JUMP)
 
     @property
     def unit(self) -> str:
@@ -141,6 +156,12 @@ class Audit:
     def ok(self) -> bool:
         """Whether everything was measured and every limit holds."""
         return bool(self.checks) and not self.broken
+
+    @property
+    def nearest(self) -> LimitCheck | None:
+        """The judged limit of the machine or the program that is used most."""
+        used = (check for check in self.checks if check.judged and check.is_limit)
+        return max(used, key=lambda check: check.ratio, default=None)
 
     def __repr__(self) -> str:
         failures = self.failures

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
     from feedplan.comparison import Row
 
-_LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel"}
 Rows = Sequence[tuple[str, str]]
 
 
@@ -264,15 +263,9 @@ def audit_text(audit: Audit) -> str:
     samples = f"{audit.checked_samples} samples"
     if not audit.ok:
         return f"FAILED, {len(audit.broken)} of {len(audit.checks)} limits broken, {samples}"
-    nearest = nearest_limit(audit)
+    nearest = audit.nearest
     use = f", nearest {check_name(nearest)} {100 * nearest.ratio:.2f} %" if nearest else ""
     return f"passed, {samples}{use}"
-
-
-def nearest_limit(audit: Audit) -> LimitCheck | None:
-    """The limit of the machine or the program that is used most; checks of consistency are left out."""
-    used = (check for check in audit.checks if check.judged and check.name in _LIMITS)
-    return max(used, key=lambda check: check.ratio, default=None)
 
 
 def failure_sentence(audit: Audit) -> str:

@@ -21,12 +21,6 @@ from feedplan.units import (
     way_unit,
 )
 
-# Limits of the machine and the program; all other checks are checks of consistency.
-_OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
-_LIMITS = _OF_AXES | {"feed", "chord", "deviation"}
-
-_NO_JUMP = 1e-3  # [mm/s]
-
 # Names of checks on the page, if they differ from their names in the audit.
 _NAMES = {
     "chord": "chord error",
@@ -53,8 +47,7 @@ def verdict(audit: Audit) -> str:
     """The audit's verdict in one line, with the broken limits."""
     samples = f"{audit.checked_samples:,}".replace(",", " ")
     if audit.ok:
-        used = [check for check in audit.checks if check.judged and _is_limit(check)]
-        nearest = max(used, key=lambda check: check.ratio, default=None)
+        nearest = audit.nearest
         tight = f" Nearest to its limit: {_name(nearest)}, {100 * nearest.ratio:.2f} %." if nearest else ""
         text = f"<p>Every limit holds at {samples} checked samples.{tight}</p>"
         return f'<div class="verdict passed"><span class="mark">Audit passed</span>{text}</div>'
@@ -231,8 +224,8 @@ def audit_table(audit: Audit) -> str:
     Limits come first; the checks of consistency are folded unless one of them fails.
     """
     known = [check for check in audit.checks if not check.ok or math.isfinite(check.limit)]
-    limits = [check for check in known if _is_limit(check)]
-    others = [check for check in known if not _is_limit(check)]
+    limits = [check for check in known if check.is_limit]
+    others = [check for check in known if not check.is_limit]
     table = _audit_rows(limits)
     if not others:
         return table
@@ -271,11 +264,6 @@ def _audit_row(check: LimitCheck) -> str:
         f'<td class="n">{f"{check.time:.4f}" if math.isfinite(check.time) else "–"}</td>'
         f'<td class="n">{check.line or "–"}</td><td class="verdict-cell">{word}</td></tr>'
     )
-
-
-def _is_limit(check: LimitCheck) -> bool:
-    # If no velocity jump is allowed at corners, this check only confirms that there is none.
-    return check.name in _LIMITS and (check.name != "jump" or check.limit > _NO_JUMP)
 
 
 def _name(check: LimitCheck) -> str:
