@@ -132,25 +132,22 @@ def _style(name: str, value: str) -> str:
 
 def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath]) -> Rows:
     """The result of a plan as names and values."""
-    time = float(summary["time"])
+    time = summary["time"]
     rows = [(name, str(summary[name])) for name in ("program", "machine", "method")]
     seconds = f" ({time:.6f} s)" if time >= 60 else ""
     rows.append(("time", duration_text(time) + seconds))
-    if summary.get("lower_bound") is not None:
-        gap = 100.0 * float(summary.get("gap") or 0.0)
-        own = summary.get("estimated_gap")
-        by_itself = "" if own is None else f", by its own estimate {100.0 * float(own):.2g} %"
-        bound = f"{summary['lower_bound']:.6f} s for this path"
-        # A plan that breaks limits may be faster than the bound.
-        distance = f"gap {gap:.3g} %{by_itself}" if audit.ok else "which keeps the limits"
-        rows.append(("lower bound", f"{bound}, {distance}"))
-    if today := summary.get("today"):
-        rows.append(("today", today_text(today, summary.get("lower_bound"))))
+    bound, own = f"{summary['lower_bound']:.6f} s for this path", summary["estimated_gap"]
+    by_itself = "" if own is None else f", by its own estimate {100.0 * own:.2g} %"
+    # A plan that breaks limits may be faster than the bound.
+    distance = f"gap {100.0 * summary['gap']:.3g} %{by_itself}" if audit.ok else "which keeps the limits"
+    rows.append(("lower bound", f"{bound}, {distance}"))
+    if today := summary["today"]:
+        rows.append(("today", today_text(today, summary["lower_bound"])))
     units, turn = summary["units"], f"{summary['turn']:.6g} {summary['units']['angle']}"
     if summary["turn"] > 0 and summary["length"] == 0:
         rows.append(("length", f"{turn}, mean {summary['mean_turn']:.4g} {units['angle']}/s"))
     else:
-        mean, unit = float(summary["mean_speed"]), units["length"]
+        mean, unit = summary["mean_speed"], units["length"]
         by_minute = f"({mm_per_min(mean):.5g} {unit}/min)"
         rows.append(("length", f"{summary['length']:.3f} {unit}, mean {mean:.4g} {unit}/s {by_minute}"))
         if summary["turn"] > 0:
@@ -164,13 +161,11 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     rows.append(("stops", _stops_text(summary["stops_by_cause"])))
     rows.append(("tolerance", tolerance_text(**summary["tolerance"], unit=way_unit(summary))))
     rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))
-    rows += fit_rows(summary.get("fit") or {}, way_unit(summary))
-    if summary.get("gain"):
+    rows += fit_rows(summary["fit"], way_unit(summary))
+    if summary["gain"]:
         rows.append(("faster path", gain_text(summary["gain"])))
     rows.append(("audit", audit_text(audit)))
-    compute: Mapping[str, float] = summary.get("compute") or {}
-    if compute:
-        rows.append(("computing", ", ".join(f"{k} {duration_text(v)}" for k, v in compute.items())))
+    rows.append(("computing", ", ".join(f"{k} {duration_text(v)}" for k, v in summary["compute"].items())))
     if files:
         rows.append(("files", " ".join(str(file) for file in files)))
     return rows
@@ -181,7 +176,7 @@ def today_text(today: Mapping[str, Any], lower_bound: float | None = None) -> st
 
     A time below the lower bound of the path breaks limits; the text says so.
     """
-    time, saved = float(today["time"]), float(today["saved"])
+    time, saved = today["time"], today["saved"]
     verb = "saves" if saved >= 0 else "takes longer by"
     gain = f"the plan {verb} {difference_text(saved, time)}"
     text = f"{duration_text(time)} by {today['controller']}: {gain}"
@@ -226,13 +221,13 @@ def pieces_text(summary: Mapping[str, Any]) -> str:
 
 def fit_rows(fit: Mapping[str, Any], unit: str = "mm") -> list[tuple[str, str]]:
     """Points, splines and deviation of a fit, with the unit of its distances; empty if nothing was fitted."""
-    points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
+    points, splines, polynomials = (fit[key] for key in ("points", "splines", "polynomials"))
     if not points or not splines:
         return []
     text = f"{counted(points, 'point')} as {counted(splines, 'spline')} ({ratio_text(points, splines)})"
     if polynomials:
         text += f" of {counted(polynomials, 'polynomial')} ({ratio_text(points, polynomials)})"
-    return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} {unit}"), *_side_rows(fit, unit)]
+    return [("fit", text), ("deviation", f"{fit['deviation']:.3g} {unit}"), *_side_rows(fit, unit)]
 
 
 def gain_text(gain: Mapping[str, Any]) -> str:
@@ -251,10 +246,10 @@ def gain_text(gain: Mapping[str, Any]) -> str:
 
 def _side_rows(fit: Mapping[str, Any], unit: str) -> list[tuple[str, str]]:
     """Offsets of a smooth path from the program by side; empty for other paths."""
-    if fit.get("mean_offset") is None:
+    if fit["mean_offset"] is None:
         return []
-    inside, outside = (distance_text(float(fit[key]), unit) for key in ("inside", "outside"))
-    mean = distance_text(float(fit["mean_offset"]), unit, "+.2g")
+    inside, outside = (distance_text(fit[key], unit) for key in ("inside", "outside"))
+    mean = distance_text(fit["mean_offset"], unit, "+.2g")
     return [("sides", f"{inside} inside at most, {outside} outside, bends {mean} in the mean")]
 
 

@@ -14,9 +14,9 @@ Rows = Sequence[tuple[str, str, float | None]]
 
 def gained(summary: Mapping[str, Any]) -> str:
     """The section as HTML; empty if plan.json (`summary`) has none of these times."""
-    time = float(summary["time"])
+    time = summary["time"]
     columns = []
-    if today := summary.get("today"):
+    if today := summary["today"]:
         columns.append(_column("Today and by the plan", _today_note(summary), _today_rows(today, time)))
     if steps := summary.get("one_step_more"):
         note = "The plan again with this limit alone raised."
@@ -30,14 +30,13 @@ def gained(summary: Mapping[str, Any]) -> str:
 
 
 def _today_note(summary: Mapping[str, Any]) -> str:
-    bound, today = summary.get("lower_bound"), summary["today"]
-    if bound is not None and float(today["time"]) < bound:
+    if summary["today"]["time"] < summary["lower_bound"]:
         return "A model of the controller. No plan of this path within the limits is as fast as it."
     return "The time that a model of the controller tells for the program as it is."
 
 
 def _today_rows(today: Mapping[str, Any], time: float) -> Rows:
-    before, saved = float(today["time"]), float(today["saved"])
+    before, saved = today["time"], today["saved"]
     verb = "Saved" if saved >= 0.0 else "Longer by"
     return [
         (f"Today, by {today['controller']}", duration_text(before), before),
@@ -49,7 +48,7 @@ def _today_rows(today: Mapping[str, Any], time: float) -> Rows:
 def _step_rows(steps: Sequence[Mapping[str, Any]], time: float) -> Rows:
     rows = []
     for step in steps:
-        saved = float(step["saved"])
+        saved = step["saved"]
         text = difference_text(saved, time, "less" if saved >= 0.0 else "more")
         rows.append((f"{step['limit']} × {step['factor']:g}", text, abs(saved)))
     return rows

@@ -46,11 +46,11 @@ def write_report(
     """Writes the page. `summary` is the content of plan.json, `data` the result of `chart_data`, `text` the
     text of the part program, or its file."""
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
-    name = FilePath(str(summary.get("program") or "path")).name
+    name = FilePath(summary["program"] or "path").name
     judged = (
         tables.verdict(audit),
         tables.numbers(summary, account, audit),
-        _warnings(summary.get("warnings") or ()),
+        _warnings(summary["warnings"]),
     )
     charts = Template(asset("page_charts.html")).substitute(
         speed=_SPEED[any(check.name == "jerk" and check.judged for check in audit.checks)],
@@ -117,8 +117,8 @@ def asset(name: str) -> str:
 
 def _about(summary: Mapping[str, Any], problem: Problem) -> str:
     parts = [
-        f"machine <b>{escape(str(summary.get('machine')))}</b>",
-        f"method <b>{escape(str(summary.get('method')))}</b>",
+        f"machine <b>{escape(summary['machine'])}</b>",
+        f"method <b>{escape(summary['method'])}</b>",
         f"servo period <b>{problem.period * 1e3:g} ms</b>",
         f"axes <b>{' '.join(problem.axes)}</b>",
     ]

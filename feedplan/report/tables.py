@@ -63,7 +63,7 @@ def verdict(audit: Audit) -> str:
 
 def numbers(summary: Mapping[str, Any], account: Account, audit: Audit) -> str:
     """The big numbers under the title."""
-    time, whole = float(summary["time"]), account.all
+    time, whole = summary["time"], account.all
     unit, turning = account.motion.units
     turned = f"turns alone {whole.turn:.4g} {turning}" if whole.turn > 0 else ""
     length, mean = _length(whole.length, unit), (f"{whole.mean:.4g}", f"{unit}/s")
@@ -71,24 +71,21 @@ def numbers(summary: Mapping[str, Any], account: Account, audit: Audit) -> str:
     if account.motion.turns.all():
         length, mean = (f"{whole.turn:.4g}", turning), (f"{whole.mean_turn:.4g}", f"{turning}/s")
         turned, by_minute = "", ""
-    bound = summary.get("lower_bound")
+    gap, bound = summary["gap"], f"{summary['lower_bound']:.6g} s"
+    if audit.ok:
+        proof = f"no plan of this path is faster{f' than {bound}' if gap > 1e-9 else ''}"
+        distance = (_short(100.0 * gap), "%", proof)
+    else:
+        # A plan that breaks limits may be faster than the bound.
+        distance = ("–", "", f"no plan of this path that keeps the limits is faster than {bound}")
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
+        ("Gap to the bound", *distance),
         ("Length", *length, turned or f"{summary['pieces']} pieces"),
         ("Mean speed", *mean, by_minute),
         ("Stops on the length", str(summary["stops"]), "", counted(summary["runs"], "run")),
         ("Setpoints", f"{summary['setpoints']['count']:,}".replace(",", " "), "", ""),
     ]
-    if bound is not None:
-        gap = float(summary.get("gap") or 0.0)
-        than = f" than {bound:.6g} s"
-        if audit.ok:
-            proof = "no plan of this path is faster" + ("" if gap <= 1e-9 else than)
-            cells.insert(1, ("Gap to the bound", _short(100.0 * gap), "%", proof))
-        else:
-            # A plan that breaks limits may be faster than the bound.
-            proof = f"no plan of this path that keeps the limits is faster{than}"
-            cells.insert(1, ("Gap to the bound", "–", "", proof))
     items = "".join(_number(*cell) for cell in cells)
     return f'<dl class="numbers card">{items}</dl>'
 
@@ -153,9 +150,9 @@ def stops_table(stops: Sequence[Stops]) -> str:
 
 def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str:
     """Figures of the fit, computing time of each stage, and least and greatest `tolerance` asked for [mm]."""
-    fit = summary.get("fit") or {}
+    fit, gain = summary["fit"], summary["gain"]
     rows: list[tuple[str, str]] = []
-    points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
+    points, splines, polynomials = (fit[key] for key in ("points", "splines", "polynomials"))
     if points and splines:
         rows += [
             ("Points fitted", f"{points}"),
@@ -169,9 +166,8 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
         rows.append(("Fit", "nothing to fit"))
     unit = way_unit(summary)
     rows.append(("Tolerance asked for", tolerance_text(*tolerance, unit)))
-    if fit.get("deviation") is not None:
-        rows.append(("Deviation from the program", _distance(fit["deviation"], unit)))
-    if fit.get("mean_offset") is not None:
+    rows.append(("Deviation from the program", _distance(fit["deviation"], unit)))
+    if fit["mean_offset"] is not None:
         rows += [
             (name, _distance(fit[key], unit))
             for name, key in (
@@ -180,13 +176,11 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
                 ("… of bends in the mean, outside positive", "mean_offset"),
             )
         ]
-    gain = summary.get("gain")
     if gain:
-        rows.append(("Time along the path as fitted", duration_text(float(gain["times"][0]))))
+        rows.append(("Time along the path as fitted", duration_text(gain["times"][0])))
         rows.append(("… gained by fits to the speed", f"{_short(gain['gained'])} s"))
     rows.append(("Pieces planned", f"{summary['pieces']} in {counted(summary['runs'], 'run')}"))
-    compute = summary.get("compute") or {}
-    rows += [(f"Time to {name}", duration_text(float(seconds))) for name, seconds in compute.items()]
+    rows += [(f"Time to {name}", duration_text(seconds)) for name, seconds in summary["compute"].items()]
     body = "".join(f'<tr><td>{escape(name)}</td><td class="n">{value}</td></tr>' for name, value in rows)
     return f"<table>{body}</table>"
 
