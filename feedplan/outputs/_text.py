@@ -10,9 +10,9 @@ import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,98 +83,94 @@ def row_writer(
         stream.writelines(_comment(EVENT, to_json(event)) for event in events)
 
 
-@dataclass
-class Rows:
-    """The content of a file of rows: `header` as written, empty if missing; the line with the `names`, if the
-    format has one; the `table` (n, k) and the `events`."""
+@dataclass(frozen=True)
+class Head:
+    """The begin of a file of rows: `header` as written, empty if missing; the line with the `names` of the
+    columns, empty if the format has none."""
 
-    header: dict[str, Any] = field(default_factory=dict)
-    names: str = ""
-    table: Floats = field(default_factory=lambda: np.empty((0, 0)))
-    events: TimedEvents = field(default_factory=TimedEvents.none)
+    file: FilePath
+    header: dict[str, Any]
+    names: str
 
-    def of_header(self, name: str, kind: type, file: FilePath) -> Any:
+    def entry(self, name: str, kind: type) -> Any:
         """An entry of the header. Raises InputError if it is missing or has another type."""
         value = self.header.get(name)
         if not isinstance(value, kind):
             what = "missing" if value is None else shown(value)
-            raise InputError(
-                f"{file}: {name} is {what} in its comment # {HEADER} {{…}}: give a file that feedplan wrote"
-            )
+            place = f"{self.file}: {name} is {what} in its comment # {HEADER} {{…}}"
+            raise InputError(f"{place}: give a file that feedplan wrote")
         return value
+
+
+def read_head(file: FilePath, has_names: bool) -> Head:
+    """The head of a file. Raises InputError."""
+    comments: list[str] = []
+    with _opened(file) as stream:
+        first = next((line for line in stream if not _took(line, comments)), "")
+    header: object = next(_named(HEADER, comments, file), {})
+    if not isinstance(header, dict):
+        raise InputError(f"{file}: the comment # {HEADER} is {shown(header)}: give a JSON object")
+    return Head(file, header, first.strip() if has_names else "")
 
 
 def read_columns(
     file: FilePath, column_names: Callable[[Sequence[str], Sequence[str]], str], progress: Listener | None
-) -> tuple[Rows, tuple[str, ...], tuple[str, ...]]:
-    """The rows of a file, its axes and their units; `column_names` makes the expected line of names of
-    these."""
-    axes: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
+) -> tuple[Head, Floats, dict[str, Any]]:
+    """The head and the table of a file with names of columns, and its axes, their units and its events.
 
-    def width_of(rows: Rows) -> int:
-        nonlocal axes, units
-        found = _AXIS.findall(rows.names)
-        axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
-        if rows.names != (names := column_names(axes, units)):
-            raise InputError(f"{file}: the columns must be named {names}")
-        return names.count(",") + 1
-
-    return read_rows(file, width_of, progress=progress), axes, units
+    `column_names` makes the expected line of names of axes and units.
+    """
+    head = read_head(file, has_names=True)
+    found = _AXIS.findall(head.names)
+    axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
+    if head.names != (names := column_names(axes, units)):
+        raise InputError(f"{file}: the columns must be named {names}")
+    table, events = read_rows(head, names.count(",") + 1, ",", progress)
+    return head, table, {"axes": axes, "units": units, "events": events}
 
 
 def read_rows(
-    file: FilePath,
-    width_of: Callable[[Rows], int],
-    *,
-    has_names: bool = True,
-    separator: str | None = ",",
-    progress: Listener | None = None,
-) -> Rows:
-    """The rows of a file. `width_of` gives the count of numbers in a row from the lines before the rows.
+    head: Head, width: int, separator: str | None, progress: Listener | None
+) -> tuple[Floats, TimedEvents]:
+    """The rows of `width` numbers after the head (n, width), and the events between them.
 
     Raises InputError with file, line and what is wrong.
     """
-    rows, size = Rows(), max(file.stat().st_size, 1)
+    file, waits_for_names = head.file, bool(head.names)
+    size = max(file.stat().st_size, 1)
     parts: list[Floats] = []
     comments: list[str] = []
-    done, read, width, waits_for_names = 0, 0, 0, has_names
+    done = read = 0
+    with _opened(file) as stream:
+        while lines := stream.readlines(_BYTES_AT_ONCE):
+            rows = [row for row in enumerate(lines, start=done + 1) if not _took(row[1], comments)]
+            if rows and waits_for_names:
+                rows, waits_for_names = rows[1:], False
+            if rows:
+                parts.append(_table(rows, width, separator, file))
+            done += len(lines)
+            read += sum(map(len, lines))
+            tell(progress, min(read / size, 1.0))
+    table = np.concatenate(parts) if parts else np.empty((0, width))
+    return table, from_objects(_named(EVENT, comments, file), file)
+
+
+@contextmanager
+def _opened(file: FilePath) -> Iterator[IO[str]]:
     try:
         with file.open(encoding="utf-8", newline="\n") as stream:
-            while lines := stream.readlines(_BYTES_AT_ONCE):
-                numbers = []
-                for number, line in enumerate(lines, start=done + 1):
-                    if line.startswith(_MORE) and comments:
-                        comments[-1] += line[len(_MORE) :].rstrip("\r\n")
-                    elif line.startswith("#"):
-                        comments.append(line.rstrip("\r\n"))
-                    elif waits_for_names:
-                        rows.names, waits_for_names = line.strip(), False
-                    else:
-                        numbers.append((number, line))
-                if not width and not waits_for_names:
-                    rows.header = _header(comments, file)
-                    width = width_of(rows)
-                if numbers:
-                    parts.append(_table(numbers, width, separator, file))
-                done += len(lines)
-                read += sum(map(len, lines))
-                tell(progress, min(read / size, 1.0))
+            yield stream
     except UnicodeDecodeError:
         raise InputError(f"{file} is not text: give a file of setpoints") from None
-    if not width:
-        width = width_of(rows)
-    rows.table = np.concatenate(parts) if parts else np.empty((0, width))
-    rows.events = from_objects(_named(EVENT, comments, file), file)
-    return rows
 
 
-def _header(comments: list[str], file: FilePath) -> dict[str, Any]:
-    """The content of the header comment; empty if there is none."""
-    header: object = next(_named(HEADER, comments, file), {})
-    if not isinstance(header, dict):
-        raise InputError(f"{file}: the comment # {HEADER} is {shown(header)}: give a JSON object")
-    return header
+def _took(line: str, comments: list[str]) -> bool:
+    """Whether a line is a comment or continues one; then it is added to the comments."""
+    if line.startswith(_MORE) and comments:
+        comments[-1] += line[len(_MORE) :].rstrip("\r\n")
+    elif line.startswith("#"):
+        comments.append(line.rstrip("\r\n"))
+    return line.startswith("#")
 
 
 def _named(name: str, comments: list[str], file: FilePath) -> Iterator[Any]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path as FilePath
-from typing import Any
 
 import numpy as np
 
@@ -47,8 +46,8 @@ def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of a csv file with the names that this format writes."""
-    rows, axes, units = read_columns(file, column_names, progress)
-    groups = np.split(rows.table[:, 1:-1], len(QUANTITIES), axis=1)
-    columns = {"t": rows.table[:, 0], **dict(zip(QUANTITIES, groups, strict=True)), "line": rows.table[:, -1]}
-    told: dict[str, Any] = {name: rows.header[name] for name in ("format", "period") if name in rows.header}
-    return chunk_of({**columns, **told, "axes": axes, "units": units, "events": rows.events}, file)
+    head, table, about = read_columns(file, column_names, progress)
+    about |= {name: head.header[name] for name in ("format", "period") if name in head.header}
+    groups = np.split(table[:, 1:-1], len(QUANTITIES), axis=1)
+    columns = {"t": table[:, 0], **dict(zip(QUANTITIES, groups, strict=True)), "line": table[:, -1]}
+    return chunk_of({**columns, **about}, file)

@@ -19,7 +19,7 @@ from feedplan.arrays import Floats
 from feedplan.errors import InputError
 from feedplan.outputs import SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.outputs._text import Rows, read_rows, row_writer
+from feedplan.outputs._text import read_head, read_rows, row_writer
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
@@ -54,15 +54,8 @@ def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The positions and lines of a file of this format; the time of a setpoint is its index times the
     period."""
-
-    def width_of(rows: Rows) -> int:
-        return len(rows.of_header("axes", list, file)) + 1
-
-    rows = read_rows(file, width_of, has_names=False, separator=None, progress=progress)
-    period = rows.of_header("period", float, file)
-    columns = {
-        "t": np.arange(len(rows.table)) * period,
-        "position": rows.table[:, :-1],
-        "line": rows.table[:, -1],
-    }
-    return chunk_of({**rows.header, **columns, "events": rows.events}, file, tuple(columns))
+    head = read_head(file, has_names=False)
+    table, events = read_rows(head, len(head.entry("axes", list)) + 1, None, progress)
+    times = np.arange(len(table)) * head.entry("period", float)
+    columns = {"t": times, "position": table[:, :-1], "line": table[:, -1]}
+    return chunk_of({**head.header, **columns, "events": events}, file, tuple(columns))

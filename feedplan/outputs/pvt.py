@@ -58,19 +58,13 @@ def writer(file: FilePath, header: Header, count: int) -> AbstractContextManager
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The knots of a table with the names that this format writes."""
-    rows, axes, units = read_columns(file, column_names, progress)
-    period = rows.of_header("period", float, file)
-    t, steps = rows.table[:, 0], rows.table[:, 1]
+    head, table, about = read_columns(file, column_names, progress)
+    about |= {"format": head.header.get("format"), "period": head.entry("period", float)}
+    t, steps = table[:, 0], table[:, 1]
     if (wrong := np.diff(t, prepend=0.0) != steps).any():
         raise InputError(
             f"{file}: the step to {t[wrong][0]:.9g} s is {steps[wrong][0]:.9g} s, not the difference of the "
             "times: one of them was changed, plan again"
         )
-    columns = {
-        "t": t,
-        "position": rows.table[:, 2:-1:2],
-        "velocity": rows.table[:, 3:-1:2],
-        "line": rows.table[:, -1],
-    }
-    told = {"format": rows.header.get("format"), "period": period, "events": rows.events}
-    return chunk_of({**columns, **told, "axes": axes, "units": units}, file, tuple(columns), KNOTS)
+    columns = {"t": t, "position": table[:, 2:-1:2], "velocity": table[:, 3:-1:2], "line": table[:, -1]}
+    return chunk_of({**columns, **about}, file, tuple(columns), KNOTS)
