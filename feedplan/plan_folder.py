@@ -68,7 +68,8 @@ def write_plan(
     from feedplan.report.tool_path import MANY_POINTS, POINTS, ToolPath
 
     formats = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")  # type: ignore[assignment]
-    folder = _folder(folder)
+    folder = file_path(folder, "the folder", "the path of a folder, as a text or a pathlib.Path")
+    require_folder(folder)
     callback(progress)
     if not callable(getattr(plan, "summary", None)):
         raise refuse("the plan", plan, "what feedplan.plan returns")
@@ -193,10 +194,7 @@ def _knots(plan: Plan, names: list[str], step: float | None) -> Knots | None:
 
 
 def write_comparison(
-    rows: Sequence[Row],
-    folder: str | os.PathLike[str],
-    summary: dict[str, Any],
-    progress: Progress | None = None,
+    rows: Sequence[Row], folder: FilePath, summary: dict[str, Any], progress: Progress | None = None
 ) -> tuple[FilePath, ...]:
     """Writes a comparison's numbers (`summary`) and its page; returns the files.
 
@@ -208,7 +206,6 @@ def write_comparison(
     from feedplan.report.comparison import write_comparison as write_page
     from feedplan.report.tool_path import ToolPath
 
-    folder = _folder(folder)
     for row in rows:
         if row.plan is not None and row.plan.program is not None:
             require_other(row.plan.program.text, folder / COMPARISON_FILE)
@@ -229,13 +226,13 @@ def write_comparison(
         shown.append(entry)
         if progress:
             progress("write", (number + 1) / len(rows))
-    about = {name: str(summary[name]) for name in ("machine", "program") if summary.get(name)}
-    if today := summary.get("today"):
+    about = {name: summary[name] for name in ("machine", "program")}
+    if today := summary["today"]:
         about["today"] = f"{duration_text(today['time'])} by {today['controller']}"
     with staged(folder, last=COMPARISON_FILE) as stage:
         write_page(
             stage / PAGE_FILE,
-            title=FilePath(str(summary.get("program") or "path")).name,
+            title=FilePath(summary["program"]).name,
             about=about,
             rows=shown,
             limits=LIMITS,
@@ -244,12 +241,6 @@ def write_comparison(
         (stage / COMPARISON_FILE).write_text(summary_text(summary), encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
     return tuple(folder / name for name in names)
-
-
-def _folder(given: str | os.PathLike[str]) -> FilePath:
-    folder = file_path(given, "the folder", "the path of a folder, as a text or a pathlib.Path")
-    require_folder(folder)
-    return folder
 
 
 def _steps(given: Sequence[Step]) -> tuple[Step, ...]:

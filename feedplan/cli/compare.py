@@ -72,8 +72,9 @@ def compare(
     from feedplan.plan_folder import write_comparison
     from feedplan.report.page import missing_pictures
 
-    if output:
-        require_folder(FilePath(output))
+    folder = None if output is None else FilePath(output)
+    if folder:
+        require_folder(folder)
     names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
     with terminal.progress_bar(quiet) as progress, terminal.silenced():
         known, source, reading = machine_for(machine, program, reading, options["feed"])
@@ -93,7 +94,7 @@ def compare(
             "today": today and today.of_controller(),
             "methods": [row.to_json() for row in rows],
         }
-        files = write_comparison(rows, output, summary, progress) if output else ()
+        files = write_comparison(rows, folder, summary, progress) if folder else ()
     if not quiet:
         terminal.warn(_warnings(rows))
         for row in rows:
