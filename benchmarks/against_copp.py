@@ -16,7 +16,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.jerk_excess import derivatives_by_length, jerk_excess, lengths
+from benchmarks.jerk_excess import derivatives_by_length, jerk_excess
 from benchmarks.named import FREE, butterfly, cubic_by_chord, lemniscate, trefoil
 from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
@@ -125,46 +125,22 @@ def _by_copp(problem: Problem, stations: int) -> tuple[float, float, int]:
     at = np.asarray(
         copp.interpolation.t_to_s_topp3_uniform(s, profile, arrivals, PERIOD, include_final=False)
     )
-    where = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
-    # Between two stations of one piece u is a cubic of the length, by the slopes 1/|q'(u)| at both.
-    moved = _between(problem, piece, u, s * total, where, at * total)
+    moved = problem.path.evaluate(np.minimum(at * total, problem.path.length))
     jerks = np.abs(np.diff(moved, 3, axis=0)) / PERIOD**3
     return float(time), float(jerks.max()) / JERK - 1.0, programs
 
 
 def _stations(problem: Problem, count: int) -> tuple[NDArray[np.int64], Array, Array]:
     """Stations about equally far apart: their pieces, parameters, and lengths from the start [mm]."""
-    pieces = np.arange(len(problem.path))
-    fine = np.linspace(0.0, 1.0, 201) * problem.path.width[:, None]
-    table = lengths(problem, pieces, np.zeros(len(pieces)), fine)
-    share = np.maximum(np.round((count - 1) * table[:, -1] / table[:, -1].sum()).astype(int), 2)
-    start = np.concatenate([[0.0], np.cumsum(table[:, -1])])
-    piece = np.repeat(pieces, share)
-    wanted = np.concatenate([np.arange(n) / n * table[i, -1] for i, n in enumerate(share)])
-    u = np.array([np.interp(w, table[i], fine[i]) for i, w in zip(piece, wanted, strict=True)])
-    piece, u = np.append(piece, pieces[-1]), np.append(u, fine[-1, -1])
-    exact = lengths(problem, piece, np.zeros(len(piece)), u[:, None] * np.linspace(0.0, 1.0, 21))[:, -1]
-    return piece, u, start[piece] + exact
-
-
-def _between(
-    problem: Problem, piece: NDArray[np.int64], u: Array, s: Array, where: NDArray[np.int64], at: Array
-) -> Array:
-    """Positions (n, axes) at lengths `at` [mm], which lie after the stations `where`."""
-    own = piece[where]
-    end = np.where(piece[where + 1] == own, u[where + 1], problem.path.width[own])
-    x, h = at - s[where], s[where + 1] - s[where]
-    rate = [1.0 / np.linalg.norm(problem.derivatives(own, v, 1)[1], axis=1) for v in (u[where], end)]
-    chord = (end - u[where]) / h
-    t = x / h
-    bend = rate[0] + rate[1] - 2 * chord
-    cubic = u[where] + x * (rate[0] + t * (chord - rate[0] - bend + t * bend))
-    # One step of Newton on the length removes the error of the cubic.
-    off = at - s[where] - lengths(problem, own, u[where], np.stack([u[where], cubic], axis=1))[:, 1]
-    slope = np.linalg.norm(problem.derivatives(own, cubic, 1)[1], axis=1)
-    return np.asarray(
-        problem.curve.evaluate(own, np.clip(cubic + off / slope, 0.0, problem.path.width[own]))[0]
-    )
+    table, pieces = problem.path.lengths, np.arange(len(problem.path))
+    ends = np.append(table.length(pieces, np.zeros(len(pieces))), table.total)
+    share = np.maximum(np.round((count - 1) * np.diff(ends) / table.total).astype(int), 2)
+    within = [np.linspace(*span, n, endpoint=False) for *span, n in zip(ends, ends[1:], share, strict=False)]
+    s = np.append(np.concatenate(within), table.total)
+    piece = np.append(np.repeat(pieces, share), pieces[-1])
+    found, u = table.locate(s)
+    # A station on a joint belongs to the piece that begins there.
+    return piece, np.where(found == piece, u, 0.0), s
 
 
 def _version() -> str:

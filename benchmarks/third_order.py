@@ -23,7 +23,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 
-from benchmarks.jerk_excess import lengths
+from benchmarks.jerk_excess import derivatives_by_length, lengths
 from feedplan.constraints.problem import Problem
 from feedplan.profile import PhaseLaw, SpeedProfile
 
@@ -118,17 +118,11 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     places = np.clip(u[cubic].ravel(), 1e-12, None)
     pieces = np.repeat(piece[cubic], 4)
     # At both ends of an interval the derivatives are those of its own piece.
-    _, c1, c2, c3 = problem.curve.evaluate(pieces, places, 3)
-    d0 = (c1**2).sum(axis=1)
-    d1, d2 = 2 * (c1 * c2).sum(axis=1), 2 * (c2**2 + c1 * c3).sum(axis=1)
-    r1 = (1 / np.sqrt(d0))[:, None]
-    r2 = (-d1 / (2 * d0**2))[:, None]
-    r3 = r1 * (d1**2 / d0**3 - d2 / (2 * d0**2))[:, None]
-    q = np.stack([c1 * r1, c2 * r1**2 + c1 * r2, c3 * r1**3 + 3 * c2 * r1 * r2 + c1 * r3])
+    q = np.stack(derivatives_by_length(problem, pieces, places))
+    square = (problem.curve.evaluate(pieces, places, 1)[1] ** 2).sum(axis=1).reshape(-1, 4)
     with np.errstate(divide="ignore"):
         speed_sq = np.minimum(((problem.max_velocity / q[0]) ** 2).min(axis=1), problem.feed[pieces] ** 2)
-    speed = d0.reshape(-1, 4)
-    w = np.append(profile.p0[cubic] * speed[:, 0], profile.p1[cubic[-1]] * speed[-1, 3])
+    w = np.append(profile.p0[cubic] * square[:, 0], profile.p1[cubic[-1]] * square[-1, 3])
     slope = 2 * np.append(profile.a0[cubic], profile.a1[cubic[-1]])
     return Grid(
         arc[cubic],
