@@ -10,7 +10,6 @@ import numpy as np
 from benchmarks.problems import quadratic_spline
 from benchmarks.results import Cell, Result
 from feedplan.constraints.problem import Problem
-from feedplan.curves.length import CurveLength
 from feedplan.geometry.path import Path
 from feedplan.profile import PhaseLaw, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, Setpoints
@@ -32,8 +31,8 @@ def curves() -> dict[str, Path]:
 
 def constant_feed(path: Path) -> SpeedProfile:
     """A profile of one phase for each piece at `FEED`: the stream starts and ends in motion."""
-    count, length = len(path), CurveLength(path.curve)
-    joints = np.append(length.length(np.arange(count), np.zeros(count)), length.total)
+    count = len(path)
+    joints = np.append(path.lengths.length(np.arange(count), np.zeros(count)), path.length)
     edges = np.diff(path.curve.by_piece, axis=1)
     p = (FEED * path.width[:, None] / 2 / np.linalg.norm(edges, axis=2)) ** 2
     return SpeedProfile(

@@ -106,16 +106,7 @@ def _latencies(url: str, job: str, count: int, when: str, quick: bool) -> list[d
                 ask(*request)
                 taken[name].append(1e3 * (time.perf_counter() - start))
                 time.sleep(0.0 if quick else PAUSE)
-    return [
-        {
-            "request": name,
-            "service": when,
-            "median [ms]": float(np.median(times)),
-            "p99 [ms]": float(np.percentile(times, 99)),
-            "worst [ms]": max(times),
-        }
-        for name, times in taken.items()
-    ]
+    return [_row(name, when, times) for name, times in taken.items()]
 
 
 def _overhead(client: Client, count: int) -> dict[str, Cell]:
@@ -131,10 +122,14 @@ def _overhead(client: Client, count: int) -> dict[str, Cell]:
         with tempfile.TemporaryDirectory() as folder:
             write_plan(plan(SMALL, "mill", **options), folder)
         more.append(1e3 * (2.0 * middle - start - time.perf_counter()))
+    return _row("a job", "overhead", more)
+
+
+def _row(request: str, service: str, times: list[float]) -> dict[str, Cell]:
     return {
-        "request": "a job",
-        "service": "overhead",
-        "median [ms]": float(np.median(more)),
-        "p99 [ms]": float(np.percentile(more, 99)),
-        "worst [ms]": max(more),
+        "request": request,
+        "service": service,
+        "median [ms]": float(np.median(times)),
+        "p99 [ms]": float(np.percentile(times, 99)),
+        "worst [ms]": max(times),
     }

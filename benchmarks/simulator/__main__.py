@@ -58,16 +58,11 @@ def prepared(content: bytes, feeds: float, tolerance: float) -> bytes:
 def places(program: Program, machine: Machine) -> Array:
     """Points of the programmed path (n, 3)."""
     path = build_path(program, machine, corners=Corners.PROGRAMMED)
-    curve, width = path.curve, path.width
-    pieces = np.arange(len(path))
-    coarse = curve.evaluate(np.repeat(pieces, 9), np.outer(width, np.linspace(0.0, 1.0, 9)).ravel())[0]
-    length = np.linalg.norm(np.diff(coarse.reshape(len(path), 9, -1), axis=1), axis=2).sum(axis=1)
-    counts = np.ceil(length / _APART).astype(np.int64) + 1
-    of = np.repeat(pieces, counts)
-    within = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
-    points = curve.evaluate(of, np.minimum(width[of], width[of] * within / np.maximum(counts[of] - 1, 1)))[0]
-    whole = np.zeros((len(points), 3))
-    whole[:, ["XYZ".index(name) for name in path.axes]] = points
+    # With the ends of all pieces, among which are the corners.
+    ends = path.lengths.length(np.arange(len(path)), path.width)
+    s = np.union1d(np.arange(0.0, path.length, _APART), np.minimum(ends, path.length))
+    whole = np.zeros((len(s), 3))
+    whole[:, ["XYZ".index(name) for name in path.axes]] = path.evaluate(s)
     return np.vstack([np.zeros(3), whole])
 
 
