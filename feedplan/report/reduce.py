@@ -105,14 +105,12 @@ class Polyline:
         # Points, the part of the tolerance already used between each point and the next, and tags.
         self._kept: Columns = ()
         self._pending: list[Columns] = []
-        self._pending_count = 0
 
     def add(self, points: Floats, *tags: Array) -> None:
         """Takes the next samples: `points` (n, 4), scaled so that one tolerance suits all, and columns of
         their tags."""
         self._pending.append((points, np.zeros(len(points)), *tags))
-        self._pending_count += len(points)
-        if self._pending_count >= 2 * self._limit:
+        if sum(len(points) for points, *_ in self._pending) >= 2 * self._limit:
             self._settle()
 
     def result(self, limit: int | None = None, tolerance: float = 0.0) -> tuple[Floats, Columns, float]:
@@ -133,7 +131,7 @@ class Polyline:
         new = _thin(_joined(self._pending), self.tolerance)
         kept = _thin(_joined([self._kept, new]), self.tolerance) if self._kept else new
         self._kept, self.tolerance = _limited(kept, self.tolerance, self._limit)
-        self._pending, self._pending_count = [], 0
+        self._pending = []
 
 
 def _divided(columns: Columns, at: int) -> tuple[Columns, Columns]:

@@ -55,13 +55,12 @@ class Database:
                 version = db.execute("PRAGMA user_version").fetchone()[0]
                 if version == 0:
                     db.executescript(f"BEGIN;{_TABLES}COMMIT;")
+            said = "" if version in (0, VERSION) else f"is of another feedplan (version {version})"
         except sqlite3.DatabaseError as error:
+            said = f"is damaged ({error})"
+        if said:
             self.close()
-            raise InputError(f"{file} is damaged ({error}): choose another folder with --store") from None
-        if version not in (0, VERSION):
-            self.close()
-            said = f"{file} is of another feedplan (version {version})"
-            raise InputError(f"{said}: choose another folder with --store")
+            raise InputError(f"{file} {said}: choose another folder with --store")
 
     def close(self) -> None:
         """Closes the connections."""
@@ -91,11 +90,6 @@ class Database:
     @contextmanager
     def change(self) -> Iterator[sqlite3.Connection]:
         """A transaction: all changes of the block are kept, or none."""
-        with self.read() as db:
+        with self.read() as db, db:  # the end of a connection's block commits or rolls back
             db.execute("BEGIN IMMEDIATE")
-            try:
-                yield db
-            except BaseException:
-                db.execute("ROLLBACK")
-                raise
-            db.execute("COMMIT")
+            yield db
