@@ -102,9 +102,7 @@ def controller(name: str, model: Model) -> dict[str, Any]:
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        name: getattr(axis, name) for name in ("name", "kind", "unit", "max_velocity", "max_acceleration")
-    }
-    travel = list(axis.travel) if all(map(math.isfinite, axis.travel)) else None
-    limits = {name: list(limit) if isinstance(limit, tuple) else limit for name, limit in row.items()}
-    return {**limits, "max_jerk": finite(axis.max_jerk), "travel": travel}
+    names = ("name", "kind", "unit", "max_velocity", "max_acceleration")
+    travel = axis.travel if all(map(math.isfinite, axis.travel)) else None
+    row = {name: getattr(axis, name) for name in names}
+    return {**row, "max_jerk": finite(axis.max_jerk), "travel": travel}
