@@ -6,7 +6,6 @@
 //! | file | computes |
 //! |---|---|
 //! | `knots`, `extract` | a checked B-spline or NURBS; its pieces |
-//! | `circle` | pieces of arcs and helices |
 //! | `bezier`, `rational` | values and derivatives of a piece, parts of it, the same of another degree |
 //! | `cusps` | where C' is 0 |
 //! | `regular` | the same curve as pieces without a cusp inside |
@@ -14,7 +13,6 @@
 //! | `error` | what is wrong with a spline that a user gives |
 
 pub mod bezier;
-pub mod circle;
 pub mod cusps;
 pub mod error;
 pub mod extract;

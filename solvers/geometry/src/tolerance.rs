@@ -25,8 +25,6 @@ pub const AT_END: f64 = 1e-9;
 pub const COINCIDENT: f64 = 1e-9;
 /// Knots nearer than this fraction of the greatest one are refused. [they have three digits left that tell them apart]
 pub const KNOT_SPAN: f64 = 1e-13;
-/// Angles nearer than this to a quarter turn are one, in rad; the same per turn for full turns. [4 roundings]
-pub const SAME_ANGLE: f64 = 4.0 * f64::EPSILON;
 /// A Newton step below this fraction of the root is the last one: the next is its square, below rounding.
 pub const LAST_STEP: f64 = 3e-9;
 /// Error of length tables as a fraction of their length. [so that steps down to 1e-7 of a table are right to 1e-6]

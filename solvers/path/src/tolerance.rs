@@ -15,6 +15,8 @@ pub const COORDINATE: f64 = 16.0 * f64::EPSILON;
 
 /// Two edges that turn by less are one line. [the exact planner gives away as much: planner's OFF_ITSELF]
 pub const SAME_DIRECTION: f64 = 1e-9;
+/// Angles nearer than this to a quarter turn are one. [4 roundings]
+pub const SAME_ANGLE: f64 = 4.0 * f64::EPSILON;
 /// An exact path is smoothed where an arc or a spline meets its neighbour with a turn below this. [program: 1°]
 pub const ROUNDED_TANGENT: f64 = 0.0175;
 /// A smooth path stops where the program turns by more: no curve passes both sides of the corner at any speed. [135°]

@@ -26,7 +26,6 @@ pub enum SplineError {
     EmptyDomain { first: usize, last: usize, value: f64 },
     Broken { knot: usize, value: f64, gap: f64, degree: usize },
     Weight { index: usize, value: f64 },
-    Helix { tolerance: f64, pieces: f64 },
 }
 
 impl std::error::Error for SplineError {}
@@ -101,10 +100,6 @@ impl fmt::Display for SplineError {
                 f,
                 "weight {index} is {value}: weights must be positive, from {MIN_WEIGHT:e} to {MAX_WEIGHT:e}; \
                  correct it or scale all by one factor"
-            ),
-            Self::Helix { tolerance, pieces } => write!(
-                f,
-                "a helix within {tolerance} mm would take {pieces:.0} pieces: allow a greater tolerance"
             ),
         }
     }

@@ -11,16 +11,20 @@
 //! and the greatest |g| is at an end or where sin ψ = −Δ/(|d| dψ/dx). This bounds the distance both ways, since both
 //! curves share their ends and the angle about c + d grows all along.
 //!
-//! An axis that is linear in the angle is linear in the parameter of the piece instead; `circle::Turn` bounds the
-//! difference. The angles about c and about c + d differ by asin(|d|/r) at most, and so do they at the ends.
+//! The angles about c and about c + d differ by asin(|d|/r) at most, and so do they at the ends.
+//!
+//! An axis that is linear in the angle is linear in the parameter of the piece instead. On a piece of the sweep θ, with
+//! τ = s tan(θ/4), s = 2t − 1, the angle from the middle is 2 atan τ, and the axis is Z/(1 + τ²) with the parabola Z that
+//! interpolates f = (1 + τ²) atan τ at τ = 0 and ±T, T = tan(θ/4). With f''' = 4/(1 + τ²)², |Z − f| ≤ max|f'''|/3! · T³/2 ≤
+//! T³/3.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::polar::{sweep_to, Arc, Polar, MAX_PIECES};
 use crate::tolerance;
 use feedplan_geometry::conic::Conic;
+use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
-use feedplan_geometry::spline::circle::Turn;
 
 /// The circle with the centre c + d.
 struct Circle {
@@ -82,47 +86,66 @@ impl Circle {
             angular: 4.0 * (distance / least).asin(),
         })
     }
+
+    /// The bound of the distance along the axis from a helix that rises by `rise`, in `count` pieces.
+    fn axial_error(&self, rise: f64, count: f64) -> f64 {
+        let theta = self.sweep.abs() / count;
+        rise / count * (2.0 / theta) * (1.0 / 3.0) * (0.25 * theta).tan().power(3.0)
+    }
 }
 
 /// The pieces of the circle, and the bound of their distance from the arc; None if that exceeds `tolerance` or takes
 /// too many pieces.
 pub fn pieces<const M: usize>(arc: &Arc<M>, polar: &Polar, tolerance: f64) -> Option<(Vec<Conic<M>>, f64)> {
     let circle = Circle::new(arc, polar)?;
-    let centre = [arc.centre[0] + circle.shift[0], arc.centre[1] + circle.shift[1]];
-    let turn = Turn { start: arc.start, plane: arc.plane, centre, sweep: circle.sweep };
     let large = polar.radius.max(polar.radius + polar.growth * polar.sweep.abs());
     // An error of the angle shows along the other axes or along the circle, whichever is less.
     let per_angle = polar.pitch.min(large);
     let least = circle.radial + circle.angular * per_angle;
-    let rise = turn.sweep.abs() * per_angle;
-    let mut count = turn.quarters();
-    let mut error = turn.axial_error(rise, 2, count);
+    let rise = circle.sweep.abs() * per_angle;
+    let mut count = (circle.sweep.abs() / FRAC_PI_2 * (1.0 - tolerance::SAME_ANGLE)).ceil().max(1.0);
+    let mut error = circle.axial_error(rise, count);
     if least > tolerance {
         return None;
     }
     while least + error > tolerance && count <= MAX_PIECES {
         // The error is proportional to the cube of the sweep of a piece.
         count = (0.99 * count * (error / (tolerance - least)).cbrt()).ceil().max(count + 1.0);
-        error = turn.axial_error(rise, 2, count);
+        error = circle.axial_error(rise, count);
     }
-    (count <= MAX_PIECES).then(|| (conics(arc, &turn, count), least + error))
+    (count <= MAX_PIECES).then(|| (conics(arc, &circle, count), least + error))
 }
 
-/// The turn in `count` equal pieces, the other axes in proportion to the angle.
-fn conics<const M: usize>(arc: &Arc<M>, turn: &Turn<M>, count: f64) -> Vec<Conic<M>> {
+/// The circle in `count` equal pieces, the other axes in proportion to the angle.
+fn conics<const M: usize>(arc: &Arc<M>, circle: &Circle, count: f64) -> Vec<Conic<M>> {
     let [x, y] = arc.plane;
-    let curve = turn.pieces(count);
-    let theta = turn.sweep / count;
+    let centre = [arc.centre[0] + circle.shift[0], arc.centre[1] + circle.shift[1]];
+    let radius = [arc.start[x] - centre[0], arc.start[y] - centre[1]];
+    let theta = circle.sweep / count;
+    let quarters = (theta.abs() - FRAC_PI_2).abs() <= tolerance::SAME_ANGLE;
+    let joint = |i: usize| {
+        let (sin, cos) = if quarters {
+            let (sin, cos) = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)][i % 4];
+            (sin * theta.signum(), cos)
+        } else {
+            // With the rounding of the product, so that pieces after many turns are of equal size.
+            let angle = i as f64 * theta;
+            let lost = (i as f64).mul_add(theta, -angle);
+            let (sin, cos) = angle.sin_cos();
+            (sin + lost * cos, cos - lost * sin)
+        };
+        let [u, v] = [radius[0] * cos - radius[1] * sin, radius[0] * sin + radius[1] * cos];
+        (centre[0] + u, centre[1] + v)
+    };
     let (weight, bulge) = ((0.5 * theta).cos(), 0.5 * (0.5 * theta).tan());
-    let last = count as usize - 1;
+    let count = count as usize;
     let mut start = arc.start;
-    (0..=last)
+    (1..=count)
         .map(|i| {
             let mut end = arc.end;
-            if i < last {
-                end = lerp(&arc.start, &arc.end, (i + 1) as f64 / count);
-                let joint = &curve.control[3 * i + 2];
-                (end[x], end[y]) = (joint[x], joint[y]);
+            if i < count {
+                end = lerp(&arc.start, &arc.end, i as f64 / count as f64);
+                (end[x], end[y]) = joint(i);
             }
             // The point where the tangents meet, computed from the chord: so a small piece of a great circle is
             // symmetric too.
