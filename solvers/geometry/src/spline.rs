@@ -10,11 +10,9 @@
 //! | `cusps` | where C' is 0 |
 //! | `regular` | the same curve as pieces without a cusp inside |
 //! | `speed`, `length` | \|C'\| with bounds of its derivatives; the length and its inverse |
-//! | `error` | what is wrong with a spline that a user gives |
 
 pub mod bezier;
 pub mod cusps;
-pub mod error;
 pub mod extract;
 pub mod knots;
 pub mod length;

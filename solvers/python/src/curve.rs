@@ -15,7 +15,6 @@ use super::native::{with_object, InAxes};
 use super::views::view;
 use super::work::run;
 use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
-use feedplan_geometry::spline::error::SplineError;
 use feedplan_geometry::spline::extract::extract;
 use feedplan_geometry::spline::knots::{check_points, Spline};
 use feedplan_geometry::spline::regular::regular;
@@ -43,10 +42,6 @@ macro_rules! with_pieces {
     ($curve:expr, $m:ident, $pieces:ident, $call:expr) => {
         with_object!($curve.pieces, $m, $pieces: Arc<CompositeCurve<$m>>, $call)
     };
-}
-
-fn input_error(error: SplineError) -> PyErr {
-    InputError::new_err(error.to_string())
 }
 
 pub fn weights_of(weights: Option<&Column>) -> PyResult<Vec<f64>> {
@@ -83,7 +78,7 @@ impl Curve {
     /// The curve of these pieces. Raises InputError for coordinates, weights or widths out of range.
     pub fn checked<const M: usize>(pieces: CompositeCurve<M>, axes: usize) -> PyResult<Self> {
         if !pieces.control.is_empty() {
-            check_points(1, &pieces.control, &pieces.weights).map_err(input_error)?;
+            check_points(1, &pieces.control, &pieces.weights).map_err(InputError::new_err)?;
         }
         let usable = |width: &f64| *width > LEAST_WIDTH && *width < 1.0 / LEAST_WIDTH;
         if let Some(i) = pieces.width.iter().position(|width| !usable(width)) {
@@ -140,7 +135,7 @@ fn spline<const M: usize>(
 ) -> PyResult<Spline<M>> {
     let (control, weights) = (rows::<M>(control)?, weights_of(weights)?);
     let make = if periodic { Spline::periodic } else { Spline::new };
-    make(degree, knots.as_slice()?.to_vec(), control, weights).map_err(input_error)
+    make(degree, knots.as_slice()?.to_vec(), control, weights).map_err(InputError::new_err)
 }
 
 #[pymethods]
@@ -176,7 +171,7 @@ impl Curve {
         let axes = control_points.shape()[1];
         with_padded_axes!(axes, M, {
             let spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, periodic)?;
-            Self::checked(py.detach(|| extract(&spline)).map_err(input_error)?, axes)
+            Self::checked(py.detach(|| extract(&spline)).map_err(InputError::new_err)?, axes)
         })
     }
 

@@ -4,15 +4,15 @@
 //! d + 1 control points of the span: de Boor's triangle at a gives f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}), and the second one replaces
 //! the later knots by b.
 
-use super::error::SplineError;
 use super::knots::Spline;
 use super::rational::cut_corners;
 use super::{CompositeCurve, MAX_DEGREE};
 use crate::quadratic::{norm, sub};
 use crate::tolerance::COINCIDENT;
 
-/// The pieces of a spline, one for each span that is not empty; the width is that of the span.
-pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, SplineError> {
+/// The pieces of a spline, one for each span that is not empty; the width is that of the span. A curve with a gap is
+/// refused by a sentence.
+pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, String> {
     let (d, t) = (spline.degree, &spline.knots);
     let mut curve = CompositeCurve::default();
     let mut previous: Option<usize> = None;
@@ -35,7 +35,13 @@ pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, 
             let size = last.iter().chain(&points[0]).fold(0.0, |size: f64, x| size.max(x.abs()));
             let gap = norm(&sub(&points[0], &last));
             if k - before == d + 1 && gap > COINCIDENT * size {
-                return Err(SplineError::Broken { knot: before + 1, value: t[k], gap, degree: d });
+                return Err(format!(
+                    "the curve has a gap of {gap} mm at the knot {} (knot {}), which stands {} times: at most {d} times \
+                     keep it together; give it as two curves",
+                    t[k],
+                    before + 1,
+                    d + 1
+                ));
             }
             // Both spans give the point where they meet, up to rounding: the first one holds.
             points[0] = last;
@@ -108,7 +114,7 @@ mod tests {
         let apart = vec![[0.0], [1.0], [4.0], [5.0]];
         let error = extract(&Spline::new(1, knots.clone(), apart, vec![]).unwrap()).unwrap_err();
         assert_eq!(
-            error.to_string(),
+            error,
             "the curve has a gap of 3 mm at the knot 1 (knot 2), which stands 2 times: at most 1 times keep it \
              together; give it as two curves"
         );

@@ -1,11 +1,16 @@
 //! A B-spline or NURBS curve from control points, knots and weights as users give them: checked, and unrolled
-//! if it is periodic.
+//! if it is periodic. What is wrong is one sentence with place, value, limit and remedy.
 //!
 //! n control points of degree d have knots t₀ … t_{n+d}; the curve is on [t_d, t_n]. Knots may be clamped or not.
 
-use super::error::{SplineError, MAX_COORDINATE, MAX_WEIGHT, MIN_WEIGHT};
 use super::MAX_DEGREE;
 use crate::tolerance::KNOT_SPAN;
+
+/// Greatest coordinate in mm, far beyond any machine: the square of a hodograph must not overflow.
+const MAX_COORDINATE: f64 = 1e60;
+/// Greatest and least weight: fourth powers must not overflow.
+const MAX_WEIGHT: f64 = 1e30;
+const MIN_WEIGHT: f64 = 1e-30;
 
 /// A checked spline curve; `weights` is empty if it is polynomial.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,16 +27,21 @@ impl<const M: usize> Spline<M> {
         knots: Vec<f64>,
         control: Vec<[f64; M]>,
         weights: Vec<f64>,
-    ) -> Result<Self, SplineError> {
+    ) -> Result<Self, String> {
         check_points(degree, &control, &weights)?;
-        if knots.len() != control.len() + degree + 1 {
-            return Err(SplineError::KnotCount { knots: knots.len(), points: control.len(), degree });
+        let (count, points, needed) = (knots.len(), control.len(), control.len() + degree + 1);
+        if count != needed {
+            let remedy = if count + 2 == needed {
+                "; repeat the first and the last one, which this notation leaves out"
+            } else {
+                " (points + degree + 1); correct the lists"
+            };
+            return Err(format!(
+                "{count} knots for {points} control points of degree {degree}: {needed} are needed{remedy}"
+            ));
         }
         check_knots(degree, &knots)?;
-        let (first, last) = (degree, control.len());
-        if knots[first] == knots[last] {
-            return Err(SplineError::EmptyDomain { first, last, value: knots[first] });
-        }
+        check_domain(&knots, degree, points)?;
         Ok(Self { degree, knots, control, weights })
     }
 
@@ -42,25 +52,21 @@ impl<const M: usize> Spline<M> {
         knots: Vec<f64>,
         mut control: Vec<[f64; M]>,
         mut weights: Vec<f64>,
-    ) -> Result<Self, SplineError> {
+    ) -> Result<Self, String> {
         let n = control.len();
-        if !(1..=MAX_DEGREE).contains(&degree) {
-            return Err(SplineError::Degree { degree });
-        }
-        if n < 2 {
-            return Err(SplineError::TooFewPoints { points: n, degree: 1 });
-        }
-        if !weights.is_empty() && weights.len() != n {
-            return Err(SplineError::WeightCount { weights: weights.len(), points: n });
-        }
+        check_degree(degree)?;
+        check_points(1, &control, &weights)?;
         if knots.len() != n + 1 {
-            return Err(SplineError::PeriodCount { knots: knots.len(), points: n });
+            return Err(format!(
+                "{} knots for {n} control points of a periodic curve: {} (points + 1), one period with both ends, are \
+                 needed; correct the lists",
+                knots.len(),
+                n + 1
+            ));
         }
         check_knots(degree, &knots)?;
+        check_domain(&knots, 0, n)?;
         let period = knots[n] - knots[0];
-        if period == 0.0 {
-            return Err(SplineError::EmptyDomain { first: 0, last: n, value: knots[0] });
-        }
         let unrolled = (0..n + 2 * degree + 1)
             .map(|i| {
                 let place = i as isize - degree as isize;
@@ -84,54 +90,96 @@ impl<const M: usize> Spline<M> {
     }
 }
 
+fn check_degree(degree: usize) -> Result<(), String> {
+    if !(1..=MAX_DEGREE).contains(&degree) {
+        return Err(format!(
+            "the degree is {degree}: degrees 1 to {MAX_DEGREE} are supported; convert the curve"
+        ));
+    }
+    Ok(())
+}
+
 /// Degree, coordinates and weights of control points.
 pub fn check_points<const M: usize>(
     degree: usize,
     control: &[[f64; M]],
     weights: &[f64],
-) -> Result<(), SplineError> {
-    if !(1..=MAX_DEGREE).contains(&degree) {
-        return Err(SplineError::Degree { degree });
-    }
-    if control.len() <= degree {
-        return Err(SplineError::TooFewPoints { points: control.len(), degree });
+) -> Result<(), String> {
+    check_degree(degree)?;
+    let (points, least) = (control.len(), degree + 1);
+    if points < least {
+        return Err(format!(
+            "{points} control points for degree {degree}: at least {least} are needed; add points or lower the degree"
+        ));
     }
     for (point, coordinates) in control.iter().enumerate() {
         for (axis, &value) in coordinates.iter().enumerate() {
             if value.is_nan() || value.abs() > MAX_COORDINATE {
-                return Err(SplineError::Coordinate { point, axis, value });
+                return Err(format!(
+                    "control point {point}, axis {axis}, is {value}: coordinates must be finite and below \
+                     {MAX_COORDINATE:e} mm; correct it"
+                ));
             }
         }
     }
-    if !weights.is_empty() && weights.len() != control.len() {
-        return Err(SplineError::WeightCount { weights: weights.len(), points: control.len() });
+    if !weights.is_empty() && weights.len() != points {
+        return Err(format!(
+            "{} weights for {points} control points: give one weight for each",
+            weights.len()
+        ));
     }
     match weights.iter().position(|weight| !(MIN_WEIGHT..=MAX_WEIGHT).contains(weight)) {
-        Some(index) => Err(SplineError::Weight { index, value: weights[index] }),
+        Some(index) => Err(format!(
+            "weight {index} is {}: weights must be positive, from {MIN_WEIGHT:e} to {MAX_WEIGHT:e}; correct it or scale \
+             all by one factor",
+            weights[index]
+        )),
         None => Ok(()),
     }
 }
 
-fn check_knots(degree: usize, knots: &[f64]) -> Result<(), SplineError> {
+fn check_knots(degree: usize, knots: &[f64]) -> Result<(), String> {
     if let Some(knot) = knots.iter().position(|knot| !knot.is_finite()) {
-        return Err(SplineError::KnotNotFinite { knot, value: knots[knot] });
+        return Err(format!("knot {knot} is {}: knots must be finite numbers; correct it", knots[knot]));
     }
     let least = KNOT_SPAN * knots.iter().fold(0.0, |most: f64, knot| most.max(knot.abs()));
     let mut count = 1;
     for knot in 1..knots.len() {
         let (before, value) = (knots[knot - 1], knots[knot]);
+        let gap = value - before;
         if value < before {
-            return Err(SplineError::Decreasing { knot, before, value });
+            return Err(format!(
+                "knot {knot} is {value} after {before}: knots must not decrease; correct their order"
+            ));
         }
-        if value > before && value - before < least {
-            return Err(SplineError::KnotsTooClose { knot, gap: value - before, least });
+        if value > before && gap < least {
+            return Err(format!(
+                "knots {} and {knot} are {gap:e} apart, where rounding begins at {least:e}: make them equal or move them \
+                 apart",
+                knot - 1
+            ));
         }
         count = if value == before { count + 1 } else { 1 };
         if count > degree + 1 {
-            let first = knot + 1 - count;
-            let count = knots.iter().filter(|&&other| other == value).count();
-            return Err(SplineError::Multiplicity { knot: first, value, count, degree });
+            return Err(format!(
+                "the knot {value} stands {} times from knot {} on: at most {} (degree + 1) are possible; remove the \
+                 others and their control points",
+                knots.iter().filter(|&&other| other == value).count(),
+                knot + 1 - count,
+                degree + 1
+            ));
         }
+    }
+    Ok(())
+}
+
+/// Refuses an empty domain between the knots `first` and `last`.
+fn check_domain(knots: &[f64], first: usize, last: usize) -> Result<(), String> {
+    if knots[first] == knots[last] {
+        return Err(format!(
+            "knots {first} and {last}, where the curve starts and ends, are both {}: the knots between them must grow",
+            knots[first]
+        ));
     }
     Ok(())
 }
@@ -152,7 +200,7 @@ mod tests {
     fn what_is_wrong_is_said_with_its_place() {
         let new = |degree, knots: &[f64], points: usize, weights: &[f64]| {
             let control = (0..points).map(|i| [i as f64]).collect();
-            Spline::new(degree, knots.to_vec(), control, weights.to_vec()).unwrap_err().to_string()
+            Spline::new(degree, knots.to_vec(), control, weights.to_vec()).unwrap_err()
         };
         assert_eq!(
             new(2, &[0.0, 0.0, 0.0, 2.0, 1.0, 3.0, 3.0], 4, &[]),
