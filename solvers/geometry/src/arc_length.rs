@@ -69,7 +69,7 @@ pub trait Integrand: Copy {
     fn foot_error(&self, width: f64) -> f64;
 }
 
-/// |C'(u)|² = E²(u − foot)² + d² of a quadratic piece; E = |C''|, d the least |C'|.
+/// |C'| of a quadratic piece, |C'(u)|² = E²(u − foot)² + d²; E = |C''|, d the least |C'|.
 #[derive(Clone, Copy, Debug)]
 pub struct QuadraticSpeed {
     e: f64,
@@ -101,7 +101,7 @@ impl QuadraticSpeed {
 
     /// |C'(u)|².
     #[inline(always)]
-    pub fn squared(&self, u: f64) -> f64 {
+    fn squared(&self, u: f64) -> f64 {
         let x = u - self.foot;
         self.e_sq * x * x + self.d_sq
     }
@@ -113,29 +113,25 @@ impl QuadraticSpeed {
     }
 }
 
-/// f = |C'|: its integral is the length.
-#[derive(Clone, Copy, Debug)]
-pub struct Length(pub QuadraticSpeed);
-
-impl Integrand for Length {
+impl Integrand for QuadraticSpeed {
     #[inline(always)]
     fn at(&self, u: f64) -> f64 {
-        self.0.squared(u).sqrt()
+        self.squared(u).sqrt()
     }
 
     // |f| ≤ 2 E δ on the disc of radius δ(ξ) about ξ, and δ(ξ)^(1−2n) is greatest where δ is least.
     fn disc(&self, a: f64, b: f64) -> Disc {
-        let (speed, radius) = self.0.least(a, b);
+        let (speed, radius) = self.least(a, b);
         Disc { radius, bound: 2.0 * speed }
     }
 
     fn foot(&self) -> f64 {
-        self.0.foot
+        self.foot
     }
 
     // f = E|x| + r with 0 ≤ r ≤ d; the linear part is integrated exactly.
     fn foot_error(&self, width: f64) -> f64 {
-        self.0.d_sq.sqrt() * width
+        self.d_sq.sqrt() * width
     }
 }
 
@@ -347,14 +343,14 @@ mod tests {
     #[test]
     fn a_straight_piece_takes_one_panel_and_no_error() {
         let line = Quadratic::line([1.0, 2.0], [4.0, 6.0]);
-        let (nodes, bound) = table_of(Length(QuadraticSpeed::new(&line)), 0.0, 5.0, 1e-12);
+        let (nodes, bound) = table_of(QuadraticSpeed::new(&line), 0.0, 5.0, 1e-12);
         assert_eq!((nodes.len(), bound), (2, 0.0));
         assert!((nodes[1].sum - 5.0).abs() < 1e-15);
     }
 
     #[test]
     fn the_unit_parabola_has_its_known_length() {
-        let (nodes, bound) = table_of(Length(QuadraticSpeed::new(&parabola())), 0.0, 1.0, 1e-13);
+        let (nodes, bound) = table_of(QuadraticSpeed::new(&parabola()), 0.0, 1.0, 1e-13);
         let expected = 0.5 * (2f64.sqrt() + 1f64.asinh());
         assert!((nodes[nodes.len() - 1].sum - expected).abs() < 1e-15 && bound <= 1e-13);
     }
@@ -369,7 +365,7 @@ mod tests {
 
     #[test]
     fn a_part_of_a_panel_has_its_integral_and_its_rate() {
-        let f = Length(QuadraticSpeed::new(&parabola()));
+        let f = QuadraticSpeed::new(&parabola());
         let panel = 1.0 / table_size(1.0, &f.disc(0.0, 1.0), 1e-13).ceil();
         let (nodes, _) = table_of(f, 0.0, 1.0, 1e-13);
         for part in [1e-3, 2e-2, 0.1, 0.3, 0.5, 0.7] {
@@ -385,7 +381,7 @@ mod tests {
 
     #[test]
     fn a_uniform_table_of_the_stated_size_holds_its_error() {
-        let f = Length(QuadraticSpeed::new(&parabola()));
+        let f = QuadraticSpeed::new(&parabola());
         for error in [1e-6, 1e-9, 1e-12] {
             let disc = f.disc(0.0, 1.0);
             let size = table_size(1.0, &disc, error).ceil() as usize;
@@ -399,7 +395,7 @@ mod tests {
     fn a_full_cusp_is_split_there_and_exact() {
         // C' goes from (−1, −2) through 0 to (1, 2): length 2 · √5/2.
         let piece = Quadratic { control: [[0.0, 0.0], [-1.0, -2.0], [0.0, 0.0]], width: 2.0 };
-        let (nodes, bound) = table_of(Length(QuadraticSpeed::new(&piece)), 0.0, 2.0, 1e-13);
+        let (nodes, bound) = table_of(QuadraticSpeed::new(&piece), 0.0, 2.0, 1e-13);
         assert_eq!((nodes.len(), nodes[1].u, bound), (3, 1.0, 0.0));
         assert!((nodes[2].sum - 5f64.sqrt()).abs() < 1e-15);
     }
@@ -426,7 +422,7 @@ mod tests {
             piece in quadratic(), at in 0.0..1.0f64, digits in 3.0..13.0f64
         ) {
             let u = at * piece.width;
-            let f = Length(QuadraticSpeed::new(&piece));
+            let f = QuadraticSpeed::new(&piece);
             let whole = exact_length(&piece, piece.width);
             let (nodes, bound) = table_of(f, 0.0, piece.width, 10f64.powf(-digits) * whole);
             prop_assert!(bound <= 10f64.powf(-digits) * whole * (1.0 + 1e-12));

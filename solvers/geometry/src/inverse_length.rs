@@ -107,7 +107,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::arc_length::{tabulate, Length, QuadraticSpeed};
+    use crate::arc_length::{tabulate, QuadraticSpeed};
     use crate::quadratic::{norm, Quadratic};
 
     fn row(u: f64, sum: f64, rate: f64) -> Node {
@@ -135,7 +135,7 @@ mod tests {
     fn one_prediction_is_enough_on_a_line() {
         let line = Quadratic::line([0.0, 0.0], [3.0, 4.0]);
         let mut nodes = Vec::new();
-        let f = Length(QuadraticSpeed::new(&line));
+        let f = QuadraticSpeed::new(&line);
         tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
         let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12, &[], 0.0);
         assert_eq!(located.iterations, 1);
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn rows_beside_those_of_the_table_lead_to_the_same_place_sooner() {
         let piece = Quadratic::<2> { control: [[0.0, 0.0], [0.5, 0.0], [1.0, 0.5]], width: 1.0 };
-        let (f, mut nodes) = (Length(QuadraticSpeed::new(&piece)), Vec::new());
+        let (f, mut nodes) = (QuadraticSpeed::new(&piece), Vec::new());
         tabulate(f, 0.0, 1.0, 1e-13, &mut nodes);
         let table = Table { f, nodes: &nodes };
         let known = [0.3, 0.32].map(|u| row(u, table.integral(u), f.at(u)));
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn a_last_step_of_newtons_method_needs_no_further_integral() {
         let piece = Quadratic::<2> { control: [[0.0, 0.0], [0.5, 0.0], [1.0, 0.5]], width: 1.0 };
-        let (f, mut nodes) = (Length(QuadraticSpeed::new(&piece)), Vec::new());
+        let (f, mut nodes) = (QuadraticSpeed::new(&piece), Vec::new());
         tabulate(f, 0.0, 1.0, 1e-13, &mut nodes);
         let table = Table { f, nodes: &nodes };
         let known = [0.3, 0.32].map(|u| row(u, table.integral(u), f.at(u)));
@@ -198,7 +198,7 @@ mod tests {
             let off = 10f64.powf(exponent);
             let middle = std::array::from_fn(|k| a[k] + along * (c[k] - a[k]) + off * b[k]);
             let piece = Quadratic::<2> { control: [a, middle, c], width: 3.0 };
-            let f = Length(QuadraticSpeed::new(&piece));
+            let f = QuadraticSpeed::new(&piece);
             let mut nodes = Vec::new();
             tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
             let table = Table { f, nodes: &nodes };

@@ -56,12 +56,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::arc_length::{quadrature, tabulate, Length, QuadraticSpeed};
+    use crate::arc_length::{quadrature, tabulate, QuadraticSpeed};
     use crate::quadratic::Quadratic;
 
     /// One step along a line of 5 mm, from 1 mm.
     fn on_a_line(step: f64) -> (Located, f64) {
-        let f = Length(QuadraticSpeed::new(&Quadratic::line([0.0, 0.0], [3.0, 4.0])));
+        let f = QuadraticSpeed::new(&Quadratic::line([0.0, 0.0], [3.0, 4.0]));
         let mut nodes = Vec::new();
         tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
         advance(&Table { f, nodes: &nodes }, (1.0, 1.0), step, 1e-12)
@@ -89,7 +89,7 @@ mod tests {
             let off = 10f64.powf(exponent);
             let middle = std::array::from_fn(|k| a[k] + along * (c[k] - a[k]) + off * b[k]);
             let piece = Quadratic::<2> { control: [a, middle, c], width: 3.0 };
-            let f = Length(QuadraticSpeed::new(&piece));
+            let f = QuadraticSpeed::new(&piece);
             let mut nodes = Vec::new();
             tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
             let table = Table { f, nodes: &nodes };

@@ -71,7 +71,7 @@ impl<'a, const M: usize> Piece<'a, M> {
     /// The first edge of the control polygon that has a direction, or with `at_end` the last; None if the piece has no
     /// length. It is in the direction of motion at that end.
     pub fn edge(&self, at_end: bool) -> Option<[f64; M]> {
-        let (extent, _) = self.extent();
+        let extent = self.extent();
         let mut edges = self.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
         let has_direction = |edge: &[f64; M]| norm(edge) > NO_DIRECTION * extent;
         if at_end {
@@ -81,19 +81,9 @@ impl<'a, const M: usize> Piece<'a, M> {
         }
     }
 
-    /// The greatest distance of a control point from the first one, and the greatest coordinate, in mm.
-    pub fn extent(&self) -> (f64, f64) {
-        let mut extent = (0.0_f64, 0.0_f64);
-        for point in self.control {
-            let (mut sum, first) = (0.0, &self.control[0]);
-            for k in 0..M {
-                let difference = point[k] - first[k];
-                sum += difference * difference;
-                extent.1 = extent.1.max(point[k].abs());
-            }
-            extent.0 = extent.0.max(sum.sqrt());
-        }
-        extent
+    /// The greatest distance of a control point from the first one, in mm.
+    pub fn extent(&self) -> f64 {
+        self.control.iter().fold(0.0, |most: f64, point| most.max(norm(&sub(point, &self.control[0]))))
     }
 }
 

@@ -248,9 +248,7 @@ fn rational_speeds_sq(control: &[f64], axes: usize, weights: &[f64], t: [f64; 4]
 fn value_and_slope<S: Simd, const N: usize>(mut b: [Register<S>; N], t: Register<S>) -> [Register<S>; 2] {
     let s = Register::all(t.simd(), 1.0) - t;
     for left in (2..N).rev() {
-        for i in 0..left {
-            b[i] = s * b[i] + t * b[i + 1];
-        }
+        cut(&mut b[..=left], s, t);
     }
     [s * b[0] + t * b[1], (b[1] - b[0]) * (N - 1) as f64]
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::cusps::piece_cusps;
 use super::speed::{Coefficients, Speed};
 use super::{CompositeCurve, Piece};
-use crate::arc_length::{quadrature, tabulate, Length, Node, QuadraticSpeed, Table};
+use crate::arc_length::{quadrature, tabulate, Node, QuadraticSpeed, Table};
 use crate::instances;
 use crate::inverse_length;
 use crate::tolerance::CUSP;
@@ -25,7 +25,7 @@ instances! {
 /// The integrand |C'| of a piece's table.
 #[derive(Clone, Copy, Debug)]
 enum PieceSpeed {
-    Quadratic(Length),
+    Quadratic(QuadraticSpeed),
     /// The ranges of its coefficients in `h` and in `omega`.
     Curve([usize; 2], [usize; 2]),
 }
@@ -80,7 +80,7 @@ impl<const M: usize> CurveLength<M> {
         };
         for piece in curve.pieces() {
             lengths.speeds.push(match piece.quadratic() {
-                Some(quadratic) => PieceSpeed::Quadratic(Length(QuadraticSpeed::new(&quadratic))),
+                Some(quadratic) => PieceSpeed::Quadratic(QuadraticSpeed::new(&quadratic)),
                 None => {
                     let coefficients = Coefficients::new(&piece);
                     let (h, omega) = (lengths.h.len(), lengths.omega.len());

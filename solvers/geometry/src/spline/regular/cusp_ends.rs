@@ -18,7 +18,7 @@ pub fn cut_in_cusps<const M: usize>(source: usize, piece: &Piece<M>, rounding: f
     }
     let mut parts = CompositeCurve::default();
     split(piece, &cuts, &mut parts);
-    for part in parts.pieces().filter(|part| part.extent().0 > rounding) {
+    for part in parts.pieces().filter(|part| part.extent() > rounding) {
         out.push([source; 2], &part, rounding);
     }
 }
@@ -62,7 +62,7 @@ pub fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64)
 /// coordinate.
 fn cusp_reach<const M: usize>(piece: &Piece<M>, rounding: f64) -> f64 {
     let size = rounding / ROUNDING;
-    (rounding * piece.extent().0).sqrt().min(CUSP * size).max(rounding)
+    (rounding * piece.extent()).sqrt().min(CUSP * size).max(rounding)
 }
 
 /// Whether the path turns in the cusp at an end of a piece, or its direction there is rounding; None if there is no cusp.
