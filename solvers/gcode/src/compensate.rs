@@ -41,7 +41,7 @@ struct Corner {
 
 impl Interpreter<'_> {
     /// The code in force, G40, G41 or G42, in tenths.
-    pub(super) fn compensation_code(&self) -> u16 {
+    pub fn compensation_code(&self) -> u16 {
         match &self.compensation {
             Some(compensation) if compensation.phase != Phase::Leaving => {
                 415 - (5.0 * compensation.side) as u16
@@ -51,7 +51,7 @@ impl Interpreter<'_> {
     }
 
     /// G40 to G42.1.
-    pub(super) fn set_compensation(&mut self, block: &Block, code: u16) -> Outcome<()> {
+    pub fn set_compensation(&mut self, block: &Block, code: u16) -> Outcome<()> {
         if code == 400 {
             if let Some(mut on) = self.compensation.take().filter(|on| on.phase != Phase::Entering) {
                 if on.phase == Phase::Following {
@@ -110,7 +110,7 @@ impl Interpreter<'_> {
     }
 
     /// After a tool change the position of the machine is the programmed one.
-    pub(super) fn forget_compensation(&mut self) {
+    pub fn forget_compensation(&mut self) {
         if self.compensation.as_ref().is_some_and(|on| on.phase == Phase::Leaving) {
             self.compensation = None;
         }
@@ -133,7 +133,7 @@ impl Interpreter<'_> {
     }
 
     /// Refuses a code or word that cannot be offset while the compensation is on.
-    pub(super) fn check_beside(&self, what: &str) -> Outcome<()> {
+    pub fn check_beside(&self, what: &str) -> Outcome<()> {
         match &self.compensation {
             Some(on) if on.phase != Phase::Leaving => {
                 fault!("{what} stands where {} is on: give G40 before", g_name(on.code))
@@ -144,7 +144,7 @@ impl Interpreter<'_> {
 
     /// A straight move of the programmed path.
     #[cold]
-    pub(super) fn go_beside(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
+    pub fn go_beside(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
         let Some(mut on) = self.compensation.take() else { return Ok(()) };
         let (control, line) = (self.state.control, self.line);
         if on.phase == Phase::Leaving {
@@ -193,13 +193,7 @@ impl Interpreter<'_> {
     }
 
     /// An arc of the programmed path about `centre`, by its signed sweep.
-    pub(super) fn arc_beside(
-        &mut self,
-        target: &Point,
-        centre: Point2,
-        angle: f64,
-        feed: f64,
-    ) -> Outcome<()> {
+    pub fn arc_beside(&mut self, target: &Point, centre: Point2, angle: f64, feed: f64) -> Outcome<()> {
         let Some(mut on) = self.compensation.take() else { return Ok(()) };
         if on.phase == Phase::Leaving {
             return fault!("the first move after G40 is an arc: give a straight move before");

@@ -10,7 +10,7 @@ use super::tolerance::ON_ONE_LINE;
 
 impl Interpreter<'_> {
     /// Keeps the corner of a block whose move has been added.
-    pub(super) fn set_corner(&mut self, block: &Block, start: &Point, feed: f64) -> Outcome<()> {
+    pub fn set_corner(&mut self, block: &Block, start: &Point, feed: f64) -> Outcome<()> {
         let Some((letter, value)) = block.corner else { return Ok(()) };
         let size = value * self.state.unit();
         if !(size > 0.0 && size < f64::INFINITY) {
@@ -27,7 +27,7 @@ impl Interpreter<'_> {
     }
 
     /// Refuses other motion where a corner waits for a straight move.
-    pub(super) fn check_corner(&self) -> Outcome<()> {
+    pub fn check_corner(&self) -> Outcome<()> {
         match &self.corner {
             None => Ok(()),
             Some(corner) => fault_in!(
@@ -40,7 +40,7 @@ impl Interpreter<'_> {
 
     /// Cuts the corner that waits, before the straight move to `target`.
     #[cold]
-    pub(super) fn cut_corner(&mut self, kind: Kind, target: &Point) -> Outcome<()> {
+    pub fn cut_corner(&mut self, kind: Kind, target: &Point) -> Outcome<()> {
         let Some(corner) = self.corner else { return Ok(()) };
         let (u, v) = self.state.plane();
         let middle = self.moves.position;

@@ -31,7 +31,7 @@ struct Hole {
 
 impl Interpreter<'_> {
     /// Drills at the axis words of the block, L times.
-    pub(super) fn cycle(&mut self, block: &Block, motion: u16) -> Outcome<()> {
+    pub fn cycle(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         if self.state.feed_mode == FeedMode::Inverse {
             return fault!("{} does not work with inverse time (G93): give G94 and F", g_name(motion));
         }

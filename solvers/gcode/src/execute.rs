@@ -257,7 +257,7 @@ impl Interpreter<'_> {
     }
 
     /// A pause of the seconds that a word gives.
-    pub(super) fn dwell(&mut self, block: &Block, letter: u8, seconds: f64) -> Outcome<()> {
+    pub fn dwell(&mut self, block: &Block, letter: u8, seconds: f64) -> Outcome<()> {
         if !(0.0..=MOST_DWELL).contains(&seconds) {
             let word =
                 if block.has(letter) { block.word(letter) } else { format!("{}{seconds}", letter as char) };
@@ -275,7 +275,7 @@ impl Interpreter<'_> {
 
     /// The end of a move to the axis words of a block.
     #[inline(always)]
-    pub(super) fn target(&mut self, block: &Block, machine: bool) -> Outcome<Point> {
+    pub fn target(&mut self, block: &Block, machine: bool) -> Outcome<Point> {
         if self.state.offsets.rotation != 0.0 || self.state.polar || block.is_polar() {
             return self.turned_target(block, machine, &self.position());
         }
@@ -285,7 +285,7 @@ impl Interpreter<'_> {
 
     /// The place that axis words name, with G91 from `place`.
     #[inline(always)]
-    pub(super) fn place(&mut self, block: &Block, mut place: Point, zero: &Point) -> Outcome<Point> {
+    pub fn place(&mut self, block: &Block, mut place: Point, zero: &Point) -> Outcome<Point> {
         let absolute = self.state.absolute;
         self.axis_values(block, |axis, value| {
             place[axis] = value + if absolute { zero[axis] } else { place[axis] };
@@ -294,13 +294,13 @@ impl Interpreter<'_> {
         Ok(place)
     }
 
-    pub(super) fn rapid(&mut self, target: &Point) -> Outcome<()> {
+    pub fn rapid(&mut self, target: &Point) -> Outcome<()> {
         self.go(Kind::Rapid, target, f64::INFINITY)
     }
 
     /// A straight move to a point of the programmed path.
     #[inline(always)]
-    pub(super) fn go(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
+    pub fn go(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
         if self.compensation.is_some() {
             return self.go_beside(kind, target, feed);
         }

@@ -24,35 +24,35 @@ pub struct Corner {
 
 /// The state of the program between two blocks.
 pub struct Interpreter<'a> {
-    pub(super) state: State,
-    pub(super) moves: Moves,
-    pub(super) line: u32,
-    pub(super) options: &'a Options,
+    pub state: State,
+    pub moves: Moves,
+    pub line: u32,
+    pub options: &'a Options,
     /// Letters of the axes that the program has named.
-    pub(super) known: u32,
+    pub known: u32,
     warnings: Vec<String>,
     warned: Vec<Topic>,
     /// The NURBS that is being read.
-    pub(super) open: Option<Box<Nurbs>>,
+    pub open: Option<Box<Nurbs>>,
     /// The row in which a G5 may follow without I and J, and the I and J that it has then, in mm.
-    pub(super) mirror: Option<(usize, [f64; 2])>,
+    pub mirror: Option<(usize, [f64; 2])>,
     pub parameters: Parameters,
-    pub(super) tools: Option<Vec<Tool>>,
+    pub tools: Option<Vec<Tool>>,
     /// The table's row of the tool in the spindle, the number of that tool, and the number that T has called.
-    pub(super) tool: Option<Tool>,
-    pub(super) loaded: Option<u32>,
-    pub(super) selected: Option<u32>,
+    pub tool: Option<Tool>,
+    pub loaded: Option<u32>,
+    pub selected: Option<u32>,
     /// The corner that waits for the next straight move.
-    pub(super) corner: Option<Corner>,
+    pub corner: Option<Corner>,
     /// The compensation, while G41 or G42 is on.
-    pub(super) compensation: Option<Box<Compensation>>,
+    pub compensation: Option<Box<Compensation>>,
     /// Modes that M70 and M73 have saved, with the depth of calls, and true where the end of the call restores them.
-    pub(super) saved: Vec<(usize, bool, State)>,
+    pub saved: Vec<(usize, bool, State)>,
 }
 
 /// What a program is warned of once.
 #[derive(PartialEq)]
-pub(super) enum Topic {
+pub enum Topic {
     UnknownCode(u16),
     NoToolTable,
     NoToolLength,
@@ -106,7 +106,7 @@ impl<'a> Interpreter<'a> {
 
     /// The point of the programmed path; the tool is beside it while G41 or G42 is on.
     #[inline(always)]
-    pub(super) fn position(&self) -> Point {
+    pub fn position(&self) -> Point {
         match &self.compensation {
             None => self.moves.position,
             Some(compensation) => compensation.programmed,
@@ -114,7 +114,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// The feed in force, as a value of F.
-    pub(super) fn feed_word(&self) -> f64 {
+    pub fn feed_word(&self) -> f64 {
         let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
         self.state.feed.map_or(0.0, |feed| feed.angular * per)
     }
@@ -122,7 +122,7 @@ impl<'a> Interpreter<'a> {
     /// Calls `each` for each axis that the block names, with its value in mm or degrees. An axis that is named for the
     /// first time gets a column.
     #[inline(always)]
-    pub(super) fn axis_values(&mut self, block: &Block, mut each: impl FnMut(usize, f64)) -> Outcome<()> {
+    pub fn axis_values(&mut self, block: &Block, mut each: impl FnMut(usize, f64)) -> Outcome<()> {
         let mut words = block.words & AXIS_WORDS;
         if words & !self.known != 0 {
             self.add_axes(words)?;
@@ -147,7 +147,7 @@ impl<'a> Interpreter<'a> {
 
     /// Gives columns to axes that are named for the first time; the machine must have them.
     #[cold]
-    pub(super) fn add_axes(&mut self, words: u32) -> Outcome<()> {
+    pub fn add_axes(&mut self, words: u32) -> Outcome<()> {
         for (axis, &letter) in AXES.iter().enumerate().filter(|(_, &letter)| words & bit(letter) != 0) {
             if !self.options.machine_axes.is_empty() && !self.options.machine_axes.contains(&letter) {
                 let letter = letter as char;
@@ -166,7 +166,7 @@ impl<'a> Interpreter<'a> {
 
     /// Refuses positions that no machine reaches, or that are not numbers.
     #[inline(always)]
-    pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
+    pub fn check_reach(&self, target: &Point) -> Outcome<()> {
         let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
         // All nine are tested without a branch, and the faulty one is looked up afterwards.
         let mut all = true;
@@ -180,12 +180,12 @@ impl<'a> Interpreter<'a> {
         too_far(axis, target[axis])
     }
 
-    pub(super) fn warn(&mut self, text: String) {
+    pub fn warn(&mut self, text: String) {
         self.warnings.push(format!("line {}: {text}", self.line));
     }
 
     /// Warns of a topic for the first time.
-    pub(super) fn warn_once(&mut self, topic: Topic, text: impl FnOnce() -> String) {
+    pub fn warn_once(&mut self, topic: Topic, text: impl FnOnce() -> String) {
         if !self.warned.contains(&topic) {
             self.warned.push(topic);
             self.warn(text());

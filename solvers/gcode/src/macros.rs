@@ -13,7 +13,7 @@ const ARGUMENTS: [u8; 26] = *b"ABCIJKDEF H     QRSTUVWXYZ";
 
 impl Runner<'_> {
     /// IF [condition] GOTO or THEN.
-    pub(super) fn when(
+    pub fn when(
         &mut self,
         lexer: &mut Lexer,
         source: &[u8],
@@ -41,7 +41,7 @@ impl Runner<'_> {
     }
 
     /// GOTO, whose number is at a place.
-    pub(super) fn go_to(
+    pub fn go_to(
         &mut self,
         lexer: &mut Lexer,
         source: &[u8],
@@ -64,7 +64,7 @@ impl Runner<'_> {
     }
 
     /// M97, M98, M99 or G65 of the block.
-    pub(super) fn fanuc(&self) -> Outcome<Exit> {
+    pub fn fanuc(&self) -> Outcome<Exit> {
         let block = &self.block;
         let (name, arguments) = match block.code(Group::Macro) {
             Some(code) => (g_name(code), Some(arguments_of(block)?)),

@@ -9,7 +9,7 @@ use super::tolerance::FARTHEST;
 
 impl Interpreter<'_> {
     /// Plane, units, path control, distance modes and retract mode.
-    pub(super) fn set_modes(&mut self, block: &Block) -> Outcome<()> {
+    pub fn set_modes(&mut self, block: &Block) -> Outcome<()> {
         let state = &mut self.state;
         if let Some(code) = block.code(Group::Plane) {
             state.normal = usize::from((190 - code) / 10);
@@ -61,7 +61,7 @@ impl Interpreter<'_> {
     }
 
     /// M70 to M73.
-    pub(super) fn save_modes(&mut self, code: u16) {
+    pub fn save_modes(&mut self, code: u16) {
         let depth = self.parameters.depth();
         match code {
             72 => self.restore_modes(),

@@ -16,7 +16,7 @@ const CENTRE: [u8; 3] = *b"IJK";
 impl Interpreter<'_> {
     /// G0 and G1 to the axis words of a block.
     #[inline(always)]
-    pub(super) fn straight(&mut self, block: &Block, rapid: bool, machine: bool) -> Outcome<()> {
+    pub fn straight(&mut self, block: &Block, rapid: bool, machine: bool) -> Outcome<()> {
         if self.state.coordinate_mode == CoordinateMode::Vector {
             return self.pointed(block, rapid);
         }
@@ -75,7 +75,7 @@ impl Interpreter<'_> {
 
     /// The feed in force, per second.
     #[inline(always)]
-    pub(super) fn feed(&self) -> Outcome<Feed> {
+    pub fn feed(&self) -> Outcome<Feed> {
         let Some(feed) = self.state.feed else {
             return fault!(
                 "a feed move has no feed: give F before or in this block, or a feed for such moves (--feed)",
@@ -115,7 +115,7 @@ impl Interpreter<'_> {
     }
 
     /// G2 (clockwise) and G3.
-    pub(super) fn arc(&mut self, block: &Block, clockwise: bool) -> Outcome<()> {
+    pub fn arc(&mut self, block: &Block, clockwise: bool) -> Outcome<()> {
         let target = self.target(block, false)?;
         let normal = self.state.normal;
         let (u, v) = self.state.plane();

@@ -12,7 +12,7 @@ use super::parameters::{
 
 impl Interpreter<'_> {
     /// G10: L1, L10 and L11 set a tool of the table, L2 and L20 a work offset.
-    pub(super) fn set_data(&mut self, block: &Block) -> Outcome<()> {
+    pub fn set_data(&mut self, block: &Block) -> Outcome<()> {
         match block.get(b'L') {
             Some(level) if [1.0, 10.0, 11.0].contains(&level) => self.set_tool_data(block, level),
             Some(level) if [2.0, 20.0].contains(&level) => self.set_work_offset(block, level == 20.0),
@@ -114,7 +114,7 @@ impl Interpreter<'_> {
     }
 
     /// G52 sets the shift; G92 sets it so that the axes named have the values given. Both use the same offset.
-    pub(super) fn shift(&mut self, block: &Block, code: u16) -> Outcome<()> {
+    pub fn shift(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let reading = self.state.offsets.to_program(&self.position());
         let mut shift = self.state.offsets.shift;
         self.axis_values(block, |axis, value| {
@@ -128,7 +128,7 @@ impl Interpreter<'_> {
     }
 
     /// G92.1 deletes the shift, G92.2 suspends it, G92.3 restores it.
-    pub(super) fn reset_shift(&mut self, code: u16) {
+    pub fn reset_shift(&mut self, code: u16) {
         self.state.offsets.shift = if code == 923 { self.parameters.row(SHIFT) } else { [0.0; 9] };
         self.parameters.set_number(SHIFT_IN_FORCE, f64::from(code == 923));
         if code == 921 {
@@ -138,7 +138,7 @@ impl Interpreter<'_> {
     }
 
     /// Puts a work offset, 0 for G54, into force as its parameters have it.
-    pub(super) fn select_system(&mut self, system: usize) {
+    pub fn select_system(&mut self, system: usize) {
         let first = first_of_system(system);
         self.end_turn();
         let offsets = &mut self.state.offsets;
@@ -150,7 +150,7 @@ impl Interpreter<'_> {
     }
 
     /// Sets tool length and work offset.
-    pub(super) fn set_offsets(&mut self, block: &Block) -> Outcome<()> {
+    pub fn set_offsets(&mut self, block: &Block) -> Outcome<()> {
         match block.code(Group::ToolLength) {
             Some(code @ (434 | 435)) => return self.program_tip(block, code),
             Some(432) if self.state.coordinate_mode != CoordinateMode::Joints => {
@@ -263,7 +263,7 @@ impl Interpreter<'_> {
 
     /// G28 and G30: a rapid to the axis words, then one of the axes named, or of all axes if none is, to the home position.
     /// G28.1 and G30.1 set that to the current position. G28.2 to G28.4 home the axes and set nothing.
-    pub(super) fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
+    pub fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let first = if code < 300 { HOME } else { SECOND_HOME };
         if matches!(code, 281 | 301) {
             let position = self.position();

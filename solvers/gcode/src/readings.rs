@@ -18,7 +18,7 @@ const CONTROL: std::ops::Range<usize> = 1000..5161;
 
 impl Interpreter<'_> {
     /// The value of a number; 0 where it has none, as in LinuxCNC. A value that only one control can know is a fault.
-    pub(super) fn parameter(&self, number: usize) -> Outcome<f64> {
+    pub fn parameter(&self, number: usize) -> Outcome<f64> {
         if !READINGS.contains(&number) {
             self.check_known(number)?;
             return Ok(self.parameters.number(number));
@@ -33,13 +33,13 @@ impl Interpreter<'_> {
     }
 
     /// True where a number has a value.
-    pub(super) fn has_value(&self, number: usize) -> Outcome<bool> {
+    pub fn has_value(&self, number: usize) -> Outcome<bool> {
         self.check_known(number)?;
         Ok(READINGS.contains(&number) || self.parameters.is_set(number))
     }
 
     /// The value of a name; None where there is no such name.
-    pub(super) fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
+    pub fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
         if let Some(value) = self.parameters.named(name) {
             return Ok(Some(value));
         }

@@ -41,7 +41,7 @@ impl<'a> Text<'a> {
 }
 
 /// The progress of the program or of a call.
-pub(super) struct Frame {
+pub struct Frame {
     /// Index into `texts`.
     text: usize,
     /// Place in the text of the next line.
@@ -51,7 +51,7 @@ pub(super) struct Frame {
     /// The line of the program that is reported for moves of a subprogram in another file.
     reported: Option<u32>,
     /// Open `repeat` steps, each with the number of times that it is run again.
-    pub(super) repeats: Vec<(usize, u64)>,
+    pub repeats: Vec<(usize, u64)>,
     /// The repetitions of a call by M97, M98 or G65.
     again: Option<Again>,
 }
@@ -66,7 +66,7 @@ struct Again {
 }
 
 /// The reason why the next line is not the one after.
-pub(super) enum Exit {
+pub enum Exit {
     /// The program ends by that word, or the text ends.
     End(Option<&'static str>),
     Call {
@@ -91,8 +91,8 @@ pub struct Runner<'a> {
     seen: &'a dyn Fn(usize),
     texts: Vec<Rc<Text<'a>>>,
     /// The program, and the calls that are open.
-    pub(super) frames: Vec<Frame>,
-    pub(super) block: Block,
+    pub frames: Vec<Frame>,
+    pub block: Block,
     /// Number of blocks left out after `/`.
     deleted: u32,
     /// Number of lines that may still be run.

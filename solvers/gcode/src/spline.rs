@@ -16,7 +16,7 @@ const FANUC_ORDER: usize = 4;
 
 impl Interpreter<'_> {
     /// A block of G5, G5.1, G5.2, G5.3 or G6.2 that begins a spline.
-    pub(super) fn spline(&mut self, block: &Block, motion: u16) -> Outcome<()> {
+    pub fn spline(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         if motion == 53 {
             return fault!("word G5.3 ends a NURBS that no G5.2 began: remove it");
         }
@@ -144,7 +144,7 @@ impl Interpreter<'_> {
 
     /// A further block of the NURBS that is open.
     #[cold]
-    pub(super) fn continue_spline(&mut self, block: &Block, mut nurbs: Box<Nurbs>) -> Outcome<()> {
+    pub fn continue_spline(&mut self, block: &Block, mut nurbs: Box<Nurbs>) -> Outcome<()> {
         if block.is_empty() {
             self.open = Some(nurbs);
             return Ok(());
@@ -251,7 +251,7 @@ impl Interpreter<'_> {
     }
 
     /// True for Fanuc's G5 P or G5.1 Q alone in a block, which switches its look-ahead.
-    pub(super) fn switches_look_ahead(&mut self, block: &Block, motion: Option<u16>) -> bool {
+    pub fn switches_look_ahead(&mut self, block: &Block, motion: Option<u16>) -> bool {
         let switch = match motion {
             Some(50) => bit(b'P'),
             Some(51) => bit(b'Q'),

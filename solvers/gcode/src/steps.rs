@@ -11,7 +11,7 @@ use super::words::Lexer;
 
 impl Runner<'_> {
     /// Runs the step `i`; the exit, where it leaves the text.
-    pub(super) fn step(
+    pub fn step(
         &mut self,
         lexer: &mut Lexer,
         source: &[u8],

@@ -44,7 +44,7 @@ impl Interpreter<'_> {
     }
 
     /// G33, and G33.1, which returns with the spindle reversed.
-    pub(super) fn thread_once(&mut self, block: &Block, motion: u16) -> Outcome<()> {
+    pub fn thread_once(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         let code = if motion == 330 { "G33" } else { "G33.1" };
         self.check_beside(code)?;
         let pitch = self.pitch(block, b'K', code)?;
@@ -61,7 +61,7 @@ impl Interpreter<'_> {
     }
 
     /// G76: passes of growing depth up to that of the thread, and spring passes at that depth.
-    pub(super) fn thread(&mut self, block: &Block) -> Outcome<()> {
+    pub fn thread(&mut self, block: &Block) -> Outcome<()> {
         self.check_beside("G76")?;
         if let Some(letter) = b"XYABCUVW".iter().find(|&&letter| block.has(letter)) {
             return fault!("word {} stands in G76, which goes along Z: remove it", block.word(*letter));

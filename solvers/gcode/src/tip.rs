@@ -11,7 +11,7 @@ use super::tolerance::{DIRECTION_LENGTH, OPPOSITE};
 
 impl Interpreter<'_> {
     /// G43.4 and G43.5, and the codes that cancel them; `length` is the tool's in mm, NaN where it is not known.
-    pub(super) fn set_coordinate_mode(&mut self, mode: CoordinateMode, length: f64) -> Outcome<()> {
+    pub fn set_coordinate_mode(&mut self, mode: CoordinateMode, length: f64) -> Outcome<()> {
         let same = length.to_bits() == self.state.tool_length.to_bits() || length == self.state.tool_length;
         if mode == self.state.coordinate_mode && (same || mode == CoordinateMode::Joints) {
             return Ok(());
@@ -40,7 +40,7 @@ impl Interpreter<'_> {
     }
 
     /// Refuses moves to joint positions or along the spindle while axis words are the tip.
-    pub(super) fn check_coordinate_mode(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
+    pub fn check_coordinate_mode(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
         let code = match (block.code(Group::ToolLength), self.state.coordinate_mode) {
             (Some(code @ (434 | 435)), _) => code,
             (Some(_), _) | (None, CoordinateMode::Joints) => return Ok(()),
@@ -82,7 +82,7 @@ impl Interpreter<'_> {
     }
 
     /// The tool direction of a block: I, J, K, where a missing one is 0, or the direction before.
-    pub(super) fn direction(&self, block: &Block) -> Outcome<Direction> {
+    pub fn direction(&self, block: &Block) -> Outcome<Direction> {
         if block.words & bits(b"IJK") == 0 {
             return Ok(self.moves.direction);
         }

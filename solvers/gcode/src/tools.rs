@@ -7,12 +7,12 @@ use super::options::Tool;
 
 impl Interpreter<'_> {
     /// The tool of a number; None where the table does not have it or there is no table.
-    pub(super) fn tool_of(&self, number: u32) -> Option<Tool> {
+    pub fn tool_of(&self, number: u32) -> Option<Tool> {
         self.tools.as_ref()?.iter().find(|tool| tool.number == number).copied()
     }
 
     /// The tool of a number that the program needs; None where there is no table.
-    pub(super) fn needed_tool(&self, number: u32) -> Outcome<Option<Tool>> {
+    pub fn needed_tool(&self, number: u32) -> Outcome<Option<Tool>> {
         match (&self.tools, self.tool_of(number)) {
             (None, _) => Ok(None),
             (Some(_), Some(tool)) => Ok(Some(tool)),
@@ -22,12 +22,12 @@ impl Interpreter<'_> {
         }
     }
 
-    pub(super) fn tool_number(&self) -> f64 {
+    pub fn tool_number(&self) -> f64 {
         f64::from(self.loaded.unwrap_or(0))
     }
 
     /// T, M6 and M61.
-    pub(super) fn set_tool(&mut self, block: &Block, change: Option<u16>) -> Outcome<()> {
+    pub fn set_tool(&mut self, block: &Block, change: Option<u16>) -> Outcome<()> {
         if let Some(number) = block.count(b'T', 0, "tool number")? {
             self.selected = Some(number);
             self.moves.event(self.line, b'T', f64::from(number), [None; 2]);

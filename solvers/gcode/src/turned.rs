@@ -9,7 +9,7 @@ use super::modal::turn;
 impl Interpreter<'_> {
     /// The end of a move to the axis words or polar words of a block.
     #[cold]
-    pub(super) fn turned_target(&mut self, block: &Block, machine: bool, from: &Point) -> Outcome<Point> {
+    pub fn turned_target(&mut self, block: &Block, machine: bool, from: &Point) -> Outcome<Point> {
         let mut target = *from;
         if machine {
             self.axis_values(block, |axis, value| target[axis] = value)?;
@@ -72,7 +72,7 @@ impl Interpreter<'_> {
     }
 
     /// G68: rotates the program's coordinates by R about X and Y, or about the position of the tool.
-    pub(super) fn begin_turn(&mut self, block: &Block) -> Outcome<()> {
+    pub fn begin_turn(&mut self, block: &Block) -> Outcome<()> {
         if self.state.normal != 2 {
             return fault!("G68 is read in the plane G17: give G17, or post the coordinates as they are cut");
         }
@@ -105,7 +105,7 @@ impl Interpreter<'_> {
     }
 
     /// G69.
-    pub(super) fn end_turn(&mut self) {
+    pub fn end_turn(&mut self) {
         let offsets = &mut self.state.offsets;
         if let Some(before) = offsets.unturned.take() {
             (offsets.shift, offsets.rotation) = before;
@@ -114,7 +114,7 @@ impl Interpreter<'_> {
     }
 
     /// Refuses codes that change the offsets while G68 is on, as controls do.
-    pub(super) fn check_turned(&self, block: &Block) -> Outcome<()> {
+    pub fn check_turned(&self, block: &Block) -> Outcome<()> {
         if self.state.offsets.unturned.is_none() {
             return Ok(());
         }
