@@ -164,9 +164,8 @@ pub struct Block {
     m_codes: [u16; M_GROUPS],
     others: [u16; MOST_OTHERS],
     other_count: usize,
-    /// Polar words: `@` and `^`.
-    pub radius: Option<f64>,
-    pub angle: Option<f64>,
+    /// The polar words `@` and `^`: radius and angle.
+    pub polar: [Option<f64>; 2],
     /// `,C` or `,R`.
     pub corner: Option<(u8, f64)>,
 }
@@ -179,8 +178,7 @@ impl Block {
         self.groups = 0;
         self.m_groups = 0;
         self.other_count = 0;
-        self.radius = None;
-        self.angle = None;
+        self.polar = [None; 2];
         self.corner = None;
     }
 
@@ -190,12 +188,7 @@ impl Block {
 
     #[inline(always)]
     pub fn is_polar(&self) -> bool {
-        self.radius.is_some() || self.angle.is_some()
-    }
-
-    /// Adds a polar word.
-    pub fn set_polar(&mut self, sign: u8, value: f64) {
-        *(if sign == b'@' { &mut self.radius } else { &mut self.angle }) = Some(value);
+        self.polar.iter().any(Option::is_some)
     }
 
     /// Drops the words of a block without G codes that begins with an M code of unknown meaning: they belong to that
@@ -253,9 +246,9 @@ impl Block {
 
     /// The first polar word as a message names it.
     pub fn polar_word(&self) -> String {
-        let [radius, angle] = [(b'@', self.radius), (b'^', self.angle)]
-            .map(|(sign, value)| value.map(|value| format!("{}{value}", sign as char)));
-        radius.or(angle).unwrap_or_default()
+        let [radius, angle] = self.polar;
+        let radius = radius.map(|radius| format!("@{radius}"));
+        radius.or(angle.map(|angle| format!("^{angle}"))).unwrap_or_default()
     }
 
     /// Adds a G code in tenths; Err with the code of its group that the block has already, or with None where the code

@@ -58,13 +58,14 @@ impl Interpreter<'_> {
             return fault!("polar words @ and ^ stand beside X or Y: give one of both");
         }
         let (mut radius, mut angle) = (before[0].hypot(before[1]), before[1].atan2(before[0]));
-        if radius == 0.0 && !(absolute && block.angle.is_some()) {
+        let [radius_word, angle_word] = block.polar;
+        if radius == 0.0 && !(absolute && angle_word.is_some()) {
             return fault!("the place before is the origin, which has no angle: give @ and ^ in G90");
         }
-        if let Some(word) = block.radius {
+        if let Some(word) = radius_word {
             radius = word * self.state.unit() + if absolute { 0.0 } else { radius };
         }
-        if let Some(word) = block.angle {
+        if let Some(word) = angle_word {
             angle = word.to_radians() + if absolute { 0.0 } else { angle };
         }
         (end[0], end[1]) = (radius * angle.cos(), radius * angle.sin());

@@ -188,15 +188,16 @@ impl<'a> Lexer<'a> {
                         at += 1;
                     }
                 }
-                b'%' if first => {
-                    self.percent(at)?;
+                // Text behind it is a comment, as on controls.
+                b'%' if first && !self.source[at..].starts_with(b"%_N_") => {
+                    self.at = after_line(self.source, end_of_line(self.source, at));
                     return Ok(Some(Line::Percent));
                 }
-                b'@' | b'^' if polar_word(byte, block) => {
+                b'@' | b'^' if block.polar[usize::from(byte == b'^')].is_none() => {
                     let Some((value, end)) = number(self.source, at + 1, values)? else {
                         return self.stray(at);
                     };
-                    block.set_polar(byte, value);
+                    block.polar[usize::from(byte == b'^')] = Some(value);
                     (at, first) = (end, false);
                 }
                 b',' if block.corner.is_none() && matches!(self.byte(at + 1) & 0xdf, b'C' | b'R') => {
@@ -395,24 +396,9 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// Reads a line with `%`; text behind it is a comment, as on controls.
-    #[cold]
-    fn percent(&mut self, start: usize) -> Outcome<()> {
-        if self.source[start..].starts_with(b"%_N_") {
-            return self.stray(start);
-        }
-        self.at = after_line(self.source, end_of_line(self.source, start));
-        Ok(())
-    }
-
     fn text(&self, at: usize, end: usize) -> String {
         String::from_utf8_lossy(&self.source[at..end.min(at + 24)]).into_owned()
     }
-}
-
-/// True where the block does not have that polar word yet.
-fn polar_word(byte: u8, block: &Block) -> bool {
-    (if byte == b'@' { block.radius } else { block.angle }).is_none()
 }
 
 /// The words that begin a comment which is a message, in LinuxCNC.
