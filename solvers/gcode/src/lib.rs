@@ -9,7 +9,7 @@
 //! 3. `intent` finds the motion of the block and checks that each of its words has a use.
 //! 4. `execute` runs the block on the state of the `interpreter` in LinuxCNC's order, with the modes of `modal` and `modes`
 //!    and the zero of `offsets`.
-//! 5. `motion`, `arc`, `spline`, `cycle`, `thread` and `corner` make moves; `compensate` and `beside` offset them by the
+//! 5. `motion`, `arc`, `spline`, `cycle`, `thread` and `corner` make moves; `compensation` and `beside` offset them by the
 //!    tool's radius; `tip` converts between joints and the tool's tip.
 //! 6. `moves` holds the moves, `events` what happens between them; `moves/columns` gives both as columns.
 
@@ -21,7 +21,6 @@ mod arc;
 mod arithmetic;
 mod beside;
 mod block;
-mod compensate;
 mod compensation;
 mod coordinates;
 mod corner;
