@@ -5,7 +5,8 @@ use super::expression::{bracket, number};
 use super::fault::Outcome;
 use super::flow::{Flow, Step};
 use super::number::{behind_word, integer, spaces};
-use super::run::{Exit, Frame, Runner};
+use super::parameters::Scope;
+use super::run::{Call, Exit, Runner, Target};
 use super::words::Lexer;
 
 /// The letters that set the parameters #1 to #26; a blank where no letter does.
@@ -13,21 +14,15 @@ const ARGUMENTS: [u8; 26] = *b"ABCIJKDEF H     QRSTUVWXYZ";
 
 impl Runner<'_> {
     /// IF [condition] GOTO or THEN.
-    pub fn when(
-        &mut self,
-        lexer: &mut Lexer,
-        source: &[u8],
-        flow: &Flow,
-        step: &Step,
-        frame: &mut Frame,
-    ) -> Outcome<()> {
+    pub fn when(&mut self, lexer: &mut Lexer, flow: &Flow, step: &Step) -> Outcome<()> {
+        let source = lexer.source;
         let Some((value, end)) = bracket(source, step.arguments, &self.interpreter)? else {
             return fault!("IF has no [condition]: give one in brackets");
         };
         let at = spaces(source, end);
         if let Some(at) = behind_word(source, at, "GOTO") {
             if value != 0.0 {
-                self.go_to(lexer, source, flow, at, frame)?;
+                self.go_to(lexer, flow, at)?;
             }
         } else if let Some(at) = behind_word(source, at, "THEN") {
             // The rest of the line is a block.
@@ -41,23 +36,15 @@ impl Runner<'_> {
     }
 
     /// GOTO, whose number is at a place.
-    pub fn go_to(
-        &mut self,
-        lexer: &mut Lexer,
-        source: &[u8],
-        flow: &Flow,
-        at: usize,
-        frame: &mut Frame,
-    ) -> Outcome<()> {
-        let number = number(source, at, &self.interpreter)?;
+    pub fn go_to(&mut self, lexer: &mut Lexer, flow: &Flow, at: usize) -> Outcome<()> {
+        let number = number(lexer.source, at, &self.interpreter)?;
         let Some(number) = number.and_then(|(value, _)| integer(value)) else {
             return fault!("GOTO has no whole number: give that of a line, such as GOTO 10");
         };
-        let Some((at, line)) = flow.numbered(source, number, lexer.at) else {
+        let Some((at, line)) = flow.numbered(lexer.source, number, lexer.at) else {
             return fault!("GOTO {number} goes to line N{number}, which the program does not have");
         };
-        frame
-            .repeats
+        self.repeats()
             .retain(|&(open, _)| (flow.steps[open].at..flow.steps[flow.steps[open].end].at).contains(&at));
         lexer.jump(at, line);
         Ok(())
@@ -66,9 +53,11 @@ impl Runner<'_> {
     /// M97, M98, M99 or G65 of the block.
     pub fn fanuc(&self) -> Outcome<Exit> {
         let block = &self.block;
-        let (name, arguments) = match block.code(Group::Macro) {
-            Some(code) => (g_name(code), Some(arguments_of(block)?)),
-            None => (format!("M{}", block.m_code(MGroup::Call).unwrap_or_default()), None),
+        let (name, scope, arguments) = match block.code(Group::Macro) {
+            Some(code) => (g_name(code), Scope::Macro, arguments_of(block)?),
+            None => {
+                (format!("M{}", block.m_code(MGroup::Call).unwrap_or_default()), Scope::Shared, Vec::new())
+            }
         };
         let number = block.get(b'P').and_then(integer).filter(|number| *number >= 0);
         if name == "M99" {
@@ -82,7 +71,9 @@ impl Runner<'_> {
             return fault!("{name} calls no subprogram: give its number as P");
         };
         let times = block.count(b'L', 0, "number of calls")?.unwrap_or(1);
-        Ok(Exit::Fanuc { number, local: name == "M97", times, arguments })
+        let label = || number.to_string().into_bytes();
+        let target = if name == "M97" { Target::Line(number) } else { Target::Label(label()) };
+        Ok(Exit::Call(target, Call { arguments, scope, times }))
     }
 }
 

@@ -40,46 +40,53 @@ impl<'a> Text<'a> {
     }
 }
 
-/// The progress of the program or of a call.
-pub struct Frame {
-    /// Index into `texts`.
+/// Where lines go on: the index of their text, the place in it of the next line, and the 1-based line before.
+#[derive(Clone, Copy)]
+struct Cursor {
     text: usize,
-    /// Place in the text of the next line.
     at: usize,
-    /// 1-based, of the line that was run last.
     line: u32,
+}
+
+/// The progress of the program or of a call.
+struct Frame {
+    cursor: Cursor,
     /// The line of the program that is reported for moves of a subprogram in another file.
     reported: Option<u32>,
     /// Open `repeat` steps, each with the number of times that it is run again.
-    pub repeats: Vec<(usize, u64)>,
-    /// The repetitions of a call by M97, M98 or G65.
-    again: Option<Again>,
+    repeats: Vec<(usize, u64)>,
+    /// The start of the subprogram, the call of it, and the number of times that it is run again.
+    start: Cursor,
+    call: Call,
+    left: u32,
 }
 
-/// The place of the first line of a subprogram, the line before it, the number of times that it is run again, and the
-/// arguments of a macro.
-struct Again {
-    at: usize,
-    line: u32,
-    left: u32,
-    arguments: Option<Vec<f64>>,
+impl Frame {
+    fn new(start: Cursor, reported: Option<u32>, call: Call) -> Self {
+        let left = call.times.saturating_sub(1);
+        Self { cursor: start, reported, repeats: Vec::new(), start, call, left }
+    }
+}
+
+/// What is called.
+pub enum Target {
+    Label(Vec<u8>),
+    /// The line with a block number, by M97.
+    Line(i64),
+}
+
+/// How it is called: `times` in succession.
+pub struct Call {
+    pub arguments: Vec<f64>,
+    pub scope: Scope,
+    pub times: u32,
 }
 
 /// The reason why the next line is not the one after.
 pub enum Exit {
     /// The program ends by that word, or the text ends.
     End(Option<&'static str>),
-    Call {
-        label: Vec<u8>,
-        arguments: Vec<f64>,
-    },
-    /// M98, G65 with its arguments, or M97 with the number of a line; `times` in succession.
-    Fanuc {
-        number: i64,
-        local: bool,
-        times: u32,
-        arguments: Option<Vec<f64>>,
-    },
+    Call(Target, Call),
     Return(Option<f64>),
     /// M99 with the number of a line.
     Back(i64),
@@ -90,8 +97,9 @@ pub struct Runner<'a> {
     pub interpreter: Interpreter<'a>,
     seen: &'a dyn Fn(usize),
     texts: Vec<Rc<Text<'a>>>,
-    /// The program, and the calls that are open.
-    pub frames: Vec<Frame>,
+    main: Frame,
+    /// The calls that are open.
+    calls: Vec<Frame>,
     pub block: Block,
     /// Number of blocks left out after `/`.
     deleted: u32,
@@ -110,13 +118,15 @@ pub struct Runner<'a> {
 
 impl<'a> Runner<'a> {
     pub fn new(source: &'a [u8], options: &'a Options, lines: usize, seen: &'a dyn Fn(usize)) -> Self {
-        let start = Frame { text: 0, at: 0, line: 0, reported: None, repeats: Vec::new(), again: None };
+        let start = Cursor { text: 0, at: 0, line: 0 };
+        let call = Call { arguments: Vec::new(), scope: Scope::Own, times: 1 };
         Self {
             options,
             interpreter: Interpreter::new(options, lines),
             seen,
             texts: vec![Text::new(String::new(), Cow::Borrowed(source))],
-            frames: vec![start],
+            main: Frame::new(start, None, call),
+            calls: Vec::new(),
             block: Block::default(),
             deleted: 0,
             left: lines as u64 + SPARE_LINES + LINES_PER_MOVE * options.max_moves as u64,
@@ -128,35 +138,50 @@ impl<'a> Runner<'a> {
         }
     }
 
+    /// The progress of the call that is run, or of the program.
+    fn frame(&self) -> &Frame {
+        self.calls.last().unwrap_or(&self.main)
+    }
+
+    fn frame_mut(&mut self) -> &mut Frame {
+        self.calls.last_mut().unwrap_or(&mut self.main)
+    }
+
+    /// The open `repeat` steps of the frame, each with the number of times that it is run again.
+    pub fn repeats(&mut self) -> &mut Vec<(usize, u64)> {
+        &mut self.frame_mut().repeats
+    }
+
+    /// True outside of calls.
+    pub fn in_main(&self) -> bool {
+        self.calls.is_empty()
+    }
+
     /// Runs the program to its end: sentences about its end and about blocks that were left out.
     pub fn run(&mut self) -> Outcome<Vec<String>> {
         let end = loop {
-            let Some(mut frame) = self.frames.pop() else { break None };
-            let text = self.texts[frame.text].clone();
+            let Cursor { text, at, line } = self.frame().cursor;
+            let text = self.texts[text].clone();
             let mut lexer = Lexer::new(&text.bytes, self.options.block_delete, self.options.whole_step);
-            if frame.line > 0 || frame.at > 0 {
-                lexer.jump(frame.at, frame.line);
+            if line > 0 || at > 0 {
+                lexer.jump(at, line);
             }
-            let exit = self.run_lines(&mut lexer, &text, &mut frame);
-            (frame.at, frame.line) = (lexer.at, lexer.line);
-            let main = self.frames.is_empty();
-            self.frames.push(frame);
+            let exit = self.run_lines(&mut lexer, &text);
+            let cursor = &mut self.frame_mut().cursor;
+            (cursor.at, cursor.line) = (lexer.at, lexer.line);
             match exit? {
-                Exit::End(word) if main || word.is_some() => break Some(self.ending(&lexer, word)),
+                Exit::End(word) if self.in_main() || word.is_some() => break self.ending(&lexer, word),
                 Exit::End(_) => {
                     return fault!("the subprogram does not end with M99 or endsub: it may be truncated")
                 }
-                Exit::Call { label, arguments } => self.call(&label, &arguments)?,
-                Exit::Fanuc { number, local, times, arguments } => {
-                    self.call_fanuc(number, local, times, arguments)?
-                }
+                Exit::Call(target, call) => self.call(&target, call)?,
                 Exit::Back(number) => self.go_back(number)?,
-                Exit::Return(_) if main => break Some(self.ending(&lexer, Some("M99"))),
+                Exit::Return(_) if self.in_main() => break self.ending(&lexer, Some("M99")),
                 Exit::Return(value) => self.leave(value),
             }
         };
         self.interpreter.check_end()?;
-        Ok(end.unwrap_or_default())
+        Ok(end)
     }
 
     /// Sentences about the end of the program.
@@ -189,16 +214,17 @@ impl<'a> Runner<'a> {
     }
 
     /// Runs lines of one text up to an exit.
-    fn run_lines(&mut self, lexer: &mut Lexer, text: &Text, frame: &mut Frame) -> Outcome<Exit> {
+    fn run_lines(&mut self, lexer: &mut Lexer, text: &Text) -> Outcome<Exit> {
+        let Frame { cursor, reported, .. } = *self.frame();
         loop {
             let line = lexer.next_line(&mut self.block, &self.interpreter)?;
-            self.count(lexer.line, frame.text)?;
+            self.count(lexer.line, cursor.text)?;
             match line {
                 Some(Line::Block) => {
                     if !lexer.assigned.is_empty() {
                         self.interpreter.assign(&mut lexer.assigned)?;
                     }
-                    let line = frame.reported.unwrap_or(lexer.line);
+                    let line = reported.unwrap_or(lexer.line);
                     for (letter, text) in lexer.remarks.drain(..) {
                         self.interpreter.moves.remark(line, letter, text);
                     }
@@ -218,7 +244,7 @@ impl<'a> Runner<'a> {
                     let Some(step) = flow.at(at) else {
                         return fault!("an O word has no number and no <name>: give one");
                     };
-                    if let Some(exit) = self.step(lexer, &text.bytes, flow, step, frame)? {
+                    if let Some(exit) = self.step(lexer, flow, step)? {
                         return Ok(exit);
                     }
                 }
@@ -249,84 +275,61 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    fn call(&mut self, label: &[u8], arguments: &[f64]) -> Outcome<()> {
-        let (text, at, line) = self.find(label)?;
-        self.interpreter.parameters.enter(arguments, Scope::Own)?;
-        self.push(text, at, line, None);
-        Ok(())
-    }
-
-    fn call_fanuc(
-        &mut self,
-        number: i64,
-        local: bool,
-        times: u32,
-        arguments: Option<Vec<f64>>,
-    ) -> Outcome<()> {
-        if times == 0 {
+    fn call(&mut self, target: &Target, call: Call) -> Outcome<()> {
+        if call.times == 0 {
             return Ok(());
         }
-        let (text, at, line) = if local {
-            self.find_line(number, "M97 calls")?
-        } else {
-            self.find(number.to_string().as_bytes())?
+        let start = match target {
+            Target::Label(label) => self.find(label)?,
+            Target::Line(number) => self.find_line(*number, "M97 calls")?,
         };
-        let scope = if arguments.is_some() { Scope::Macro } else { Scope::Shared };
-        self.interpreter.parameters.enter(arguments.as_deref().unwrap_or_default(), scope)?;
-        self.push(text, at, line, Some(Again { at, line, left: times - 1, arguments }));
+        self.interpreter.parameters.enter(&call.arguments, call.scope)?;
+        let caller = self.frame();
+        let reported = (start.text != 0).then(|| caller.reported.unwrap_or(caller.cursor.line));
+        self.called = true;
+        self.calls.push(Frame::new(start, reported, call));
         Ok(())
     }
 
     /// Ends the last call, if there is one, and goes to the line with a block number.
     fn go_back(&mut self, number: i64) -> Outcome<()> {
-        if self.frames.len() > 1 {
-            self.frames.pop();
+        if self.calls.pop().is_some() {
             self.interpreter.leave_call();
         }
-        let (_, at, line) = self.find_line(number, "M99 goes to")?;
-        if let Some(frame) = self.frames.last_mut() {
-            (frame.at, frame.line) = (at, line);
-            frame.repeats.clear();
-        }
+        let cursor = self.find_line(number, "M99 goes to")?;
+        let frame = self.frame_mut();
+        frame.cursor = cursor;
+        frame.repeats.clear();
         Ok(())
-    }
-
-    fn push(&mut self, text: usize, at: usize, line: u32, again: Option<Again>) {
-        let caller = &self.frames[self.frames.len() - 1];
-        let reported = (text != 0).then(|| caller.reported.unwrap_or(caller.line));
-        self.called = true;
-        self.frames.push(Frame { text, at, line, reported, repeats: Vec::new(), again });
     }
 
     /// Ends the last call, or runs its subprogram again.
     fn leave(&mut self, value: Option<f64>) {
-        if let Some(frame) = self.frames.last_mut() {
-            if let Some(again) = frame.again.as_mut().filter(|again| again.left > 0) {
-                again.left -= 1;
-                (frame.at, frame.line) = (again.at, again.line);
-                frame.repeats.clear();
-                if let Some(arguments) = &again.arguments {
-                    self.interpreter.parameters.take(arguments);
-                }
-                return;
+        let Some(frame) = self.calls.last_mut() else { return };
+        let scope = frame.call.scope;
+        if frame.left > 0 {
+            frame.left -= 1;
+            frame.cursor = frame.start;
+            frame.repeats.clear();
+            if scope == Scope::Macro {
+                self.interpreter.parameters.take(&frame.call.arguments);
             }
-            let by_number = frame.again.is_some();
-            self.frames.pop();
-            self.interpreter.leave_call();
-            if !by_number {
-                self.interpreter.parameters.set_named(b"_value", value.unwrap_or(0.0));
-                self.interpreter.parameters.set_named(b"_value_returned", f64::from(value.is_some()));
-            }
+            return;
+        }
+        self.calls.pop();
+        self.interpreter.leave_call();
+        if scope == Scope::Own {
+            self.interpreter.parameters.set_named(b"_value", value.unwrap_or(0.0));
+            self.interpreter.parameters.set_named(b"_value_returned", f64::from(value.is_some()));
         }
     }
 
-    /// The text, place and line before the first line of a subprogram: in the text that calls it, in one that has been
-    /// read, or in a file of its name.
-    fn find(&mut self, label: &[u8]) -> Outcome<(usize, usize, u32)> {
-        let here = self.frames.last().map_or(0, |frame| frame.text);
+    /// The first line of a subprogram: in the text that calls it, in one that has been read, or in a file of its name.
+    fn find(&mut self, label: &[u8]) -> Outcome<Cursor> {
+        let here = self.frame().cursor.text;
         for text in std::iter::once(here).chain(0..self.texts.len()) {
-            if let Some(place) = self.sub_in(text, label)? {
-                return Ok(place);
+            if let Some(start) = self.sub_in(text, label)? {
+                return Ok(start);
             }
         }
         let name = String::from_utf8_lossy(label).into_owned();
@@ -344,7 +347,7 @@ impl<'a> Runner<'a> {
         };
         self.texts.push(Text::new(file.clone(), Cow::Owned(bytes)));
         match self.sub_in(self.texts.len() - 1, label) {
-            Ok(Some(place)) => Ok(place),
+            Ok(Some(start)) => Ok(start),
             Ok(None) => {
                 fault!("the file {file} has no subprogram {name}: name it O<{name}> sub there")
             }
@@ -352,17 +355,17 @@ impl<'a> Runner<'a> {
         }
     }
 
-    fn sub_in(&self, text: usize, label: &[u8]) -> Outcome<Option<(usize, usize, u32)>> {
+    fn sub_in(&self, text: usize, label: &[u8]) -> Outcome<Option<Cursor>> {
         let flow = self.texts[text].flow(self.options.block_delete)?;
-        Ok(flow.sub(label).map(|i| (text, flow.steps[i].next, flow.steps[i].line)))
+        Ok(flow.sub(label).map(|i| Cursor { text, at: flow.steps[i].next, line: flow.steps[i].line }))
     }
 
-    /// The text, place and line before the line with a block number, in the program that is run.
-    fn find_line(&self, number: i64, what: &str) -> Outcome<(usize, usize, u32)> {
-        let (here, from) = self.frames.last().map_or((0, 0), |frame| (frame.text, frame.at));
-        let text = &self.texts[here];
-        match text.flow(self.options.block_delete)?.numbered(&text.bytes, number, from) {
-            Some((at, line)) => Ok((here, at, line)),
+    /// The line with a block number, in the program that is run.
+    fn find_line(&self, number: i64, what: &str) -> Outcome<Cursor> {
+        let here = self.frame().cursor;
+        let text = &self.texts[here.text];
+        match text.flow(self.options.block_delete)?.numbered(&text.bytes, number, here.at) {
+            Some((at, line)) => Ok(Cursor { at, line, ..here }),
             None => fault!("{what} line N{number}, which the program does not have"),
         }
     }
@@ -370,9 +373,9 @@ impl<'a> Runner<'a> {
     /// The line of the program that a fault is about, and its sentence, with file and line where these are another's.
     #[cold]
     pub fn place(&self, fault: &Fault) -> (u32, String) {
-        let Some(frame) = self.frames.last() else { return (fault.line.unwrap_or(1), fault.message.clone()) };
-        let line = fault.line.unwrap_or(frame.line).max(1);
-        let within = || format!("in {} line {line}: {}", self.texts[frame.text].name, fault.message);
-        frame.reported.map_or_else(|| (line, fault.message.clone()), |reported| (reported, within()))
+        let Frame { cursor, reported, .. } = *self.frame();
+        let line = fault.line.unwrap_or(cursor.line).max(1);
+        let within = || format!("in {} line {line}: {}", self.texts[cursor.text].name, fault.message);
+        reported.map_or_else(|| (line, fault.message.clone()), |reported| (reported, within()))
     }
 }

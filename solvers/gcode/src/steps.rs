@@ -4,23 +4,16 @@ use super::expression::{bracket, expression};
 use super::fault::Outcome;
 use super::flow::{behind_comments, check_rest, Flow, Step};
 use super::number::integer;
-use super::parameters::LOCALS;
-use super::run::{Exit, Frame, Runner};
+use super::parameters::{Scope, LOCALS};
+use super::run::{Call, Exit, Runner, Target};
 use super::statement::{number_label, Kind};
 use super::words::Lexer;
 
 impl Runner<'_> {
     /// Runs the step `i`; the exit, where it leaves the text.
-    pub fn step(
-        &mut self,
-        lexer: &mut Lexer,
-        source: &[u8],
-        flow: &Flow,
-        i: usize,
-        frame: &mut Frame,
-    ) -> Outcome<Option<Exit>> {
-        let step = &flow.steps[i];
-        let steps = &flow.steps;
+    pub fn step(&mut self, lexer: &mut Lexer, flow: &Flow, i: usize) -> Outcome<Option<Exit>> {
+        let (source, steps) = (lexer.source, &flow.steps);
+        let step = &steps[i];
         let past = |lexer: &mut Lexer, step: &Step| lexer.jump(step.next, step.line);
         let onto = |lexer: &mut Lexer, step: &Step| lexer.jump(step.at, step.line - 1);
         past(lexer, step);
@@ -31,7 +24,7 @@ impl Runner<'_> {
             }
             Kind::EndSub | Kind::Return => {
                 let value = self.value(source, step)?;
-                if self.frames.is_empty() {
+                if self.in_main() {
                     return fault!("return stands outside of subroutines: remove it");
                 }
                 return Ok(Some(Exit::Return(value)));
@@ -53,23 +46,23 @@ impl Runner<'_> {
             Kind::Repeat => {
                 let times = self.needed(source, step)?;
                 match integer(times.round()) {
-                    Some(times @ 1..) => frame.repeats.push((i, times as u64 - 1)),
+                    Some(times @ 1..) => self.repeats().push((i, times as u64 - 1)),
                     _ => past(lexer, &steps[step.partner]),
                 }
             }
-            Kind::EndRepeat => match frame.repeats.last_mut() {
+            Kind::EndRepeat => match self.repeats().last_mut() {
                 Some((_, left)) if *left > 0 => {
                     *left -= 1;
                     past(lexer, &steps[step.partner]);
                 }
                 _ => {
-                    frame.repeats.pop();
+                    self.repeats().pop();
                 }
             },
             Kind::Break | Kind::Continue => {
                 let start = step.partner;
                 let stays = step.kind == Kind::Continue;
-                frame.repeats.retain(|&(open, _)| open < start || (stays && open == start));
+                self.repeats().retain(|&(open, _)| open < start || (stays && open == start));
                 let (first, end) = (&steps[start], &steps[steps[start].end]);
                 match (stays, first.kind) {
                     (false, _) => past(lexer, end),
@@ -77,8 +70,8 @@ impl Runner<'_> {
                     (true, _) => onto(lexer, end),
                 }
             }
-            Kind::When => self.when(lexer, source, flow, step, frame)?,
-            Kind::GoTo => self.go_to(lexer, source, flow, step.arguments, frame)?,
+            Kind::When => self.when(lexer, flow, step)?,
+            Kind::GoTo => self.go_to(lexer, flow, step.arguments)?,
             Kind::EndIf | Kind::Do | Kind::DoWhile | Kind::While => {}
             Kind::Number => return fault!("an O number stands where the program goes on: end it before"),
         }
@@ -127,6 +120,6 @@ impl Runner<'_> {
             at = behind_comments(source, end);
         }
         check_rest(source, at)?;
-        Ok(Exit::Call { label, arguments })
+        Ok(Exit::Call(Target::Label(label), Call { arguments, scope: Scope::Own, times: 1 }))
     }
 }

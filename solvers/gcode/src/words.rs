@@ -27,7 +27,7 @@ pub enum Line {
 
 /// A text, and the place up to which it has been read.
 pub struct Lexer<'a> {
-    source: &'a [u8],
+    pub source: &'a [u8],
     pub at: usize,
     /// 1-based line of the block that was read last.
     pub line: u32,
