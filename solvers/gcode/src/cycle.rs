@@ -15,9 +15,11 @@ use super::tolerance::MOST_REPEATS;
 /// The height above the last depth at which G73 and G83 stop, unless D gives it, in mm: 0.010 inch.
 const PECK_CLEARANCE: f64 = 0.254;
 
-/// One hole: its cycle and heights along the tool axis, in machine coordinates.
+/// One hole: its cycle, the tool axis, and heights along it in machine coordinates.
 struct Hole {
     motion: u16,
+    normal: usize,
+    feed: f64,
     initial: f64,
     /// Retract height and bottom in the numbers of the program; `peck` is in them too.
     own: [f64; 2],
@@ -48,7 +50,7 @@ impl Interpreter<'_> {
             return fault!("word {} is more than {MOST_REPEATS} repetitions: check L", block.word(b'L'));
         }
         self.check_beside(&g_name(motion))?;
-        let hole = self.hole(block, motion)?;
+        let hole = self.hole(block, motion, feed)?;
         if block.has(b'P') && matches!(motion, 730 | 810 | 830 | 850) {
             self.warn_once(Topic::CycleDwell, || {
                 format!(
@@ -100,7 +102,7 @@ impl Interpreter<'_> {
             }
             self.check_reach(&place)?;
             self.rapid(&place)?;
-            self.drill(block, &hole, place, normal, feed)?;
+            self.drill(block, &hole, place)?;
             place[normal] = hole.clear;
         }
         self.state.control = before;
@@ -108,7 +110,7 @@ impl Interpreter<'_> {
     }
 
     /// Heights and words of the cycle; missing ones are as in the block before, if that had the same cycle.
-    fn hole(&mut self, block: &Block, motion: u16) -> Outcome<Hole> {
+    fn hole(&mut self, block: &Block, motion: u16, feed: f64) -> Outcome<Hole> {
         let normal = self.state.normal;
         let unit = self.state.unit();
         let again = self.state.motion == motion;
@@ -171,71 +173,54 @@ impl Interpreter<'_> {
             _ => f64::INFINITY,
         };
         let clear = if self.state.retract_to_initial { retract.max(initial) } else { retract };
-        Ok(Hole { motion, initial, own, retract, bottom, clear, dwell, peck, clearance })
+        Ok(Hole { motion, normal, feed, initial, own, retract, bottom, clear, dwell, peck, clearance })
     }
 
     /// From above the hole down to R, through the cycle and up again.
-    fn drill(
-        &mut self,
-        block: &Block,
-        hole: &Hole,
-        mut place: Point,
-        normal: usize,
-        feed: f64,
-    ) -> Outcome<()> {
-        place[normal] = hole.retract;
-        self.rapid(&place)?;
+    fn drill(&mut self, block: &Block, hole: &Hole, mut place: Point) -> Outcome<()> {
+        let Hole { normal, retract, bottom, clear, .. } = *hole;
+        let mut go = |reader: &mut Self, kind: Kind, height: f64| {
+            place[normal] = height;
+            reader.go(kind, &place, if kind == Kind::Rapid { f64::INFINITY } else { hole.feed })
+        };
+        go(self, Kind::Rapid, retract)?;
         let pecks = ((hole.own[0] - hole.own[1]) / hole.peck).ceil();
         if pecks > f64::from(MOST_REPEATS) {
             return fault!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion));
         }
         // Depths are added in the numbers of the program, so that rounding makes as many pecks as on a control.
         let (unit, zero) = (self.state.unit(), self.state.offsets.sum()[normal]);
-        let [retract, bottom] = hole.own;
-        let mut reached = retract - hole.peck;
-        while reached > bottom {
+        let mut reached = hole.own[0] - hole.peck;
+        while reached > hole.own[1] {
             let depth = reached * unit + zero;
-            self.feed_to(&mut place, normal, depth, feed)?;
+            go(self, Kind::Line, depth)?;
             if hole.motion == 830 {
-                self.rapid_to(&mut place, normal, hole.retract)?;
+                go(self, Kind::Rapid, retract)?;
             }
-            self.rapid_to(&mut place, normal, (depth + hole.clearance).min(hole.retract))?;
+            go(self, Kind::Rapid, (depth + hole.clearance).min(retract))?;
             reached -= hole.peck;
         }
-        self.feed_to(&mut place, normal, hole.bottom, feed)?;
+        go(self, Kind::Line, bottom)?;
+        if matches!(hole.motion, 740 | 820 | 840 | 860 | 890) {
+            self.dwell(block, b'P', hole.dwell)?;
+        }
         match hole.motion {
-            820 => self.dwell(block, b'P', hole.dwell)?,
+            850 => go(self, Kind::Line, retract)?,
             // The spindle stands still on the way up.
             860 => {
-                self.dwell(block, b'P', hole.dwell)?;
                 self.turn_spindle(Spindle::Off);
-                self.rapid_to(&mut place, normal, hole.clear)?;
+                go(self, Kind::Rapid, clear)?;
                 self.turn_spindle(Spindle::AsBefore);
             }
-            850 => self.feed_to(&mut place, normal, hole.retract, feed)?,
-            890 => {
-                self.dwell(block, b'P', hole.dwell)?;
-                self.feed_to(&mut place, normal, hole.clear, feed)?;
-            }
+            890 => go(self, Kind::Line, clear)?,
             // A tap reverses the spindle at the bottom and again at the top.
             740 | 840 => {
-                self.dwell(block, b'P', hole.dwell)?;
                 self.turn_spindle(Spindle::Reversed);
-                self.feed_to(&mut place, normal, hole.clear, feed)?;
+                go(self, Kind::Line, clear)?;
                 self.turn_spindle(Spindle::AsBefore);
             }
             _ => {}
         }
-        self.rapid_to(&mut place, normal, hole.clear)
-    }
-
-    fn feed_to(&mut self, place: &mut Point, normal: usize, height: f64, feed: f64) -> Outcome<()> {
-        place[normal] = height;
-        self.go(Kind::Line, place, feed)
-    }
-
-    fn rapid_to(&mut self, place: &mut Point, normal: usize, height: f64) -> Outcome<()> {
-        place[normal] = height;
-        self.rapid(place)
+        go(self, Kind::Rapid, clear)
     }
 }

@@ -92,7 +92,7 @@ impl Interpreter<'_> {
 
     #[cold]
     fn feed_per_turn(&self, feed: Feed) -> Outcome<Feed> {
-        match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
+        match self.spindle_speed() {
             Some(speed) => {
                 let turns = speed / 60.0;
                 Ok(Feed { linear: feed.linear * turns, angular: feed.angular * turns })
@@ -101,6 +101,11 @@ impl Interpreter<'_> {
                 "the feed is per turn (G95) and the spindle speed is not known: give S and M3 before, or use G94"
             ),
         }
+    }
+
+    /// The turns per minute of the spindle, where it is on and its speed is known.
+    pub fn spindle_speed(&self) -> Option<f64> {
+        self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed))
     }
 
     /// The feed along a move of a length under G93, where F is one over the minutes of the move.

@@ -261,14 +261,8 @@ impl Moves {
     /// The positions and directions from the start of the last change to the end of the last move.
     pub fn since_change(&self) -> Vec<(Point, Direction)> {
         let Some(change) = self.changes.last() else { return vec![(self.position, self.direction)] };
-        let width = self.axes.len();
-        let mut direction = change.direction;
-        let mut later = self.directions.iter().filter(|(row, _)| *row >= change.row).peekable();
-        let mut positions = vec![(change.start, direction)];
-        for (row, target) in self.target.chunks_exact(width).enumerate().skip(change.row) {
-            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
-                direction = next;
-            }
+        let mut positions = vec![(change.start, change.direction)];
+        for (target, direction) in self.directed_rows(change.row) {
             let mut position = change.start;
             for (&axis, &value) in self.axes.iter().zip(target) {
                 position[axis] = value;
@@ -276,6 +270,18 @@ impl Moves {
             positions.push((position, direction));
         }
         positions
+    }
+
+    /// The targets of the rows from `first` on, with the tool directions there.
+    fn directed_rows(&self, first: usize) -> impl Iterator<Item = (&[f64], Direction)> {
+        let mut direction = UPRIGHT;
+        let mut later = self.directions.iter().peekable();
+        self.target.chunks_exact(self.axes.len()).enumerate().skip(first).map(move |(row, target)| {
+            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
+                direction = next;
+            }
+            (target, direction)
+        })
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use super::execute::Spindle;
 use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::moves::Kind;
-use super::tolerance::{MOST_PASSES, RATES};
+use super::tolerance::MOST_PASSES;
 
 /// The heights of a thread along X and its ends along Z, in mm. Depths are from the drive line towards the workpiece.
 struct Thread {
@@ -26,20 +26,14 @@ struct Thread {
 }
 
 impl Interpreter<'_> {
-    /// The feed in mm/s that advances by a pitch in mm in each turn of the spindle.
-    fn feed_of_pitch(&self, pitch: f64, code: &str) -> Outcome<f64> {
-        match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
-            Some(speed) => Ok(pitch * speed / 60.0),
-            None => {
-                fault!("{code} follows the spindle and its speed is not known: give S and M3 before")
-            }
-        }
-    }
-
-    fn pitch(&self, block: &Block, letter: u8, code: &str) -> Outcome<f64> {
-        match block.get(letter) {
-            Some(pitch) if pitch > 0.0 => Ok(pitch * self.state.unit()),
-            _ => fault!("{code} has no pitch: give a positive {}", letter as char),
+    /// The feed in mm/s that advances by the pitch of a word in each turn of the spindle.
+    fn synchronous_feed(&self, block: &Block, letter: u8, code: &str) -> Outcome<f64> {
+        let Some(pitch) = block.get(letter).filter(|&pitch| pitch > 0.0) else {
+            return fault!("{code} has no pitch: give a positive {}", letter as char);
+        };
+        match self.spindle_speed() {
+            Some(speed) => Ok(pitch * self.state.unit() * speed / 60.0),
+            None => fault!("{code} follows the spindle and its speed is not known: give S and M3 before"),
         }
     }
 
@@ -47,8 +41,7 @@ impl Interpreter<'_> {
     pub fn thread_once(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         let code = if motion == 330 { "G33" } else { "G33.1" };
         self.check_beside(code)?;
-        let pitch = self.pitch(block, b'K', code)?;
-        let feed = self.feed_of_pitch(pitch, code)?;
+        let feed = self.synchronous_feed(block, b'K', code)?;
         let start = self.position();
         let target = self.target(block, false)?;
         self.go(Kind::Line, &target, feed)?;
@@ -66,8 +59,7 @@ impl Interpreter<'_> {
         if let Some(letter) = b"XYABCUVW".iter().find(|&&letter| block.has(letter)) {
             return fault!("word {} stands in G76, which goes along Z: remove it", block.word(*letter));
         }
-        let pitch = self.pitch(block, b'P', "G76")?;
-        let feed = self.feed_of_pitch(pitch, "G76")?;
+        let feed = self.synchronous_feed(block, b'P', "G76")?;
         let unit = self.state.unit() * if self.state.diameters { 0.5 } else { 1.0 };
         let word = |letter: u8| block.get(letter).map(|value| value * unit);
         let [Some(peak), Some(first), Some(height)] = [word(b'I'), word(b'J'), word(b'K')] else {

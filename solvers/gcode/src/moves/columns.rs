@@ -160,17 +160,11 @@ impl Moves {
 
     /// Targets, with the tool directions where these have columns.
     fn directed_target(&mut self) -> Vec<f64> {
-        let target = std::mem::take(&mut self.target);
         if !self.points_tool() {
-            return target;
+            return std::mem::take(&mut self.target);
         }
-        let mut direction = UPRIGHT;
-        let mut later = self.directions.iter().peekable();
-        let mut wider = Vec::with_capacity(target.len() / self.axes.len() * (self.axes.len() + 3));
-        for (row, position) in target.chunks_exact(self.axes.len()).enumerate() {
-            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
-                direction = next;
-            }
+        let mut wider = Vec::with_capacity(self.target.len() + 3 * self.kind.len());
+        for (position, direction) in self.directed_rows(0) {
             wider.extend_from_slice(position);
             wider.extend(direction);
         }
