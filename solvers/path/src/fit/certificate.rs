@@ -147,15 +147,13 @@ impl<const M: usize> Step<M> {
             }
             let part_sq = if before == 1 || next <= middle {
                 let half = &halves[before];
-                let part = part_bound_sq(half, x, next, &segment, tolerance_sq, HALVINGS);
+                let part = part_bound_sq(half, x, next, &segment, tolerance_sq);
                 bound_sq[before] = bound_sq[before].max(part).max(off_sq).max(next_off_sq);
                 part
             } else {
                 let at_knot = segment.distance_sq(&halves[0].point(middle));
-                let left =
-                    part_bound_sq(&halves[0], x, middle, &segment, tolerance_sq, HALVINGS).max(at_knot);
-                let right =
-                    part_bound_sq(&halves[1], middle, next, &segment, tolerance_sq, HALVINGS).max(at_knot);
+                let left = part_bound_sq(&halves[0], x, middle, &segment, tolerance_sq).max(at_knot);
+                let right = part_bound_sq(&halves[1], middle, next, &segment, tolerance_sq).max(at_knot);
                 bound_sq[0] = bound_sq[0].max(left).max(off_sq);
                 bound_sq[1] = bound_sq[1].max(right).max(next_off_sq);
                 left.max(right)
@@ -207,29 +205,17 @@ fn part_bound_sq<const M: usize>(
     x1: f64,
     segment: &Segment<M>,
     enough_sq: f64,
-    halvings: u32,
 ) -> f64 {
-    let bound_sq = segment.distance_sq(&half.control(x0, x1));
-    if bound_sq <= enough_sq || halvings == 0 {
+    let middle = half.control(x0, x1);
+    let bound_sq = segment.distance_sq(&middle);
+    if bound_sq <= enough_sq {
         return bound_sq;
     }
-    sharper_sq(half, x0, x1, segment, enough_sq, halvings - 1)
+    sharpen(segment, &half.point(x0), &middle, &half.point(x1), enough_sq, HALVINGS - 1)
 }
 
 #[cold]
 #[inline(never)]
-fn sharper_sq<const M: usize>(
-    half: &Half<M>,
-    x0: f64,
-    x1: f64,
-    segment: &Segment<M>,
-    enough_sq: f64,
-    halvings: u32,
-) -> f64 {
-    let (a, b, c) = (half.point(x0), half.control(x0, x1), half.point(x1));
-    sharpen(segment, &a, &b, &c, enough_sq, halvings)
-}
-
 fn sharpen<const M: usize>(
     segment: &Segment<M>,
     a: &[f64; M],
