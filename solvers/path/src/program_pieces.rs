@@ -42,12 +42,6 @@ impl AddAssign for FitCounts {
     }
 }
 
-/// Consecutive moves that one task turns into pieces.
-enum Task {
-    OneByOne(Range<usize>),
-    Chain(Range<usize>),
-}
-
 impl<const M: usize> Moves<'_, M> {
     /// Whether move `i` is in one chain with the move before.
     fn chained(&self, i: usize) -> bool {
@@ -60,28 +54,26 @@ impl<const M: usize> Moves<'_, M> {
             && self.fit_tolerance[i - 1] == self.fit_tolerance[i]
     }
 
-    fn tasks(&self) -> Vec<Task> {
-        let count = self.kind.len();
-        let mut tasks = Vec::new();
-        let (mut single, mut i) = (0, 0);
-        while i < count {
+    /// Whether consecutive moves, of which all or none are chained, are a chain.
+    fn is_chain(&self, moves: &Range<usize>) -> bool {
+        moves.len() > 1 && self.chained(moves.start + 1)
+    }
+
+    /// All moves in order, cut into chains and into ranges of moves outside of chains.
+    fn tasks(&self) -> Vec<Range<usize>> {
+        let mut tasks: Vec<Range<usize>> = Vec::new();
+        let mut i = 0;
+        while i < self.kind.len() {
             let mut end = i + 1;
-            while end < count && self.chained(end) {
+            while end < self.kind.len() && self.chained(end) {
                 end += 1;
             }
-            let chain = end - i > 1;
-            if (chain || i - single == TASK) && single < i {
-                tasks.push(Task::OneByOne(single..i));
-                single = i;
-            }
-            if chain {
-                tasks.push(Task::Chain(i..end));
-                single = end;
+            let grows = |last: &&mut Range<usize>| end - i == 1 && last.len() < TASK && !self.is_chain(last);
+            match tasks.last_mut().filter(grows) {
+                Some(last) => last.end = end,
+                None => tasks.push(i..end),
             }
             i = end;
-        }
-        if single < count {
-            tasks.push(Task::OneByOne(single..count));
         }
         tasks
     }
@@ -97,15 +89,13 @@ pub fn program_pieces<const M: usize>(
     let parts: Vec<_> = moves
         .tasks()
         .into_par_iter()
-        .map(|task| match task {
-            Task::OneByOne(range) => {
-                each.advance(range.len());
-                one_by_one(moves, options, range)
-            }
-            Task::Chain(range) => {
+        .map(|range| {
+            if moves.is_chain(&range) {
                 let watch = each.part(range.len() as f64);
-                chain(moves, options, range, watch)
+                return chain(moves, options, range, watch);
             }
+            each.advance(range.len());
+            one_by_one(moves, options, range)
         })
         .collect::<Result<_, _>>()?;
     let total = parts.iter().map(|part| part.pieces.len()).sum();
