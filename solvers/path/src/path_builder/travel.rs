@@ -29,44 +29,31 @@ pub fn outside<const M: usize>(
     if travel.iter().flatten().all(|limit| limit.is_infinite()) {
         return None;
     }
-    let beyond = |index: usize, axis: usize, (least, greatest): (f64, f64), bulge: f64| {
-        let [low, high] = travel[axis];
-        let slack = TRAVEL + bulge;
-        if least < low - slack {
-            Some(Outside { index, axis, position: least })
-        } else if greatest > high + slack {
-            Some(Outside { index, axis, position: greatest })
-        } else {
-            None
-        }
-    };
     // Only joints have a travel.
-    let has_travel = |index: usize| moves.joints[index];
+    let limits = |index: usize, axis: usize, slack: f64| match moves.joints[index] {
+        true => [travel[axis][0] - slack, travel[axis][1] + slack],
+        false => [f64::NEG_INFINITY, f64::INFINITY],
+    };
+    let beyond = |index: usize, axis: usize, (least, greatest): (f64, f64), bulge: f64| {
+        let [low, high] = limits(index, axis, TRAVEL + bulge);
+        let position = if least < low { least } else { greatest };
+        (position < low || position > high).then_some(Outside { index, axis, position })
+    };
     let targets = moves.target.par_iter().enumerate().find_map_first(|(index, target)| {
-        if !has_travel(index) {
-            return None;
-        }
         (0..M).find_map(|axis| beyond(index, axis, (target[axis], target[axis]), 0.0))
     });
     let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
-        if !has_travel(index) {
-            return None;
-        }
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
     let curves = chunks.par_iter().find_map_first(|chunk| {
         chunk.pieces.iter().find_map(|piece| {
-            let bulge = if piece.arc { piece.deviation } else { 0.0 };
             let index = piece.first as usize;
-            if !has_travel(index) {
-                return None;
-            }
+            let bulge = if piece.arc { piece.deviation } else { 0.0 };
             (0..M).find_map(|axis| match &piece.shape {
                 Shape::Conic(conic) => beyond(index, axis, conic.extent(axis), bulge),
                 Shape::Spline(spline) => {
-                    let [low, high] = travel[axis];
                     let piece = chunk.spline(spline, moves.splines);
-                    let position = position_outside(&piece, axis, low - TRAVEL, high + TRAVEL, DEPTH)?;
+                    let position = position_outside(&piece, axis, limits(index, axis, TRAVEL), DEPTH)?;
                     Some(Outside { index, axis, position })
                 }
             })
@@ -75,13 +62,12 @@ pub fn outside<const M: usize>(
     [targets, arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
 }
 
-/// A position of an axis on a piece below `low` or above `high`. The control points enclose the piece. If some of them are
+/// A position of an axis on a piece outside of two limits. The control points enclose the piece. If some of them are
 /// beyond and both ends are not, the halves are examined.
 fn position_outside<const M: usize>(
     piece: &Piece<M>,
     axis: usize,
-    low: f64,
-    high: f64,
+    [low, high]: [f64; 2],
     depth: u32,
 ) -> Option<f64> {
     let outside = |value: f64| value < low || value > high;
@@ -97,7 +83,7 @@ fn position_outside<const M: usize>(
     }
     let mut halves = CompositeCurve::default();
     bezier::split(piece, &[0.5 * piece.width], &mut halves);
-    (0..2).find_map(|i| position_outside(&halves.piece(i), axis, low, high, depth - 1))
+    (0..2).find_map(|i| position_outside(&halves.piece(i), axis, [low, high], depth - 1))
 }
 
 #[cfg(test)]
@@ -113,10 +99,10 @@ mod tests {
         bezier::elevate(&parabola.piece(0), 1, &mut curve);
         curve.push(&[[0.0], [2.0], [0.0]], &[1.0, 3.0, 1.0], 1.0);
         for (piece, apex) in curve.pieces().zip([1.0, 1.0, 1.5]) {
-            assert_eq!(position_outside(&piece, 0, -0.1, apex + 1e-9, DEPTH), None);
-            let found = position_outside(&piece, 0, -0.1, apex - 1e-9, DEPTH).unwrap();
+            assert_eq!(position_outside(&piece, 0, [-0.1, apex + 1e-9], DEPTH), None);
+            let found = position_outside(&piece, 0, [-0.1, apex - 1e-9], DEPTH).unwrap();
             assert!(found > apex - 1e-9 && found <= apex);
-            assert_eq!(position_outside(&piece, 0, 0.1, 2.0, DEPTH), Some(0.0));
+            assert_eq!(position_outside(&piece, 0, [0.1, 2.0], DEPTH), Some(0.0));
         }
     }
 }
