@@ -45,11 +45,7 @@ struct CornerRounding<'a, const M: usize> {
 }
 
 /// The stations where a blend begins in the span before the corner and ends in the span after it.
-#[derive(Clone, Copy)]
-struct Cuts {
-    before: f64,
-    after: f64,
-}
+type Cuts = [f64; 2];
 
 /// The pieces with rounded corners, and the first piece of each run, with the number of pieces at the end.
 pub fn round_corners<const M: usize>(
@@ -224,13 +220,13 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
     }
 
     /// Sets `sides` to the pieces on both sides of corner `k` between its cuts.
-    fn cut_sides(&self, k: usize, cuts: Cuts, sides: &mut Sides<M>) {
+    fn cut_sides(&self, k: usize, [begin, end]: Cuts, sides: &mut Sides<M>) {
         let Sides { before, after, made } = sides;
         before.clear();
         after.clear();
         made.clear();
-        self.append_span(k - 1, [cuts.before, f64::INFINITY], true, before, made);
-        self.append_span(k, [0.0, cuts.after], true, after, made);
+        self.append_span(k - 1, [begin, f64::INFINITY], true, before, made);
+        self.append_span(k, [0.0, end], true, after, made);
     }
 
     /// Where the blend of corner `k` begins and ends; None if the tolerance leaves no room for it.
@@ -239,12 +235,12 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         let jump = self.corners[k].jump.as_ref().filter(|jump| !jump.vanishes(length[k]))?;
         let (mut before, mut after) = (length[k], length[k]);
         for _ in 0..TRIALS {
-            let mut cuts = Cuts { before: self.length[k - 1] - before, after };
+            let mut begin = self.length[k - 1] - before;
             // Blends that touch must cut at the same place.
-            if cuts.before - length[k - 1] <= tolerance::TOUCHING * self.length[k - 1] {
-                cuts.before = length[k - 1];
+            if begin - length[k - 1] <= tolerance::TOUCHING * self.length[k - 1] {
+                begin = length[k - 1];
             }
-            cuts = Cuts { before: self.snapped(k - 1, cuts.before), after: self.snapped(k, cuts.after) };
+            let cuts = [self.snapped(k - 1, begin), self.snapped(k, after)];
             self.cut_sides(k, cuts, sides);
             let excess = match sides.between_lines(jump, self.rounding) {
                 Some(corner) => corner.deviation / corner.tolerance,
@@ -285,7 +281,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
                                 sides.bend(turn);
                                 chunk.append(&sides);
                             }
-                            cuts.after
+                            cuts[1]
                         }
                         (_, turn) => {
                             if !(jump && turn.is_some()) {
@@ -294,7 +290,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
                             0.0
                         }
                     };
-                    let end = cuts[k + 1].map_or(f64::INFINITY, |cuts| cuts.before);
+                    let end = cuts[k + 1].map_or(f64::INFINITY, |cuts| cuts[0]);
                     self.append_span(k, [start, end], false, &mut chunk.pieces, &mut chunk.made);
                 }
                 (chunk, runs)
