@@ -5,8 +5,8 @@
 
 use std::f64::consts::TAU;
 
-use super::beside::{distance, minus, Point2};
 use super::fault::Outcome;
+use super::plane::{distance, minus, Point2};
 use super::tolerance::{
     HALF_CHORD, RADIUS_SLACK, SAME_ANGLE, SAME_POINT, SPIRAL_INCH, SPIRAL_MM, SPIRAL_MOST, SPIRAL_RELATIVE,
 };

@@ -7,12 +7,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::beside::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
 use super::block::{g_name, Block};
 use super::coordinates::Point;
 use super::fault::Outcome;
 use super::interpreter::Interpreter;
 use super::moves::{Arc, Kind};
+use super::plane::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
 use super::tolerance::{ENTRY_BEND, NO_CORNER, WHOLE_TURNS};
 
 /// The vector from the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for each of the

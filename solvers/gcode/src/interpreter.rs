@@ -7,9 +7,9 @@ use super::corner::Corner;
 use super::fault::Outcome;
 use super::modal::{Feed, FeedMode, State};
 use super::moves::Moves;
-use super::nurbs::Nurbs;
 use super::options::{Options, Tool};
 use super::parameters::{first_of_system, Parameters, HOME, SECOND_HOME, SYSTEM};
+use super::spline::Nurbs;
 use super::tolerance::{FARTHEST, FARTHEST_TURN};
 
 /// The state of the program between two blocks.

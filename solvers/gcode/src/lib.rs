@@ -4,13 +4,13 @@
 //! for its macros and codes. Text that is not understood is an error with its line and word.
 //!
 //! 1. `read` starts `run`, which takes the lines in the order of the program flow: `statement` reads its keywords, `flow`
-//!    ties them, `steps` follows them, and `macros` has the statements of Fanuc.
+//!    ties them, and `steps` follows them.
 //! 2. `words` reads a line into a `block`, with the arithmetic of `expression` on `parameters` and `readings`.
 //! 3. `intent` finds the motion of the block and checks that each of its words has a use.
 //! 4. `execute` runs the block on the state of the `interpreter` in LinuxCNC's order, with the modes of `modal` and `modes`
 //!    and the zero of `offsets`.
-//! 5. `motion`, `arc`, `spline`, `cycle`, `thread` and `corner` make moves; `compensation` and `beside` offset them by the
-//!    tool's radius; `tip` converts between joints and the tool's tip.
+//! 5. `motion`, `arc`, `spline`, `cycle`, `thread` and `corner` make moves; `compensation` offsets them by the tool's
+//!    radius; `tip` converts between joints and the tool's tip.
 //! 6. `moves` holds the moves, `events` what happens between them; `moves/columns` gives both as columns.
 
 // Its macros are for the modules below.
@@ -19,7 +19,6 @@ mod fault;
 
 mod arc;
 mod arithmetic;
-mod beside;
 mod block;
 mod compensation;
 mod coordinates;
@@ -32,16 +31,15 @@ mod expression;
 mod flow;
 mod intent;
 mod interpreter;
-mod macros;
 mod modal;
 mod modes;
 mod motion;
 mod moves;
 mod number;
-mod nurbs;
 mod offsets;
 mod options;
 mod parameters;
+mod plane;
 mod read;
 mod readings;
 mod run;
