@@ -3,7 +3,6 @@
 mod arrays;
 mod audit;
 mod axes;
-mod bound;
 mod csv;
 mod curve;
 mod curve_length;
@@ -34,7 +33,6 @@ mod _solvers {
     #[pymodule_export]
     use super::{
         audit::audit_plan,
-        bound::lower_bound,
         csv::csv_rows,
         curve::Curve,
         curve_length::CurveLength,
@@ -44,7 +42,7 @@ mod _solvers {
         kinematics::{joint_derivatives, joint_enclosures, joint_interpolants, joint_path, joint_positions},
         moves::Moves,
         path::build_path,
-        plan::{feed_between, look_ahead, plan_bang_bang},
+        plan::{feed_between, look_ahead, lower_bound, plan_bang_bang},
         problem::{PlanError, Problem},
         profile::Profile,
         reduce::{buckets, thin},

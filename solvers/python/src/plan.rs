@@ -1,4 +1,4 @@
-//! The exact planner, from a problem to a profile, and look-ahead over segments.
+//! The exact planner, from a problem to a profile, its lower bound, and look-ahead over segments.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -24,6 +24,21 @@ pub fn plan_bang_bang<'py>(
     with_padded_axes!(problem.axes(), M, {
         let profile = problem.solved::<M, _>(py, progress.as_ref(), |problem| problem.fastest())?;
         Ok(profile.into())
+    })
+}
+
+/// A lower bound in s on the time of every profile of the problem; of `profile` only its division counts.
+#[pyfunction]
+#[pyo3(signature = (problem, profile, progress=None))]
+pub fn lower_bound(
+    py: Python<'_>,
+    problem: Of<Problem>,
+    profile: Of<Profile>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<f64> {
+    let hint = &profile.phases;
+    with_padded_axes!(problem.axes(), M, {
+        problem.solved::<M, _>(py, progress.as_ref(), |problem| problem.lower_bound(hint))
     })
 }
 
