@@ -2,6 +2,10 @@
 
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_geometry::quadratic::{dot, norm};
+use feedplan_geometry::spline::bezier::derivatives;
+use feedplan_geometry::spline::extract::extract;
+use feedplan_geometry::spline::knots::Spline;
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 
 /// A curve C(t) in M axes with its first three derivatives.
@@ -124,12 +128,10 @@ impl Curve<3> for Trefoil {
     }
 }
 
-/// A NURBS curve in the plane.
+/// A NURBS curve in the plane, by its pieces and the parameters at their ends.
 pub struct Nurbs {
-    pub degree: usize,
-    pub knots: Vec<f64>,
-    /// (w x, w y, w)
-    pub points: Vec<[f64; 3]>,
+    pieces: CompositeCurve<2>,
+    pub parameters: Vec<f64>,
 }
 
 impl Nurbs {
@@ -144,63 +146,20 @@ impl Nurbs {
                 .filter_map(|word| word.parse().ok())
                 .collect()
         };
-        let weights = numbers("weights");
+        let (degree, knots, weights) = (numbers("degree")[0] as usize, numbers("knots"), numbers("weights"));
         let points = numbers("control_points");
-        let width = points.len() / weights.len();
-        Self {
-            degree: numbers("degree")[0] as usize,
-            knots: numbers("knots"),
-            points: points
-                .chunks(width)
-                .zip(&weights)
-                .map(|(point, &w)| [point[0] * w, point[1] * w, w])
-                .collect(),
-        }
-    }
-
-    /// The parameters at the ends of pieces.
-    pub fn parameters(&self) -> Vec<f64> {
-        let mut out = self.knots[self.degree..self.knots.len() - self.degree].to_vec();
-        out.dedup();
-        out
+        let control = points.chunks(points.len() / weights.len()).map(|point| [point[0], point[1]]).collect();
+        let mut parameters = knots[degree..knots.len() - degree].to_vec();
+        parameters.dedup();
+        let spline = Spline::new(degree, knots, control, weights).expect("a spline");
+        Self { pieces: extract(&spline).expect("one curve"), parameters }
     }
 }
 
 impl Curve<2> for Nurbs {
     fn at(&self, t: f64) -> [[f64; 2]; 4] {
-        let (p, u) = (self.degree, &self.knots);
-        let span = u.partition_point(|&knot| knot <= t).clamp(p + 1, self.points.len()) - 1;
-        let mut rows: [[f64; 3]; 4] = [[0.0; 3]; 4];
-        for order in 0..=3.min(p) {
-            // Control points of the derivative, then de Boor's algorithm on them.
-            let mut d = [[0.0; 3]; 8];
-            d[..=p].copy_from_slice(&self.points[span - p..=span]);
-            for level in 1..=order {
-                let q = p - level + 1;
-                for i in 0..q {
-                    let at = span - p + level + i;
-                    let width = u[at + q] - u[at];
-                    d[i] = std::array::from_fn(|k| q as f64 * (d[i + 1][k] - d[i][k]) / width);
-                }
-            }
-            let q = p - order;
-            for level in 1..=q {
-                for i in (level..=q).rev() {
-                    let at = span - q + i;
-                    let part = (t - u[at]) / (u[at + q + 1 - level] - u[at]);
-                    d[i] = std::array::from_fn(|k| d[i - 1][k] + part * (d[i][k] - d[i - 1][k]));
-                }
-            }
-            rows[order] = d[q];
-        }
-        let w: [f64; 4] = std::array::from_fn(|k| rows[k][2]);
-        let mut c = [[0.0; 2]; 4];
-        for k in 0..2 {
-            c[0][k] = rows[0][k] / w[0];
-            c[1][k] = (rows[1][k] - w[1] * c[0][k]) / w[0];
-            c[2][k] = (rows[2][k] - 2.0 * w[1] * c[1][k] - w[2] * c[0][k]) / w[0];
-            c[3][k] = (rows[3][k] - 3.0 * w[1] * c[2][k] - 3.0 * w[2] * c[1][k] - w[3] * c[0][k]) / w[0];
-        }
-        c
+        let inner = &self.parameters[1..self.parameters.len() - 1];
+        let i = inner.partition_point(|&knot| knot <= t);
+        derivatives(&self.pieces.piece(i), t - self.parameters[i])
     }
 }

@@ -16,11 +16,8 @@ impl Geometry<PADDED> for Path<'_> {
     }
 }
 
-/// Calls a function with the same problem on a path of any kind.
-fn with<G: Geometry<M>, const M: usize, T>(
-    problem: &Problem<G, M>,
-    call: impl FnOnce(&Problem<Path, PADDED>) -> T,
-) -> T {
+/// `jerk_limited::plan`.
+pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let at = |piece, s| {
         let PathPoint { first, second, third, speed_cap } = problem.geometry.at(piece, s);
         let [first, second, third] = [first, second, third].map(|values| padded(&values, 0.0));
@@ -33,10 +30,6 @@ fn with<G: Geometry<M>, const M: usize, T>(
         jerk: padded(jerk, 1.0),
     };
     let geometry = Path(Box::new(at), problem.geometry.knots());
-    call(&Problem { geometry: &geometry, limits, caps: problem.caps, ends: problem.ends })
-}
-
-/// `jerk_limited::plan`.
-pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
-    with(problem, |problem| jerk_limited::plan(problem, effort))
+    let padded = Problem { geometry: &geometry, limits, caps: problem.caps, ends: problem.ends };
+    jerk_limited::plan(&padded, effort)
 }
