@@ -55,8 +55,7 @@ impl Flow {
         let (mut at, mut line) = (0, 0);
         while at < source.len() {
             line += 1;
-            let end = end_of_line(source, at);
-            let next = after_line(source, end);
+            let next = after_line(source, at);
             if let Some(first) = first_letter(source, at, delete) {
                 if let Some(step) = step_at(source, first, next, line)? {
                     flow.steps.push(step);
@@ -275,7 +274,7 @@ fn numbered_lines(source: &[u8]) -> Vec<(i64, usize, u32)> {
                 lines.push((number, at, line));
             }
         }
-        at = after_line(source, end_of_line(source, at));
+        at = after_line(source, at);
         line += 1;
     }
     lines.sort_unstable();

@@ -68,8 +68,9 @@ pub fn end_of_line(source: &[u8], at: usize) -> usize {
     at + rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(rest.len())
 }
 
-/// The place after the line end at `end`.
-pub fn after_line(source: &[u8], end: usize) -> usize {
+/// The place after the line that a place is in.
+pub fn after_line(source: &[u8], at: usize) -> usize {
+    let end = end_of_line(source, at);
     end + if source.get(end..).is_some_and(|rest| rest.starts_with(b"\r\n")) { 2 } else { 1 }
 }
 

@@ -180,7 +180,7 @@ impl<'a> Lexer<'a> {
                 b'/' if first => {
                     at += 1;
                     if self.delete {
-                        self.at = after_line(self.source, end_of_line(self.source, at));
+                        self.at = after_line(self.source, at);
                         return Ok(Some(Line::Deleted));
                     }
                     // Controls number their switches /1 to /9.
@@ -190,7 +190,7 @@ impl<'a> Lexer<'a> {
                 }
                 // Text behind it is a comment, as on controls.
                 b'%' if first && !self.source[at..].starts_with(b"%_N_") => {
-                    self.at = after_line(self.source, end_of_line(self.source, at));
+                    self.at = after_line(self.source, at);
                     return Ok(Some(Line::Percent));
                 }
                 b'@' | b'^' if block.polar[usize::from(byte == b'^')].is_none() => {
