@@ -29,7 +29,7 @@ pub fn rows<const M: usize>(array: &Table) -> PyResult<Vec<[f64; M]>> {
 
 /// The same with `rest` for the axes beyond m.
 pub fn rows_with<const M: usize>(array: &Table, rest: f64) -> PyResult<Vec<[f64; M]>> {
-    let flat = array.as_slice().map_err(|_| contiguous())?;
+    let flat = array.as_slice()?;
     let axes = array.shape()[1];
     Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
 }
@@ -41,7 +41,7 @@ pub fn padded_rows<const M: usize>(flat: &[f64], axes: usize) -> Vec<[f64; M]> {
 
 /// An (m,) array as one row of M ≥ m axes, those beyond m at `rest`.
 pub fn row<const M: usize>(array: &Column, rest: f64) -> PyResult<[f64; M]> {
-    let flat = array.as_slice().map_err(|_| contiguous())?;
+    let flat = array.as_slice()?;
     if flat.len() > M {
         return Err(PyValueError::new_err(format!("{} values where {M} axes are", flat.len())));
     }
@@ -67,8 +67,4 @@ pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
         flat.truncate(count * axes);
     }
     PyArray1::from_vec(py, flat).reshape([count, axes]).expect("n × axes values")
-}
-
-fn contiguous() -> PyErr {
-    PyValueError::new_err("arrays must be C-contiguous float64")
 }

@@ -120,7 +120,7 @@ impl PySampler {
 
     /// The states at times of the plan's own clock.
     fn at<'py>(&self, py: Python<'py>, times: Column<'_>) -> PyResult<Bound<'py, PyTuple>> {
-        let times = slice(&times)?;
+        let times = times.as_slice()?;
         with_padded_axes!(
             self.sampler.axes,
             M,
@@ -135,7 +135,7 @@ impl PySampler {
         piece: Column<'_, u32>,
         u: Column<'_>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let (piece, u) = (slice(&piece)?, slice(&u)?);
+        let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         if piece.len() != u.len() {
             return Err(PyValueError::new_err(format!("{} pieces and {} parameters", piece.len(), u.len())));
         }
@@ -143,8 +143,4 @@ impl PySampler {
             self.states::<M>(py, |sampler, watch| sampler.states_along(piece, u, watch))
         })
     }
-}
-
-fn slice<'a, T: numpy::Element>(array: &'a Column<'_, T>) -> PyResult<&'a [T]> {
-    array.as_slice().map_err(|_| PyValueError::new_err("arrays must be C-contiguous"))
 }
