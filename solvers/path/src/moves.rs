@@ -83,15 +83,18 @@ pub enum MoveFault {
     Spline,
 }
 
+/// What a list that ascends by moves has for move `i`.
+pub fn of_move<T>(list: &[(usize, T)], i: usize) -> Option<&T> {
+    list.binary_search_by_key(&i, |row| row.0).ok().map(|row| &list[row].1)
+}
+
 impl<const M: usize> Moves<'_, M> {
     /// Where move `i` begins.
     pub fn origin(&self, i: usize) -> [f64; M] {
-        if let Ok(row) = self.changes.binary_search_by_key(&i, |change| change.0) {
-            self.changes[row].1
-        } else if i == 0 {
-            self.start
-        } else {
-            self.target[i - 1]
+        match (of_move(self.changes, i), i) {
+            (Some(start), _) => *start,
+            (None, 0) => self.start,
+            (None, _) => self.target[i - 1],
         }
     }
 
@@ -130,17 +133,15 @@ impl<const M: usize> Moves<'_, M> {
 
     /// The arc of move `i`.
     fn arc(&self, i: usize) -> Result<Arc<M>, MoveError> {
-        let row = self.arcs.binary_search_by_key(&i, |arc| arc.0);
-        let row = row.map_err(|_| MoveError { index: i, fault: MoveFault::Arc(ArcError::Sweep) })?;
-        let ArcShape { plane, centre, sweep } = self.arcs[row].1;
+        let none = MoveError { index: i, fault: MoveFault::Arc(ArcError::Sweep) };
+        let ArcShape { plane, centre, sweep } = *of_move(self.arcs, i).ok_or(none)?;
         Ok(Arc { start: self.origin(i), end: self.target[i], centre, plane, sweep })
     }
 
     /// The pieces of spline move `i` that have a length, with widths whose sum is about the length of the spline.
     pub fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, MoveError> {
-        let row = self.spline_moves.binary_search_by_key(&i, |spline| spline.0);
-        let row = row.map_err(|_| MoveError { index: i, fault: MoveFault::Spline })?;
-        let range = self.spline_moves[row].1.clone();
+        let none = MoveError { index: i, fault: MoveFault::Spline };
+        let range = of_move(self.spline_moves, i).ok_or(none)?.clone();
         let sum = |length: f64, width: f64, piece: usize| {
             let piece = self.splines.piece(piece);
             let polygon = piece.control.windows(2).map(|pair| norm(&sub(&pair[1], &pair[0]))).sum::<f64>();

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::chords::{Chord, Chords};
 use super::chunk::Chunk;
 use super::{Axes, BuiltPath, NotSmooth};
-use crate::moves::{MoveError, Moves, PathOptions, RAPID};
+use crate::moves::{of_move, MoveError, Moves, PathOptions, RAPID};
 use crate::path_piece::{PathPiece, Shape};
 use crate::program_pieces::FitCounts;
 use crate::smooth_fit::pace::{Moment, Pace};
@@ -130,7 +130,7 @@ fn sections<const M: usize>(moves: &Moves<M>, crawl: f64) -> Vec<Range<usize>> {
             && !moves.halt[i - 1]
             && (moves.tolerance[i - 1] > 0.0) == (moves.tolerance[i] > 0.0)
             && !(is_rapid(i - 1) && crawls(i) || crawls(i - 1) && is_rapid(i))
-            && moves.changes.binary_search_by_key(&i, |change| change.0).is_err();
+            && of_move(moves.changes, i).is_none();
         if !goes_on {
             sections.push(first..i);
             first = i;
