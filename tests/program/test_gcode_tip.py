@@ -15,6 +15,7 @@ from feedplan.machine.path_derivatives import positions
 from feedplan.machine.rotary import RotaryChain
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
+from feedplan.program.tools import Tool
 
 FIVE_AXES = ["trunnion-ac", "trunnion-bc", "head-table", "head-head"]
 
@@ -127,6 +128,22 @@ def test_a_length_that_is_not_known_is_the_machine_files_with_a_warning() -> Non
     assert np.isnan(program.tool_length).all()
     (warning,) = program.warnings
     assert warning.startswith("line 2: the tool length that G43.4 calls for is not known: the machine file's")
+
+
+def test_the_length_of_a_tool_of_the_table_is_known() -> None:
+    lengths = {1: (0.0, 0.0, 80.0), 2: (5.0, 0.0, 30.0)}
+    tools = [Tool(number, number, (*offset, *[0.0] * 6), 0.0, 0) for number, offset in lengths.items()]
+    machine = Machine.load("trunnion-ac")
+    by_name = read_gcode("G21 F600\nG0 Z300\nG43.4 H1\nG1 X5\nM2\n", machine, tools=tools)
+    in_force = read_gcode("G21 F600\nG0 Z300\nG43 H1\nG43.4\nG1 X5\nM2\n", machine, tools=tools)
+    assert by_name.warnings == in_force.warnings == ()
+    assert by_name.tool_length is not None
+    assert by_name.tool_length[1] == 80
+    assert by_name.change_start.tolist() == in_force.change_start.tolist() == [[0, 0, 220, 0, 0]]
+    with pytest.raises(ProgramError, match="line 2: G43.4 works with a tool length in Z and X has one too"):
+        read_gcode("G21\nG43.4 H2\nG0 X5\nM2\n", machine, tools=tools)
+    with pytest.raises(ProgramError, match="line 2: the tool table has no tool 3"):
+        read_gcode("G21\nG43.4 H3\nG0 X5\nM2\n", machine, tools=tools)
 
 
 def test_a_change_before_the_first_move_starts_at_the_joints_zero() -> None:

@@ -188,15 +188,19 @@ impl Interpreter<'_> {
         self.set_system(block)
     }
 
-    /// G43.4 and G43.5: axis words are the tip, without the tool length. The length is the one in force, unless H names
-    /// another tool.
+    /// G43.4 and G43.5: axis words are the tip, without the tool length. The length is the one in force, or that of the tool
+    /// which H names.
     fn program_tip(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let mode = if code == 434 { CoordinateMode::Tip } else { CoordinateMode::Vector };
-        let tool = &mut self.state.offsets.tool;
-        let length = match (block.has(b'H'), self.state.coordinate_mode) {
-            (false, CoordinateMode::Joints) if tool[2] != 0.0 => tool[2],
-            (true, _) | (_, CoordinateMode::Joints) => f64::NAN,
-            (false, _) => self.state.tool_length,
+        let named = block.has(b'H');
+        let in_table = named && self.tools.is_some();
+        let tool = if in_table { self.length_of_tool(block)? } else { self.state.offsets.tool };
+        let length = match self.state.coordinate_mode {
+            _ if in_table => tool[2],
+            _ if named => f64::NAN,
+            CoordinateMode::Joints if tool[2] != 0.0 => tool[2],
+            CoordinateMode::Joints => f64::NAN,
+            _ => self.state.tool_length,
         };
         if let Some(axis) = [0, 1].into_iter().chain(3..9).find(|&axis| tool[axis] != 0.0) {
             return fault!(
@@ -205,7 +209,7 @@ impl Interpreter<'_> {
                 AXES[axis] as char
             );
         }
-        *tool = [0.0; 9];
+        self.state.offsets.tool = [0.0; 9];
         if length.is_nan() {
             self.warn_once(Topic::NoToolLength, || {
                 format!(
