@@ -2,6 +2,8 @@
 
 mod at_once;
 
+use at_once::Tool;
+
 use super::columns::Columns;
 use super::curve::sagitta;
 use super::deviation::{allowed, enough, settled, window};
@@ -26,20 +28,30 @@ pub struct Comparison<'a, const M: usize> {
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
+    /// Of joints, at the rows that are looked at at once.
+    tool: Tool<M>,
 }
 
 impl<'a, const M: usize> Comparison<'a, M> {
     pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let columns = plan.columns(limits);
-        Self { plan, limits, columns, near: Neighbours::default(), piece: None }
+        Self { plan, limits, columns, near: Neighbours::default(), piece: None, tool: Tool::default() }
     }
 
     /// Which rows change nothing but by their distance from the program; see `at_once`.
-    pub fn settled(&self, rows: &[Row<M>], unsure: &[f64; COUNT], tally: &Tally<M>) -> [bool; COUNT] {
-        match self.columns.are_axes() {
-            true => at_once::settled(self.plan, self.limits, rows, unsure, tally),
-            false => [false; COUNT],
+    pub fn settled(&mut self, rows: &[Row<M>], unsure: &[f64; COUNT], tally: &Tally<M>) -> [bool; COUNT] {
+        let Self { plan, limits, columns, tool: Tool { tip, feed }, .. } = self;
+        let has_tool = !columns.are_axes();
+        if has_tool {
+            tip.clear();
+            feed.clear();
+            for row in rows {
+                let (at, limit) = columns.fed_tip(row.nearest.place);
+                tip.push(at);
+                feed.push(limit);
+            }
         }
+        at_once::settled((plan, has_tool.then_some(&self.tool)), limits, rows, unsure, tally)
     }
 
     /// What one setpoint shows: its distance from the path, and what it records.

@@ -6,8 +6,11 @@ use std::rc::Rc;
 use super::curve::{Curve, Curves, Followed};
 use super::joints::columns::JointColumns;
 use super::joints::path::JointPath;
+use super::nearest;
+use super::number::Lanes;
 use super::station::{Place, Rounded, Roundings, Station};
-use super::vectors::{from_to, length, vector_of};
+use super::together::Together;
+use super::vectors::{from_to, length, times, vector_of};
 use super::{Check, Limits, Sided, EPS, FEEDS, ROUNDINGS};
 
 /// The speed that chord errors are about, beside those that feeds are about.
@@ -60,6 +63,25 @@ impl<'a, const M: usize> Columns<'a, M> {
     /// The tool's path on a piece, and what each of its axes counts in its length.
     pub fn curve(&mut self, piece: usize) -> &Rc<Curve<M>> {
         self.curves.get(piece)
+    }
+
+    /// The columns at several places at once of a piece that has no weights.
+    pub fn together(&mut self, piece: usize) -> Option<Together<'a, M>> {
+        let bend = self.bend(piece);
+        let curve = self.curves.get(piece);
+        if curve.polygon.is_rational() {
+            return None;
+        }
+        let (scale, joints) = match &mut self.joints {
+            Some(joints) => (Some(joints.of.scale()), Some(joints.piece(piece, curve))),
+            None => (None, None),
+        };
+        Some(Together { curve: curve.clone(), joints, scale, bend })
+    }
+
+    /// Room for what joints are made of at several places at once.
+    pub fn room(&self) -> Vec<Lanes> {
+        self.joints.as_ref().map_or(Vec::new(), |joints| joints.of.room([0.0; 8]))
     }
 
     pub fn scale(&self) -> [f64; M] {
@@ -190,6 +212,15 @@ impl<'a, const M: usize> Columns<'a, M> {
             true => *q,
             false => self.curves.get(piece).at(u),
         }
+    }
+
+    /// The tool of joints at a place, in the axes whose motion the feed of its piece limits, and that feed; it is not a number where it
+    /// limits a turn.
+    pub fn fed_tip(&mut self, nearest::Place { piece, u }: nearest::Place) -> ([f64; M], f64) {
+        let curve = self.curves.get(piece);
+        let (tip, Some(joints)) = (curve.at(u), &mut self.joints) else { return ([0.0; M], f64::NAN) };
+        let (counts, feed) = (joints.piece(piece, curve).fed_axes(), joints.of.feed[piece]);
+        counts.map_or((tip, f64::NAN), |counts| (times(&counts, &tip), feed))
     }
 
     /// The straight way of the tool that a feed limits between two places of a piece.

@@ -305,6 +305,14 @@ impl<const M: usize> Curve<M> {
         by_width(self.hodographs.polynomial_rates(t, rest), self.per_width)
     }
 
+    /// C and its first three derivatives on a piece without weights, at one u or at several.
+    #[inline(always)]
+    pub fn polynomial_jet<T: Number>(&self, u: T) -> [[T; M]; 4] {
+        let (t, rest) = self.parts(u);
+        let [first, second, third] = by_width(self.hodographs.polynomial_rates(t, rest), self.per_width);
+        [self.hodographs.polynomial_point(t, rest), first, second, third]
+    }
+
     /// C and C' on a piece without weights, at one u or at several.
     #[inline(always)]
     pub fn polynomial_place<T: Number>(&self, u: T) -> [[T; M]; 2] {
@@ -313,11 +321,16 @@ impl<const M: usize> Curve<M> {
         [point, scaled(slope, self.per_width)]
     }
 
-    /// The length of C' on a piece without weights, at one u or at several.
+    /// The length of C' on a piece without weights, at one u or at several; each axis times its scale, if there is one.
     #[inline(always)]
-    pub fn polynomial_speed<T: Number>(&self, u: T) -> T {
+    pub fn polynomial_speed<T: Number>(&self, u: T, scale: Option<&[f64; M]>) -> T {
         let (t, rest) = self.parts(u);
-        let slope = scaled(self.hodographs.polynomial_slope(t, rest), self.per_width);
+        let mut slope = scaled(self.hodographs.polynomial_slope(t, rest), self.per_width);
+        if let Some(scale) = scale {
+            for k in 0..M {
+                slope[k] = slope[k] * scale[k];
+            }
+        }
         inner(&slope, &slope).root()
     }
 

@@ -177,11 +177,17 @@ impl<const M: usize> Hodographs<M> {
     /// C and dC/dt of such a piece.
     #[inline(always)]
     pub fn polynomial_place<T: Number>(&self, t: T, rest: T) -> [[T; M]; 2] {
+        [self.polynomial_point(t, rest), self.polynomial_slope(t, rest)]
+    }
+
+    /// C of such a piece.
+    #[inline(always)]
+    pub fn polynomial_point<T: Number>(&self, t: T, rest: T) -> [T; M] {
         let mut point = with_degree!(self.degree, n, sum(&self.rows[0][..=n], t, rest));
         for k in 0..M {
             point[k] = point[k] + self.start[k];
         }
-        [point, self.polynomial_slope(t, rest)]
+        point
     }
 
     /// The first three derivatives by t.

@@ -5,7 +5,7 @@
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
 //! The path: `vectors`, `number`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
-//! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics). The profile: `phases`, `phase_order`, `quadrature`,
+//! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics), `together` (at several places at once). The profile: `phases`, `phase_order`, `quadrature`,
 //! `phase_motion`, `speed_by_length`, `bulge`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
 //! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Loops: `parallel`. Other crates call `kernels`.
 
@@ -42,6 +42,7 @@ mod rows;
 pub mod setpoints;
 mod speed_by_length;
 mod station;
+mod together;
 pub mod tracking;
 mod vectors;
 

@@ -2,7 +2,10 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use fearless_simd::{f64x8, Simd, SimdBase, SimdFloat};
+use fearless_simd::{f64x8, Select, Simd, SimdBase, SimdFloat};
+
+/// Eight numbers in memory.
+pub type Lanes = [f64; 8];
 
 /// One number or eight. No product is fused with a sum, so that results are the same on every processor.
 pub trait Number:
@@ -14,15 +17,40 @@ pub trait Number:
     + Mul<f64, Output = Self>
     + Div<Output = Self>
 {
+    /// How it is kept in memory.
+    type Kept: Copy;
+    fn kept(self) -> Self::Kept;
+    /// What is kept, where `self` has its places.
+    fn taken(self, kept: &Self::Kept) -> Self;
     /// The same number in all places, where `self` has its places.
     fn filled(self, value: f64) -> Self;
     fn smaller(self, other: Self) -> Self;
     fn greater(self, other: Self) -> Self;
     fn size(self) -> Self;
     fn root(self) -> Self;
+    /// The nearest integer.
+    fn rounded(self) -> Self;
+    /// `other` where `of` is not finite.
+    fn where_finite(self, of: Self, other: f64) -> Self;
+    /// Sine and cosine of an angle in radians.
+    fn wave(self) -> [Self; 2];
+    /// The angle in radians of the vector (x, self).
+    fn angle(self, x: Self) -> Self;
 }
 
 impl Number for f64 {
+    type Kept = f64;
+
+    #[inline(always)]
+    fn kept(self) -> f64 {
+        self
+    }
+
+    #[inline(always)]
+    fn taken(self, kept: &f64) -> f64 {
+        *kept
+    }
+
     #[inline(always)]
     fn filled(self, value: f64) -> Self {
         value
@@ -47,9 +75,46 @@ impl Number for f64 {
     fn root(self) -> Self {
         self.sqrt()
     }
+
+    #[inline(always)]
+    fn rounded(self) -> Self {
+        self.round()
+    }
+
+    #[inline(always)]
+    fn where_finite(self, of: Self, other: f64) -> Self {
+        if of.is_finite() {
+            self
+        } else {
+            other
+        }
+    }
+
+    #[inline(always)]
+    fn wave(self) -> [Self; 2] {
+        let (sine, cosine) = self.sin_cos();
+        [sine, cosine]
+    }
+
+    #[inline(always)]
+    fn angle(self, x: Self) -> Self {
+        self.atan2(x)
+    }
 }
 
 impl<S: Simd> Number for f64x8<S> {
+    type Kept = Lanes;
+
+    #[inline(always)]
+    fn kept(self) -> Lanes {
+        self.into()
+    }
+
+    #[inline(always)]
+    fn taken(self, kept: &Lanes) -> Self {
+        Self::from_slice(self.simd, kept)
+    }
+
     #[inline(always)]
     fn filled(self, value: f64) -> Self {
         Self::splat(self.simd, value)
@@ -73,6 +138,36 @@ impl<S: Simd> Number for f64x8<S> {
     #[inline(always)]
     fn root(self) -> Self {
         self.sqrt()
+    }
+
+    #[inline(always)]
+    fn rounded(self) -> Self {
+        self.round()
+    }
+
+    #[inline(always)]
+    fn where_finite(self, of: Self, other: f64) -> Self {
+        // 0 times what is not finite is no number.
+        (of * 0.0).simd_eq(of.filled(0.0)).select(self, of.filled(other))
+    }
+
+    #[inline(always)]
+    fn wave(self) -> [Self; 2] {
+        let (angles, mut sines, mut cosines) = (self.kept(), [0.0; 8], [0.0; 8]);
+        for i in 0..8 {
+            (sines[i], cosines[i]) = angles[i].sin_cos();
+        }
+        [self.taken(&sines), self.taken(&cosines)]
+    }
+
+    #[inline(always)]
+    fn angle(self, x: Self) -> Self {
+        let (y, x) = (self.kept(), x.kept());
+        let mut angles = [0.0; 8];
+        for i in 0..8 {
+            angles[i] = y[i].atan2(x[i]);
+        }
+        self.taken(&angles)
     }
 }
 

@@ -5,6 +5,7 @@ mod at_once;
 use super::columns::Columns;
 use super::motion::{Motion, Passage};
 use super::nearest::Place;
+use super::number::Lanes;
 use super::phases::SPEED_CUBIC;
 use super::profile_clock::ProfileClock;
 use super::station::Rounded;
@@ -35,13 +36,16 @@ pub struct Reader<'a, const M: usize> {
     last: Option<(Place, Passage<M>)>,
     /// The places that come next, the last one first; the phase of each, and what the profile does there.
     ahead: Vec<(Place, usize, Passage<M>)>,
+    room: Vec<Lanes>,
 }
 
 impl<'a, const M: usize> Reader<'a, M> {
     /// On the first phase; there must be one, and a run of the path for it.
     pub fn new(clock: &ProfileClock<'a>, mut columns: Columns<'a, M>) -> Self {
         let motion = (0, Motion::new(&clock.phases, 0, &mut columns));
-        let mut reader = Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None, ahead: vec![] };
+        let room = columns.room();
+        let mut reader =
+            Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None, ahead: vec![], room };
         reader.enter(0);
         reader
     }
@@ -102,10 +106,9 @@ impl<'a, const M: usize> Reader<'a, M> {
             }
         }
         let Some((place, ..)) = self.ahead.first() else { return };
-        let curve = self.columns.curve(place.piece).clone();
-        match self.columns.are_axes() && !curve.polygon.is_rational() {
-            true => at_once::read(&curve, &phases, &mut self.ahead),
-            false => self.ahead.clear(),
+        match self.columns.together(place.piece) {
+            Some(on) => at_once::read(&on, &phases, &mut self.ahead, &mut self.room),
+            None => self.ahead.clear(),
         }
         self.ahead.reverse();
     }

@@ -193,7 +193,7 @@ impl<const M: usize> View<'_, M> {
             false => [f64::NAN; at_once::COUNT],
         };
         let window = &self.differences.rows[rows.start.saturating_sub(at_once::BEFORE)..rows.end];
-        let settled = match &comparison {
+        let settled = match &mut comparison {
             Some(comparison) if rows.start >= at_once::BEFORE => comparison.settled(window, &unsure, tally),
             _ => [false; at_once::COUNT],
         };
@@ -374,6 +374,7 @@ impl<const M: usize> View<'_, M> {
 mod tests {
     use super::*;
     use crate::curve::{Followed, Pieces};
+    use crate::joints::path::{JointPath, Words};
     use crate::nearest::Place;
     use crate::phases::{Phases, FEED};
     use crate::profile_clock::ProfileClock;
@@ -382,12 +383,12 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(500))]
+        #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
         fn rows_that_are_looked_at_at_once_show_what_they_show_one_after_the_other(
             broken in 0..600_usize, what in 0..14_u8, by in -1.0..1.0_f64,
-            travels: bool, records: bool, has_plan: bool,
+            travels: bool, records: bool, has_plan: bool, has_joints: bool, has_chord: bool,
         ) {
             // Two axes that swing, one row broken in some way or none; from row 300 on they are on the next piece.
             let mut rows: Vec<Row<3>> = (0..600)
@@ -434,7 +435,9 @@ mod tests {
             let sided = |limit: f64| Sided { positive: [limit; 3], negative: [0.9 * limit; 3] };
             let mut limits = Limits { axes: 2, velocity: sided(12.0), acceleration: sided(150.0), ..Limits::none() };
             limits.jerk = [1000.0, f64::INFINITY, 0.0];
-            limits.chord_tolerance = 1e-5;
+            if has_chord {
+                limits.chord_tolerance = 1e-5;
+            }
             if travels {
                 limits.travel[0] = [-1.0, 2.0];
             }
@@ -448,11 +451,14 @@ mod tests {
             };
             let any = f64::INFINITY;
             let feed = [10.0, any, any, any, 12.0, 15.0, any, any];
-            let path = Followed { feed: &feed, line: &[1, 2], tolerance: &[0.0; 2], ..Followed::of_one(pieces) };
+            let path = Followed { feed: &feed, line: &[1, 2], tolerance: &[0.0; 2], runs: &[0, 2], ..Followed::of_one(pieces) };
             let (kind, axis, value, u, p) = ([FEED], [255], [100.0], [0.0, 3.0], [100.0; 2]);
             let phases = Phases::of_one(&kind, &axis, &value, &u, &p);
             let profile = Some(ProfileClock { phases, starts: &[0.0, 0.3], run_starts: &[0.0] });
-            let plan = Plan { path, profile, program: None, deviation: 0.0, joints: None };
+            let (words, feed) = (Words::polar(), [10.0, 12.0]);
+            let joints = JointPath::of_one(path, &words, &feed);
+            let joints = has_joints.then_some(&joints);
+            let plan = Plan { path, profile, program: None, deviation: 0.0, joints };
             let stream = Stream::new(limits, 1e-9);
             let view = View { differences: stream.differences(&rows), plan: has_plan.then_some(&plan) };
             let (mut found, mut wanted) = (Tally::default(), Tally::default());

@@ -6,6 +6,7 @@
 //! q_sss = (C''' − 3 C''ₜ/g (C'' − C''ₜ T) − (C'''ₜ + |C'' − C''ₜ T|²/g) T)/g³.
 
 use super::curve::Curve;
+use super::joints::formula::Jet;
 use super::number::{inner, scaled, Number};
 use super::speed_by_length::Pace;
 use super::vectors::vector_of;
@@ -72,29 +73,6 @@ impl<const M: usize> Station<M> {
         (station.slope > STILL * curve.size_lengths()[0]).then_some(station)
     }
 
-    /// Of joints by their first three derivatives by u and g with its first two:
-    /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³.
-    pub fn of_joints(
-        u: f64,
-        [q1, q2, q3]: [&[f64; M]; 3],
-        [g, dg, ddg]: [f64; 3],
-        [tip, curvature]: [f64; 2],
-    ) -> Self {
-        let per = 1.0 / g;
-        let turn = dg * per;
-        let bend = 3.0 * turn * turn - ddg * per;
-        let (per2, per3) = (per * per, per * per * per);
-        Self {
-            u,
-            slope: g,
-            tip,
-            curvature,
-            first: vector_of(|k| per * q1[k]),
-            second: vector_of(|k| per2 * (q2[k] - q1[k] * turn)),
-            third: vector_of(|k| per3 * (q3[k] - 3.0 * q2[k] * turn + q1[k] * bend)),
-        }
-    }
-
     pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
         let (mixed, cube) = (3.0 * v * a, v * v * v);
         vector_of(|k| self.first[k] * j + self.second[k] * mixed + self.third[k] * cube)
@@ -102,6 +80,28 @@ impl<const M: usize> Station<M> {
 }
 
 impl<const M: usize, T: Number> Station<M, T> {
+    /// Of joints by their first three derivatives by u and g with its first two:
+    /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³.
+    #[inline(always)]
+    pub fn of_joints(
+        u: T,
+        [q1, q2, q3]: [&[T; M]; 3],
+        [g, dg, ddg]: [T; 3],
+        [tip, curvature]: [T; 2],
+    ) -> Self {
+        let per = u.filled(1.0) / g;
+        let turn = dg * per;
+        let bend = turn * 3.0 * turn - ddg * per;
+        let (per2, per3) = (per * per, per * per * per);
+        let mut station = Self { u, slope: g, tip, curvature, first: *q1, second: *q2, third: *q3 };
+        for k in 0..M {
+            station.first[k] = per * q1[k];
+            station.second[k] = per2 * (q2[k] - q1[k] * turn);
+            station.third[k] = per3 * (q3[k] - q2[k] * 3.0 * turn + q1[k] * bend);
+        }
+        station
+    }
+
     /// By these derivatives, whether or not the piece has a direction there.
     #[inline(always)]
     pub fn anywhere(u: T, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
@@ -138,6 +138,34 @@ impl<const M: usize, T: Number> Station<M, T> {
 }
 
 impl<const M: usize, T: Number> Roundings<M, T> {
+    /// Of joints and their first three derivatives by u, and g with its first two, each with how wrong it may be. Where nothing is
+    /// known of a derivative its rounding is as great as any number.
+    #[inline(always)]
+    pub fn of_joints([_, first, second, third]: &[Rounded<M, T>; 4], way: &Jet<3, 3, T>) -> Self {
+        let ([g, dg, ddg], [_, dg_error, ddg_error]) = (way.value, way.error);
+        let per = g.filled(1.0) / g;
+        let (turn, turn_error) = (dg * per, dg_error * EPS * per);
+        let size = turn * 3.0 * turn + ddg.size() * per;
+        let bend_error = turn.size() * 6.0 * turn_error + ddg_error * EPS * per;
+        let unit = 2.0 * ROUNDINGS * EPS;
+        let turn_size = turn.size();
+        let mut roundings = Self { first: first.value, second: second.value, third: third.value };
+        for k in 0..M {
+            let [q1, q2, q3] = [first.value[k].size(), second.value[k].size(), third.value[k].size()];
+            let [e1, e2, e3] = [first.rounding[k], second.rounding[k], third.rounding[k]];
+            let found = per * (e1 + q1 * unit);
+            roundings.first[k] = found.where_finite(found, f64::MAX);
+            let wrong = e2 + e1 * turn_size + q1 * turn_error;
+            let found = per * per * (wrong + (q2 + q1 * turn_size) * unit);
+            roundings.second[k] = found.where_finite(found, f64::MAX);
+            let wrong = e3 + (e2 * turn_size + q2 * turn_error) * 3.0;
+            let terms = q3 + q2 * 3.0 * turn_size + q1 * size;
+            let found = per * per * per * (wrong + e1 * size + q1 * bend_error + terms * unit);
+            roundings.third[k] = found.where_finite(found, f64::MAX);
+        }
+        roundings
+    }
+
     /// At a station of a curve with these derivatives: what is rounded in C', C'' and C''' is felt in g and its derivatives as well.
     #[inline(always)]
     pub fn new(curve: &Curve<M>, station: &Station<M, T>, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
@@ -183,32 +211,6 @@ impl<const M: usize, T: Number> Roundings<M, T> {
 }
 
 impl<const M: usize> Roundings<M> {
-    /// Of joints by the same as a station, each with how wrong it may be. Where nothing is known of a derivative its rounding is as
-    /// great as any number.
-    pub fn of_joints(joints: [&Rounded<M>; 3], way: [(f64, f64); 3]) -> Self {
-        let [(q1, e1), (q2, e2), (q3, e3)] = joints.map(|q| (&q.value, &q.rounding));
-        let [(g, _), (dg, dg_error), (ddg, ddg_error)] = way;
-        let per = 1.0 / g;
-        let (turn, turn_error) = (dg * per, dg_error * per);
-        let size = 3.0 * turn * turn + ddg.abs() * per;
-        let bend_error = 6.0 * turn.abs() * turn_error + ddg_error * per;
-        let unit = 2.0 * ROUNDINGS * EPS;
-        let turn_size = turn.abs();
-        let finite = |error: f64| if error.is_finite() { error } else { f64::MAX };
-        Self {
-            first: vector_of(|k| finite(per * (e1[k] + unit * q1[k].abs()))),
-            second: vector_of(|k| {
-                let wrong = e2[k] + e1[k] * turn_size + q1[k].abs() * turn_error;
-                finite(per * per * (wrong + unit * (q2[k].abs() + q1[k].abs() * turn_size)))
-            }),
-            third: vector_of(|k| {
-                let wrong = e3[k] + 3.0 * (e2[k] * turn_size + q2[k].abs() * turn_error);
-                let terms = q3[k].abs() + 3.0 * q2[k].abs() * turn_size + q1[k].abs() * size;
-                finite(per * per * per * (wrong + e1[k] * size + q1[k].abs() * bend_error + unit * terms))
-            }),
-        }
-    }
-
     pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
         let (size, mixed, cube) = (j.abs(), (3.0 * v * a).abs(), v * v * v);
         vector_of(|k| self.first[k] * size + self.second[k] * mixed + self.third[k] * cube)

@@ -11,7 +11,7 @@ use super::curve::Followed;
 use super::joints::path::JointPath;
 use super::moves::Programmed;
 use super::nearest::{step_towards, Found, Place, Search};
-use super::number::{inner, Number};
+use super::number::{inner, Lanes, Number};
 use super::parallel;
 use super::phase_motion::ROUNDING;
 use super::phases::SPEED_CUBIC;
@@ -167,6 +167,7 @@ struct Finder<'a, const M: usize> {
     /// Guesses of the places of the next setpoints, the last one first, and the phase of the last one.
     guesses: Vec<Guess>,
     phase: usize,
+    room: Vec<Lanes>,
 }
 
 /// The place of the first one of so many setpoints that are `left`, its distance from there, and |C'| there.
@@ -179,14 +180,15 @@ struct Guess {
 
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
-        let (mut profile, mut columns) = (None, None);
+        let (mut profile, mut columns, new) = (None, None, plan.columns(limits));
+        let room = new.room();
         match &plan.profile {
-            Some(clock) => profile = Some(Reader::new(clock, plan.columns(limits))),
-            None => columns = Some(plan.columns(limits)),
+            Some(clock) => profile = Some(Reader::new(clock, new)),
+            None => columns = Some(new),
         }
         let is_by_length = plan.profile.is_some_and(|clock| clock.phases.kind.contains(&SPEED_CUBIC));
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, columns, reach, is_by_length, guesses: vec![], phase: 0 }
+        Self { plan, limits, profile, columns, reach, is_by_length, guesses: vec![], phase: 0, room }
     }
 
     fn columns(&mut self) -> &mut Columns<'a, M> {
@@ -297,12 +299,8 @@ impl<'a, const M: usize> Finder<'a, M> {
             count += 1;
         }
         let Some(piece) = first else { return };
-        let columns = self.columns();
-        let curve = columns.curve(piece).clone();
-        if !columns.are_axes() || curve.polygon.is_rational() {
-            return;
-        }
-        let found = at_once::nearest(&curve, &starts, &q);
+        let Some(on) = self.columns().together(piece) else { return };
+        let found = at_once::nearest(&on, &starts, &q, &mut self.room);
         self.guesses.extend((0..count).rev().map(|i| Guess {
             left: rows.len() - i,
             place: Place { piece, u: found.u[i] },

@@ -1,6 +1,6 @@
 //! Vectors of M numbers, one an axis: length, distance, curvature, and straight lines between two points.
 
-use super::number::inner;
+use super::number::{inner, Number};
 
 /// Row `i` of a table with a column for each axis.
 #[inline(always)]
@@ -49,16 +49,18 @@ pub fn distance<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     length(&from_to(a, b))
 }
 
-/// Curvature in 1/mm from C' and C'': the part of C'' across the path over |C'|².
-#[inline]
-pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
+/// Curvature in 1/mm from C' and C'': the part of C'' across the path over |C'|²; 0 where C' vanishes.
+#[inline(always)]
+pub fn curvature<const M: usize, T: Number>(tangent: &[T; M], bend: &[T; M]) -> T {
     let square = inner(tangent, tangent);
-    if square == 0.0 {
-        return 0.0;
-    }
     let along = inner(tangent, bend) / square;
-    let across: [f64; M] = std::array::from_fn(|k| bend[k] - along * tangent[k]);
-    length(&across) / square
+    let mut across = *bend;
+    for k in 0..M {
+        across[k] = bend[k] - along * tangent[k];
+    }
+    let curvature = inner(&across, &across).root() / square;
+    // What is no number does not get lost.
+    curvature.where_finite(square.filled(1.0) / square, 0.0) + square * 0.0
 }
 
 /// A straight line from one point to another, ends included.

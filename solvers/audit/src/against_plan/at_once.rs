@@ -13,21 +13,29 @@ use crate::setpoints::at_once::{fill, judge, ALL, BEFORE, COUNT};
 use crate::tracking::Plan;
 use crate::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
-/// Which rows of axes change nothing; so much of the distance of each may be rounding, or it is not a number and the row does. There
+/// The tool of joints at some rows: in the axes whose motion the feed limits on the piece of each, and that feed; it is not a number
+/// where the feed limits a turn.
+#[derive(Default)]
+pub struct Tool<const M: usize> {
+    pub tip: Vec<[f64; M]>,
+    pub feed: Vec<f64>,
+}
+
+/// Which rows change nothing; so much of the distance of each may be rounding, or it is not a number and the row does. There
 /// are as many rows before them as for `setpoints::at_once`.
 pub fn settled<const M: usize>(
-    plan: &Plan,
+    (plan, tool): (&Plan, Option<&Tool<M>>),
     limits: &Limits<M>,
     rows: &[Row<M>],
     unsure: &[f64; COUNT],
     tally: &Tally<M>,
 ) -> [bool; COUNT] {
-    dispatch!(Level::new(), _simd => settled_in_vectors(plan, limits, rows, unsure, tally))
+    dispatch!(Level::new(), _simd => settled_in_vectors((plan, tool), limits, rows, unsure, tally))
 }
 
 #[inline(always)]
 fn settled_in_vectors<const M: usize>(
-    plan: &Plan,
+    (plan, tool): (&Plan, Option<&Tool<M>>),
     limits: &Limits<M>,
     rows: &[Row<M>],
     unsure: &[f64; COUNT],
@@ -71,7 +79,11 @@ fn settled_in_vectors<const M: usize>(
     }
     // The step.
     for feed in 0..FEEDS {
-        fill(&mut here, rows, |row| path.feed[FEEDS * row.nearest.place.piece + feed]);
+        match tool {
+            None => fill(&mut here, rows, |row| path.feed[FEEDS * row.nearest.place.piece + feed]),
+            Some(tool) if feed == 0 => here[..rows.len()].copy_from_slice(&tool.feed),
+            Some(_) => here.fill(f64::INFINITY),
+        }
         let is_limited = here[..rows.len()].iter().any(|limit| *limit != f64::INFINITY);
         let known = tally.most(Check::Feed, 0, 1.0);
         if !is_limited {
@@ -79,9 +91,16 @@ fn settled_in_vectors<const M: usize>(
             continue;
         }
         way_sq.fill(0.0);
-        for k in 0..limits.axes {
-            let counted = limits.feed_axes[feed][k];
-            fill(&mut there, rows, |row| row.q[k]);
+        for k in 0..if tool.is_some() { path.axes } else { limits.axes } {
+            let counted = if tool.is_some() { 1.0 } else { limits.feed_axes[feed][k] };
+            match tool {
+                None => fill(&mut there, rows, |row| row.q[k]),
+                Some(tool) => {
+                    for (own, tip) in there.iter_mut().zip(&tool.tip) {
+                        *own = tip[k];
+                    }
+                }
+            }
             for i in BEFORE..ALL {
                 let way = counted * (there[i] - there[i - 1]);
                 way_sq[i] += way * way;

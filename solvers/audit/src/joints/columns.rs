@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::path::{JointPath, Piece, Work};
+use super::path::{JointPath, Piece};
 use crate::curve::{Curve, Curves};
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{length, vector_of};
@@ -13,7 +13,7 @@ const BEND_GROWS: f64 = 4.0;
 
 pub struct JointColumns<'a, const M: usize> {
     pub of: &'a JointPath<'a>,
-    work: Work,
+    room: Vec<f64>,
     /// The last two pieces, the last one first.
     pieces: [Option<Rc<Piece<'a, M>>>; 2],
     /// The last place, the last station with its piece, and the last two whose rounding is known, the last one first.
@@ -24,7 +24,7 @@ pub struct JointColumns<'a, const M: usize> {
 
 impl<'a, const M: usize> JointColumns<'a, M> {
     pub fn new(of: &'a JointPath<'a>) -> Self {
-        Self { of, work: of.work(), pieces: [None, None], last: None, known: None, rounded: [None, None] }
+        Self { of, room: of.room(0.0), pieces: [None, None], last: None, known: None, rounded: [None, None] }
     }
 
     /// A piece of the path, on its curve.
@@ -41,13 +41,15 @@ impl<'a, const M: usize> JointColumns<'a, M> {
 
     pub fn place(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
         let last = self.last.filter(|place| place.piece == piece && place.u == u);
-        let place = last.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.work));
+        let place = last.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.room));
         self.last = Some(place);
         place
     }
 
     pub fn station(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Station<M> {
-        let station = self.piece(piece, curve).station(u, &mut self.work);
+        let [slope, second, third] = curve.derivatives(u);
+        let station =
+            self.piece(piece, curve).station(u, &[curve.at(u), slope, second, third], &mut self.room);
         self.known = Some((piece, station));
         station
     }
@@ -62,14 +64,14 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         if let Some(&(_, station, roundings)) = self.rounded.iter().flatten().find(is_here) {
             return (station, roundings);
         }
-        let (place, station, roundings) = self.piece(piece, curve).rounded_station(u, &mut self.work);
+        let (place, station, roundings) = self.piece(piece, curve).rounded_station(u, &mut self.room);
         (self.last, self.known) = (Some(place), Some((piece, station)));
         self.rounded = [Some((piece, station, roundings)), self.rounded[0]];
         (station, roundings)
     }
 
     pub fn way(&mut self, curve: &Rc<Curve<M>>, from: &Place<M>, to: &Place<M>) -> Rounded<M> {
-        let value = self.piece(from.piece, curve).between(&from.position.value, &to.position.value, None);
+        let value = self.piece(from.piece, curve).way(&from.position.value, &to.position.value);
         Rounded { value, rounding: vector_of(|k| from.position.rounding[k] + to.position.rounding[k]) }
     }
 
@@ -81,16 +83,16 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         b: &[f64; M],
     ) -> [f64; M] {
         let [first, last] = pieces.map(|piece| self.piece(piece, curves.get(piece)));
-        last.between(a, b, Some(&first))
+        last.way_from(&first, a, b)
     }
 
     pub fn toward(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
         let on = self.piece(piece, curve);
         let [position, slope] = match self.last.filter(|place| place.piece == piece && place.u == u) {
             Some(place) => [place.position.value, place.slope.value],
-            None => on.position_and_slope(u, &mut self.work),
+            None => on.position_and_slope(&curve.place(u), &mut self.room),
         };
-        [on.between(&position, q, None), slope]
+        [on.way(&position, q), slope]
     }
 
     /// The second derivative by u where it was last looked at on a piece, which may be some times that elsewhere.

@@ -4,20 +4,45 @@
 //! parameter, as many as are asked for; products go by Leibniz's rule, functions by Faà di Bruno's. Each derivative
 //! has a bound of its error in units of the rounding of 1: the errors of the operands carried over, and the rounding of each term
 //! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.3). Bounds take longer than the values, so a
-//! jet has them only if they are asked for.
+//! jet has them only if they are asked for. A formula is evaluated at one place or at eight at once, with the same bits.
 
 use std::f64::consts::PI;
 
-use crate::vectors::vector_of;
+use fearless_simd::{dispatch, f64x8, Level, Simd, SimdBase};
+
+use crate::number::{Lanes, Number};
 
 /// Error of an elementary function, in roundings of its value.
 const ELEMENTARY: f64 = 4.0;
 
-/// The first N of f, f', f'', f''' and, if `ROUNDED`, their errors in units of `EPS`; else these are 0.
+/// The first N of f, f', f'', f''' and their errors in units of `EPS`, N or none.
 #[derive(Clone, Copy, Debug)]
-pub struct Jet<const N: usize, const ROUNDED: bool> {
-    pub value: [f64; N],
-    pub error: [f64; N],
+pub struct Jet<const N: usize, const E: usize, T = f64> {
+    pub value: [T; N],
+    pub error: [T; E],
+}
+
+/// The most numbers of a jet.
+pub const JET: usize = 8;
+
+/// What a formula is evaluated on: a number, or eight at once.
+pub trait Argument: Number {
+    /// Fills the table of results, in which the inputs are given; each result has N values and E errors.
+    fn evaluate<const N: usize, const E: usize>(formula: &Formula, table: &mut [Self::Kept]);
+}
+
+impl Argument for f64 {
+    fn evaluate<const N: usize, const E: usize>(formula: &Formula, table: &mut [f64]) {
+        formula.fill::<N, E, f64>(0.0, table);
+    }
+}
+
+impl<S: Simd> Argument for f64x8<S> {
+    // Its loop is built once, and not in all that call it.
+    #[inline(always)]
+    fn evaluate<const N: usize, const E: usize>(formula: &Formula, table: &mut [Lanes]) {
+        formula.evaluate_at_once::<N, E>(table);
+    }
 }
 
 /// One operation; see `feedplan.machine.expression.Op` for the codes.
@@ -66,38 +91,46 @@ impl Formula {
         self.inputs + self.steps.len()
     }
 
-    /// Fills the table of results, in which the inputs are given.
-    pub fn evaluate<const N: usize, const ROUNDED: bool>(&self, table: &mut [Jet<N, ROUNDED>]) {
+    /// Fills the table of results at eight places, in the vectors of the processor.
+    pub fn evaluate_at_once<const N: usize, const E: usize>(&self, table: &mut [Lanes]) {
+        dispatch!(Level::new(), simd => self.fill::<N, E, _>(f64x8::splat(simd, 0.0), table));
+    }
+
+    /// Fills the table of results, in which the inputs are given; `nothing` is 0 in all places.
+    #[inline(always)]
+    fn fill<const N: usize, const E: usize, T: Number>(&self, nothing: T, table: &mut [T::Kept]) {
         // The cosine of an angle comes right after its sine.
-        let mut wave = (0.0, 1.0);
+        let mut wave = [nothing; 2];
         for (i, step) in self.steps.iter().enumerate() {
-            let (known, rest) = table.split_at_mut(self.inputs + i);
-            let [a, b] = step.operands.map(|place| &known[place]);
+            let (known, rest) = table.split_at_mut((self.inputs + i) * (N + E));
+            let [a, b] = step.operands;
+            let a = Jet::<N, E, T>::taken(nothing, known, a);
             let c = step.constant;
-            rest[0] = match step.code {
-                0 => Jet::constant(c),
+            let found = match step.code {
+                0 => Jet::constant(nothing.filled(c)),
                 1 => a.scaled(-1.0),
-                2 => a.plus(b, 1.0),
-                3 => a.plus(b, -1.0),
-                4 => a.times(b),
-                5 => a.times(&b.reciprocal()),
+                2 => a.plus(&Jet::taken(nothing, known, b), 1.0),
+                3 => a.plus(&Jet::taken(nothing, known, b), -1.0),
+                4 => a.times(&Jet::taken(nothing, known, b)),
+                5 => a.times(&Jet::taken(nothing, known, b).reciprocal()),
                 6 => a.shifted(c),
                 7 => a.scaled(c),
-                8 => a.times(a),
+                8 => a.times(&a),
                 9 => a.root(),
                 SINE => {
-                    wave = a.value[0].sin_cos();
-                    let (s, c) = wave;
-                    a.composed([s, c, -s, -c, s], ELEMENTARY)
+                    wave = a.value[0].wave();
+                    let [s, c] = wave;
+                    a.composed([s, c, s * -1.0, c * -1.0, s], ELEMENTARY)
                 }
                 COSINE => {
-                    let (s, c) = wave;
-                    a.composed([c, -s, -c, s, c], ELEMENTARY)
+                    let [s, c] = wave;
+                    a.composed([c, s * -1.0, c * -1.0, s, c], ELEMENTARY)
                 }
-                12 => a.angle(b),
+                12 => a.angle(&Jet::taken(nothing, known, b)),
                 13 => a.scaled(PI / 180.0),
                 _ => a.scaled(180.0 / PI),
             };
+            found.keep(rest, 0);
         }
     }
 }
@@ -106,42 +139,77 @@ impl Formula {
 const BINOMIAL: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
 
-impl<const N: usize, const ROUNDED: bool> Jet<N, ROUNDED> {
-    pub fn constant(value: f64) -> Self {
-        let mut jet = Self { value: [0.0; N], error: [0.0; N] };
+impl<const N: usize, const E: usize, T: Number> Jet<N, E, T> {
+    /// Known exactly, and the same everywhere.
+    #[inline(always)]
+    pub fn constant(value: T) -> Self {
+        let nothing = value.filled(0.0);
+        let mut jet = Self { value: [nothing; N], error: [nothing; E] };
         jet.value[0] = value;
         jet
     }
 
-    /// From the values, and the errors if there are any.
+    /// A result in a table; `like` has the places of its numbers.
     #[inline(always)]
-    fn by(value: [f64; N], error: impl Fn(usize) -> f64) -> Self {
-        Self { value, error: if ROUNDED { vector_of(error) } else { [0.0; N] } }
-    }
-
-    #[inline]
-    fn plus(&self, other: &Self, sign: f64) -> Self {
-        let value: [f64; N] = std::array::from_fn(|k| self.value[k] + sign * other.value[k]);
-        Self::by(value, |k| self.error[k] + other.error[k] + value[k].abs())
-    }
-
-    #[inline]
-    fn shifted(&self, constant: f64) -> Self {
-        let mut jet = *self;
-        jet.value[0] += constant;
-        if ROUNDED {
-            jet.error[0] += jet.value[0].abs();
+    pub fn taken(like: T, table: &[T::Kept], place: usize) -> Self {
+        let row = &table[place * (N + E)..][..N + E];
+        let mut jet = Self { value: [like; N], error: [like; E] };
+        for k in 0..N {
+            jet.value[k] = like.taken(&row[k]);
+        }
+        for k in 0..E {
+            jet.error[k] = like.taken(&row[N + k]);
         }
         jet
     }
 
-    #[inline]
-    fn scaled(&self, constant: f64) -> Self {
-        let value = self.value.map(|x| constant * x);
-        Self::by(value, |k| constant.abs() * self.error[k] + value[k].abs())
+    /// Puts it into a table.
+    #[inline(always)]
+    pub fn keep(&self, table: &mut [T::Kept], place: usize) {
+        let row = &mut table[place * (N + E)..][..N + E];
+        for k in 0..N {
+            row[k] = self.value[k].kept();
+        }
+        for k in 0..E {
+            row[N + k] = self.error[k].kept();
+        }
     }
 
-    #[inline]
+    #[inline(always)]
+    fn plus(&self, other: &Self, sign: f64) -> Self {
+        let mut jet = *self;
+        for k in 0..N {
+            jet.value[k] = self.value[k] + other.value[k] * sign;
+        }
+        for k in 0..E {
+            jet.error[k] = self.error[k] + other.error[k] + jet.value[k].size();
+        }
+        jet
+    }
+
+    #[inline(always)]
+    fn shifted(&self, constant: f64) -> Self {
+        let mut jet = *self;
+        jet.value[0] = jet.value[0] + constant;
+        if E > 0 {
+            jet.error[0] = jet.error[0] + jet.value[0].size();
+        }
+        jet
+    }
+
+    #[inline(always)]
+    fn scaled(&self, constant: f64) -> Self {
+        let mut jet = *self;
+        for k in 0..N {
+            jet.value[k] = self.value[k] * constant;
+        }
+        for k in 0..E {
+            jet.error[k] = self.error[k] * constant.abs() + jet.value[k].size();
+        }
+        jet
+    }
+
+    #[inline(always)]
     pub fn times(&self, other: &Self) -> Self {
         self.times_to(other, N)
     }
@@ -149,103 +217,130 @@ impl<const N: usize, const ROUNDED: bool> Jet<N, ROUNDED> {
     /// The first terms of a product, the others 0.
     #[inline(always)]
     fn times_to(&self, other: &Self, terms: usize) -> Self {
-        let mut jet = Self { value: [0.0; N], error: [0.0; N] };
-        let [size, other_size] = [self, other].map(|jet| jet.value.map(f64::abs));
-        // The rounding of a product and of its addition counts as an error of the second factor.
-        let other_error: [f64; N] = vector_of(|k| other.error[k] + 2.0 * other_size[k]);
+        let nothing = self.value[0].filled(0.0);
+        let mut jet = Self { value: [nothing; N], error: [nothing; E] };
         for k in 0..terms {
             for j in 0..=k {
-                let many = BINOMIAL[k][j];
-                jet.value[k] += many * (self.value[j] * other.value[k - j]);
-                if ROUNDED {
-                    jet.error[k] += many * (size[j] * other_error[k - j] + self.error[j] * other_size[k - j]);
-                }
+                let product = self.value[j] * other.value[k - j] * BINOMIAL[k][j];
+                jet.value[k] = if j == 0 { product } else { jet.value[k] + product };
+            }
+        }
+        if E == 0 {
+            return jet;
+        }
+        // The rounding of a product and of its addition counts as an error of the second factor.
+        let (mut size, mut other_size, mut other_error) = (self.value, other.value, other.error);
+        for k in 0..N {
+            (size[k], other_size[k]) = (size[k].size(), other_size[k].size());
+            other_error[k] = other_error[k] + other_size[k] * 2.0;
+        }
+        for k in 0..terms {
+            for j in 0..=k {
+                let wrong = size[j] * other_error[k - j] + self.error[j] * other_size[k - j];
+                jet.error[k] = jet.error[k] + wrong * BINOMIAL[k][j];
             }
         }
         jet
     }
 
     /// A function of the jet, from the value and the first four derivatives of the function, each with an error of `roundings`.
-    #[inline]
-    fn composed(&self, f: [f64; 5], roundings: f64) -> Self {
+    #[inline(always)]
+    fn composed(&self, f: [T; 5], roundings: f64) -> Self {
         let (x, e) = (&self.value, &self.error);
-        let wrong = |k: usize| f[k + 1].abs() * e[0] + roundings * f[k].abs();
         let mut jet = Self::constant(f[0]);
-        if ROUNDED {
-            jet.error[0] = wrong(0);
+        // How wrong the function and its derivatives are.
+        let mut wrong = f;
+        if E > 0 {
+            for k in 0..4 {
+                wrong[k] = f[k + 1].size() * e[0] + f[k].size() * roundings;
+            }
+            jet.error[0] = wrong[0];
         }
         if N > 1 {
             jet.value[1] = f[1] * x[1];
         }
-        if N > 1 && ROUNDED {
-            jet.error[1] = wrong(1) * x[1].abs() + f[1].abs() * e[1] + jet.value[1].abs();
+        if N > 1 && E > 0 {
+            jet.error[1] = wrong[1] * x[1].size() + f[1].size() * e[1] + jet.value[1].size();
         }
-        let (bent, straight) = if N > 2 { (f[2] * x[1] * x[1], f[1] * x[2]) } else { (0.0, 0.0) };
         if N > 2 {
+            let (bent, straight) = (f[2] * x[1] * x[1], f[1] * x[2]);
             jet.value[2] = bent + straight;
-        }
-        if N > 2 && ROUNDED {
-            jet.error[2] = wrong(2) * x[1] * x[1]
-                + 2.0 * (f[2] * x[1]).abs() * e[1]
-                + wrong(1) * x[2].abs()
-                + f[1].abs() * e[2]
-                + 3.0 * (bent.abs() + straight.abs());
+            if E > 0 {
+                jet.error[2] = wrong[2] * x[1] * x[1]
+                    + (f[2] * x[1]).size() * 2.0 * e[1]
+                    + wrong[1] * x[2].size()
+                    + f[1].size() * e[2]
+                    + (bent.size() + straight.size()) * 3.0;
+            }
         }
         if N > 3 {
-            let terms = [f[3] * x[1].powi(3), 3.0 * f[2] * x[1] * x[2], f[1] * x[3]];
-            jet.value[3] = terms.iter().sum();
-            if !ROUNDED {
-                return jet;
+            let terms = [f[3] * (x[1] * x[1] * x[1]), f[2] * 3.0 * x[1] * x[2], f[1] * x[3]];
+            jet.value[3] = terms[0] + terms[1] + terms[2];
+            if E > 0 {
+                let [slope, bend] = [x[1].size(), x[2].size()];
+                let mixed = wrong[2] * (x[1] * x[2]).size() + f[2].size() * (e[1] * bend + slope * e[2]);
+                jet.error[3] = wrong[3] * (slope * slope * slope)
+                    + f[3].size() * 3.0 * x[1] * x[1] * e[1]
+                    + mixed * 3.0
+                    + wrong[1] * x[3].size()
+                    + f[1].size() * e[3]
+                    + (terms[0].size() + terms[1].size() + terms[2].size()) * 5.0;
             }
-            let mixed = wrong(2) * (x[1] * x[2]).abs() + f[2].abs() * (e[1] * x[2].abs() + x[1].abs() * e[2]);
-            jet.error[3] = wrong(3) * x[1].abs().powi(3)
-                + 3.0 * f[3].abs() * x[1] * x[1] * e[1]
-                + 3.0 * mixed
-                + wrong(1) * x[3].abs()
-                + f[1].abs() * e[3]
-                + 5.0 * terms.iter().map(|term| term.abs()).sum::<f64>();
         }
         jet
     }
 
+    #[inline(always)]
     fn reciprocal(&self) -> Self {
-        let r = 1.0 / self.value[0];
+        let r = self.value[0].filled(1.0) / self.value[0];
         let r2 = r * r;
-        self.composed([r, -r2, 2.0 * r2 * r, -6.0 * r2 * r2, 24.0 * r2 * r2 * r], 1.0)
+        self.composed([r, r2 * -1.0, r2 * 2.0 * r, r2 * -6.0 * r2, r2 * 24.0 * r2 * r], 1.0)
     }
 
+    #[inline(always)]
     pub fn root(&self) -> Self {
-        let (x, r) = (self.value[0], self.value[0].sqrt());
-        let first = 0.5 / r;
-        let second = -0.5 * first / x;
-        let third = -1.5 * second / x;
-        self.composed([r, first, second, third, -2.5 * third / x], 2.0)
+        let (x, r) = (self.value[0], self.value[0].root());
+        let first = x.filled(0.5) / r;
+        let second = first * -0.5 / x;
+        let third = second * -1.5 / x;
+        self.composed([r, first, second, third, third * -2.5 / x], 2.0)
     }
 
     /// The angle of the vector (x, self): its slope is (x y' − y x') / (x² + y²).
+    #[inline(always)]
     fn angle(&self, x: &Self) -> Self {
         let y = self;
         let square = x.value[0] * x.value[0] + y.value[0] * y.value[0];
-        let mut jet = Self::constant(y.value[0].atan2(x.value[0]));
-        if ROUNDED {
-            let across = x.value[0].abs() * y.error[0] + y.value[0].abs() * x.error[0];
-            jet.error[0] = across / square + ELEMENTARY * jet.value[0].abs();
+        let mut jet = Self::constant(y.value[0].angle(x.value[0]));
+        if E > 0 {
+            let across = x.value[0].size() * y.error[0] + y.value[0].size() * x.error[0];
+            jet.error[0] = across / square + jet.value[0].size() * ELEMENTARY;
         }
         if N > 1 {
             let turn = x.times_to(&y.slope(), N - 1).plus(&y.times_to(&x.slope(), N - 1), -1.0);
             let square = x.times_to(x, N - 1).plus(&y.times_to(y, N - 1), 1.0);
             let slope = turn.times_to(&square.reciprocal(), N - 1);
             for k in 1..N {
-                (jet.value[k], jet.error[k]) = (slope.value[k - 1], slope.error[k - 1]);
+                jet.value[k] = slope.value[k - 1];
+            }
+            for k in 1..E {
+                jet.error[k] = slope.error[k - 1];
             }
         }
         jet
     }
 
     /// The derivative; its last term is not known, and 0.
+    #[inline(always)]
     fn slope(&self) -> Self {
-        let later = |terms: &[f64; N]| std::array::from_fn(|k| if k + 1 < N { terms[k + 1] } else { 0.0 });
-        Self { value: later(&self.value), error: later(&self.error) }
+        let mut slope = Self::constant(self.value[0].filled(0.0));
+        for k in 1..N {
+            slope.value[k - 1] = self.value[k];
+        }
+        for k in 1..E {
+            slope.error[k - 1] = self.error[k];
+        }
+        slope
     }
 }
 
@@ -254,24 +349,27 @@ mod tests {
     use super::*;
 
     /// f, f', f'', f''' of a formula of x = u and y = 1 at u, with their errors.
-    fn jet(u: f64, rows: &[[i32; 3]], constant: f64) -> Jet<4, true> {
+    fn jet(u: f64, rows: &[[i32; 3]], constant: f64) -> Jet<4, 4> {
         let last = 2 + rows.len() as i32 - 1;
         let constants = vec![constant; rows.len()];
         let formula = Formula::new(2, rows, &constants, &[last]).expect("a list in order");
-        let found = jet_of::<true>(u, &formula);
-        assert_eq!(jet_of::<false>(u, &formula).value, found.value);
+        let found = jet_of::<4>(u, &formula);
+        assert_eq!(jet_of::<0>(u, &formula).value, found.value);
         found
     }
 
-    fn jet_of<const ROUNDED: bool>(u: f64, formula: &Formula) -> Jet<4, ROUNDED> {
-        let mut table = vec![Jet::constant(0.0); formula.places()];
-        table[0] = Jet { value: [u, 1.0, 0.0, 0.0], error: [u.abs(), 0.0, 0.0, 0.0] };
-        table[1] = Jet::constant(1.0);
-        formula.evaluate(&mut table);
-        table[formula.outputs[0]]
+    fn jet_of<const E: usize>(u: f64, formula: &Formula) -> Jet<4, E> {
+        let mut table = vec![0.0; JET * formula.places()];
+        let (mut x, errors) = (Jet::<4, E>::constant(u), [u.abs(), 0.0, 0.0, 0.0]);
+        x.value[1] = 1.0;
+        x.error.copy_from_slice(&errors[..E]);
+        x.keep(&mut table, 0);
+        Jet::<4, E>::constant(1.0).keep(&mut table, 1);
+        f64::evaluate::<4, E>(formula, &mut table);
+        Jet::taken(0.0, &table, formula.outputs[0])
     }
 
-    fn assert_near(found: Jet<4, true>, exact: [f64; 4]) {
+    fn assert_near(found: Jet<4, 4>, exact: [f64; 4]) {
         for k in 0..4 {
             let away = (found.value[k] - exact[k]).abs();
             assert!(

@@ -2,13 +2,16 @@
 
 use std::rc::Rc;
 
-use super::formula::{Formula, Jet};
+use super::formula::{Argument, Formula, Jet, JET};
 use crate::curve::{Curve, Followed};
+use crate::number::{inner, Number};
 use crate::station::{Place, Rounded, Roundings, Station};
-use crate::vectors::{curvature, length, times};
+use crate::vectors::{curvature, length, times, vector_of};
 use crate::{EPS, ROUNDINGS};
 
 pub const TURN: f64 = 360.0;
+/// Degrees of an angle of 1.
+const DEGREE: f64 = 180.0 / std::f64::consts::PI;
 /// Error of a coordinate of the tip in the formula, in roundings of the greatest coordinate of its piece.
 pub const TIP_ROUNDINGS: f64 = 2.0 * ROUNDINGS;
 
@@ -57,22 +60,41 @@ pub struct Piece<'a, const M: usize> {
     way_scale: [f64; M],
     xyz: [f64; M],
     ijk: [usize; 3],
-    size: f64,
-    slope_size: [f64; M],
+    /// What the rounding of the tip's coordinates and of their first three derivatives is relative to.
+    sizes: [[f64; M]; 4],
     start_size: f64,
 }
 
-/// Room for the results of a formula, used again at every place.
-pub struct Work {
-    positions: Vec<Jet<1, false>>,
-    slopes: Vec<Jet<2, false>>,
-    bends: Vec<Jet<4, false>>,
-    rounded_slopes: Vec<Jet<2, true>>,
-    rounded_bends: Vec<Jet<4, true>>,
+/// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
+type Bends<const M: usize, const W: usize, T> = ([Rounded<M, T>; 4], Jet<3, W, T>);
+
+#[cfg(test)]
+impl Words {
+    /// Radius and angle of X and Y, the angle in degrees and known up to whole turns only.
+    pub fn polar() -> Self {
+        let rows = [[8, 0, 0], [8, 1, 0], [2, 2, 3], [9, 4, 0], [12, 1, 0], [14, 6, 0]];
+        let formula = Formula::new(2, &rows, &[0.0; 6], &[5, 7]).expect("a list in order");
+        Self { formula, turning: vec![false, true], column: vec![Some(0), Some(1)], directed: false }
+    }
 }
 
-/// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
-type Bends<const M: usize, const ROUNDED: bool> = ([Rounded<M>; 4], Jet<3, ROUNDED>);
+#[cfg(test)]
+impl<'a> JointPath<'a> {
+    /// Two joints of a path of two axes that is one run; the second axis counts twice in its length.
+    pub fn of_one(path: Followed<'a>, words: &'a Words, feed: &'a [f64]) -> Self {
+        let (xyz, ijk, way_scale) = (&[true; 2], &[false; 2], &[1.0, 2.0]);
+        Self {
+            path,
+            joints: 2,
+            words: std::slice::from_ref(words),
+            words_of: &[0],
+            xyz,
+            ijk,
+            way_scale,
+            feed,
+        }
+    }
+}
 
 impl JointPath<'_> {
     fn run_of(&self, piece: usize) -> usize {
@@ -84,16 +106,10 @@ impl JointPath<'_> {
         std::array::from_fn(|k| self.way_scale.get(k).copied().unwrap_or(0.0))
     }
 
-    /// Room for results of all formulas.
-    pub fn work(&self) -> Work {
+    /// Room for the results of all formulas, used again at every place.
+    pub fn room<K: Copy>(&self, nothing: K) -> Vec<K> {
         let most = self.words.iter().map(|words| words.formula.places()).max().unwrap_or(0);
-        Work {
-            positions: vec![Jet::constant(0.0); most],
-            slopes: vec![Jet::constant(0.0); most],
-            bends: vec![Jet::constant(0.0); most],
-            rounded_slopes: vec![Jet::constant(0.0); most],
-            rounded_bends: vec![Jet::constant(0.0); most],
-        }
+        vec![nothing; JET * most]
     }
 
     /// A piece ready to be measured.
@@ -114,6 +130,7 @@ impl JointPath<'_> {
         let linear = (0..axes).any(|k| self.xyz[k] && moves(k));
         let mut ijk = (0..axes).filter(|&k| self.ijk[k]);
         let number_of = |k: bool| if k { 1.0 } else { 0.0 };
+        let [first_size, second_size, third_size] = *curve.derivative_sizes();
         Piece {
             number,
             width: curve.width(),
@@ -123,16 +140,26 @@ impl JointPath<'_> {
             way_scale: self.scale(),
             xyz: std::array::from_fn(|k| number_of(flag(self.xyz, k))),
             ijk: std::array::from_fn(|_| ijk.next().unwrap_or(0)),
-            size: curve.magnitude(),
-            slope_size: curve.derivative_size(),
+            sizes: [[curve.magnitude(); M], first_size, second_size, third_size],
             start_size: first.iter().fold(0.0, |most, x| most.max(x.abs())),
             curve,
         }
     }
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+#[inline(always)]
+fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The vector by axis times what the axes count.
+#[inline(always)]
+fn counted<const M: usize, T: Number>(of: &[T; M], counts: &[f64; M]) -> [T; M] {
+    let mut counted = *of;
+    for k in 0..M {
+        counted[k] = of[k] * counts[k];
+    }
+    counted
 }
 
 impl<const M: usize> Piece<'_, M> {
@@ -141,8 +168,15 @@ impl<const M: usize> Piece<'_, M> {
         times(&self.counts, &self.xyz)
     }
 
-    fn direction(&self, of: &[f64; M]) -> [f64; 3] {
-        self.ijk.map(|k| of[k])
+    #[inline(always)]
+    fn direction<T: Number>(&self, of: &[T; M]) -> [T; 3] {
+        let [i, j, k] = self.ijk;
+        [of[i], of[j], of[k]]
+    }
+
+    /// The axes whose motion the feed limits, 1 or 0; none where it limits a turn.
+    pub fn fed_axes(&self) -> Option<[f64; M]> {
+        (!self.turns).then_some(self.counts)
     }
 
     /// Whether a joint is known up to whole turns only.
@@ -160,11 +194,12 @@ impl<const M: usize> Piece<'_, M> {
         self.curvature_by(&self.curve.derivatives(u))
     }
 
-    fn curvature_by(&self, [tangent, bend, _]: &[[f64; M]; 3]) -> f64 {
+    #[inline(always)]
+    fn curvature_by<T: Number>(&self, [tangent, bend, _]: &[[T; M]; 3]) -> T {
         if self.linear() == [0.0; M] {
-            return 0.0;
+            return tangent[0].filled(0.0);
         }
-        curvature(&times(&self.counts, tangent), &times(&self.counts, bend))
+        curvature(&counted(tangent, &self.counts), &counted(bend, &self.counts))
     }
 
     /// Derivative by u of the way that the feed limits.
@@ -176,13 +211,15 @@ impl<const M: usize> Piece<'_, M> {
         }
     }
 
-    fn feed_slope_of(&self, tip: &[f64; M], slope: &[f64; M]) -> f64 {
+    #[inline(always)]
+    fn feed_slope_of<T: Number>(&self, tip: &[T; M], slope: &[T; M]) -> T {
         if !self.turns {
-            return length(&times(&self.counts, slope));
+            let slope = counted(slope, &self.counts);
+            return inner(&slope, &slope).root();
         }
         let direction = self.direction(tip);
-        let across = length(&cross(direction, self.direction(slope)));
-        (across / direction.iter().map(|x| x * x).sum::<f64>()).to_degrees()
+        let across = cross(direction, self.direction(slope));
+        inner(&across, &across).root() / inner(&direction, &direction) * DEGREE
     }
 
     /// The way that the feed limits, straight from one point of the piece to another.
@@ -196,56 +233,76 @@ impl<const M: usize> Piece<'_, M> {
         across.atan2((0..3).map(|k| first[k] * last[k]).sum()).to_degrees()
     }
 
-    fn fill<const N: usize, const ROUNDED: bool>(
+    /// Fills the table of results from the first derivatives of the tip, the position being the first one of them, which are rounded
+    /// by sizes like these.
+    #[inline(always)]
+    fn fill<const N: usize, const E: usize, T: Argument>(
         &self,
-        table: &mut [Jet<N, ROUNDED>],
-        jet: impl Fn(usize) -> Jet<N, ROUNDED>,
+        table: &mut [T::Kept],
+        tip: &[[T; M]; N],
+        sizes: &[[f64; M]; E],
     ) {
-        for (entry, column) in table.iter_mut().zip(&self.words.column) {
-            *entry = column.map_or(Jet::constant(0.0), &jet);
+        let nothing = tip[0][0].filled(0.0);
+        for (input, column) in self.words.column.iter().enumerate() {
+            let mut jet = Jet { value: [nothing; N], error: [nothing; E] };
+            if let Some(column) = *column {
+                for order in 0..N {
+                    jet.value[order] = tip[order][column];
+                }
+                for order in 0..E {
+                    jet.error[order] = nothing.filled(TIP_ROUNDINGS * sizes[order][column]);
+                }
+            }
+            jet.keep(table, input);
         }
-        self.words.formula.evaluate(table);
+        T::evaluate::<N, E>(&self.words.formula, table);
     }
 
-    fn joint_rows<const N: usize, const ROUNDED: bool>(
+    /// A derivative of all joints from the table of results; `like` has the places of its numbers.
+    #[inline(always)]
+    fn joint_rows<const N: usize, const E: usize, T: Argument>(
         &self,
-        table: &[Jet<N, ROUNDED>],
+        table: &[T::Kept],
         order: usize,
-    ) -> Rounded<M> {
-        let (mut value, mut error) = ([0.0; M], [0.0; M]);
+        like: T,
+    ) -> Rounded<M, T> {
+        let nothing = like.filled(0.0);
+        let (mut value, mut rounding) = ([nothing; M], [nothing; M]);
         for (joint, &place) in self.words.formula.outputs.iter().enumerate() {
-            let jet = &table[place];
-            (value[joint], error[joint]) = (jet.value[order], EPS * jet.error[order]);
+            let jet = Jet::<N, E, T>::taken(like, table, place);
+            value[joint] = jet.value[order];
+            if E > 0 {
+                rounding[joint] = jet.error[order] * EPS;
+            }
             // At a singular place nothing is known of a derivative.
-            if order > 0 && !(value[joint] + error[joint]).is_finite() {
-                (value[joint], error[joint]) = (0.0, f64::INFINITY);
+            if order > 0 {
+                let both = value[joint] + rounding[joint];
+                value[joint] = value[joint].where_finite(both, 0.0);
+                rounding[joint] = rounding[joint].where_finite(both, f64::INFINITY);
             }
         }
-        Rounded { value, rounding: error }
+        Rounded { value, rounding }
     }
 
     /// Positions of the joints, angles as the kinematics gives them.
-    pub fn at(&self, u: f64, work: &mut Work) -> [f64; M] {
-        let tip = self.curve.at(u);
-        self.fill(&mut work.positions, |k| Jet { value: [tip[k]], error: [0.0] });
-        self.joint_rows(&work.positions, 0).value
+    pub fn at(&self, u: f64, room: &mut [f64]) -> [f64; M] {
+        self.fill(room, &[self.curve.at(u)], &[]);
+        self.joint_rows::<1, 0, f64>(room, 0, u).value
     }
 
-    /// Positions and slopes of the joints at u.
-    pub fn position_and_slope(&self, u: f64, work: &mut Work) -> [[f64; M]; 2] {
-        let [tip, slope] = self.curve.place(u);
-        self.fill(&mut work.slopes, |k| Jet { value: [tip[k], slope[k]], error: [0.0; 2] });
-        [0, 1].map(|order| self.joint_rows(&work.slopes, order).value)
+    /// Positions and slopes of the joints where those of the tip are at hand.
+    #[inline(always)]
+    pub fn position_and_slope<T: Argument>(&self, tip: &[[T; M]; 2], room: &mut [T::Kept]) -> [[T; M]; 2] {
+        self.fill(room, tip, &[]);
+        let like = tip[0][0];
+        [self.joint_rows::<2, 0, T>(room, 0, like).value, self.joint_rows::<2, 0, T>(room, 1, like).value]
     }
 
     /// The place at u.
-    pub fn place(&self, u: f64, work: &mut Work) -> Place<M> {
+    pub fn place(&self, u: f64, room: &mut [f64]) -> Place<M> {
         let (tip, slope) = (self.curve.at(u), self.curve.derivative(u));
-        self.fill(&mut work.rounded_slopes, |k| Jet {
-            value: [tip[k], slope[k]],
-            error: [TIP_ROUNDINGS * self.size, TIP_ROUNDINGS * self.slope_size[k]],
-        });
-        let joints = [0, 1].map(|order| self.joint_rows(&work.rounded_slopes, order));
+        self.fill(room, &[tip, slope], &[self.sizes[0], self.sizes[1]]);
+        let joints = [0, 1].map(|order| self.joint_rows::<2, 2, f64>(room, order, u));
         self.place_of(u, tip, slope, joints)
     }
 
@@ -256,88 +313,107 @@ impl<const M: usize> Piece<'_, M> {
         Place { piece: self.number, u, tip, position, slope, way_slope, tip_slope: feed_slope }
     }
 
-    /// The first three derivatives of the joints by the length of the way at u.
-    pub fn station(&self, u: f64, work: &mut Work) -> Station<M> {
-        let (tip, slopes) = (self.curve.at(u), self.curve.derivatives(u));
-        let bends = self.bends(&mut work.bends, &tip, &slopes);
-        self.station_of(u, &tip, &slopes, &bends)
+    /// The first three derivatives of the joints by the length of the way at u, where the tip and its own derivatives are at hand.
+    #[inline(always)]
+    pub fn station<T: Argument>(&self, u: T, tip: &[[T; M]; 4], room: &mut [T::Kept]) -> Station<M, T> {
+        self.station_of(u, tip, &self.bends::<0, 0, T>(room, tip, &[]))
     }
 
     /// The same with the place, and what of it may be rounding.
-    pub fn rounded_station(&self, u: f64, work: &mut Work) -> (Place<M>, Station<M>, Roundings<M>) {
-        let (tip, slopes) = (self.curve.at(u), self.curve.derivatives(u));
-        let bends = self.bends(&mut work.rounded_bends, &tip, &slopes);
-        let ([position, q1, q2, q3], way) = &bends;
-        let way = std::array::from_fn(|order| (way.value[order], EPS * way.error[order]));
+    pub fn rounded_station(&self, u: f64, room: &mut [f64]) -> (Place<M>, Station<M>, Roundings<M>) {
+        let [slope, second, third] = self.curve.derivatives(u);
+        let tip = [self.curve.at(u), slope, second, third];
+        let bends = self.bends::<4, 3, f64>(room, &tip, &self.sizes);
+        let ([position, q1, ..], _) = &bends;
         (
-            self.place_of(u, tip, slopes[0], [*position, *q1]),
-            self.station_of(u, &tip, &slopes, &bends),
-            Roundings::of_joints([q1, q2, q3], way),
+            self.place_of(u, tip[0], slope, [*position, *q1]),
+            self.station_of(u, &tip, &bends),
+            Roundings::of_joints(&bends.0, &bends.1),
         )
     }
 
-    fn station_of<const ROUNDED: bool>(
+    /// The same at places on a piece without weights.
+    #[inline(always)]
+    pub fn rounded_stations<T: Argument>(
         &self,
-        u: f64,
-        tip: &[f64; M],
-        slopes: &[[f64; M]; 3],
-        ([_, q1, q2, q3], way): &Bends<M, ROUNDED>,
-    ) -> Station<M> {
+        u: T,
+        tip: &[[T; M]; 4],
+        room: &mut [T::Kept],
+    ) -> (Station<M, T>, Roundings<M, T>) {
+        let bends = self.bends::<4, 3, T>(room, tip, &self.sizes);
+        (self.station_of(u, tip, &bends), Roundings::of_joints(&bends.0, &bends.1))
+    }
+
+    #[inline(always)]
+    fn station_of<const W: usize, T: Argument>(
+        &self,
+        u: T,
+        [tip, slopes @ ..]: &[[T; M]; 4],
+        ([_, q1, q2, q3], way): &Bends<M, W, T>,
+    ) -> Station<M, T> {
         let tool = [self.feed_slope_of(tip, &slopes[0]) / way.value[0], self.curvature_by(slopes)];
         Station::of_joints(u, [&q1.value, &q2.value, &q3.value], way.value, tool)
     }
 
     /// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
-    fn bends<const ROUNDED: bool>(
+    #[inline(always)]
+    fn bends<const E: usize, const W: usize, T: Argument>(
         &self,
-        table: &mut [Jet<4, ROUNDED>],
-        tip: &[f64; M],
-        slopes: &[[f64; M]; 3],
-    ) -> Bends<M, ROUNDED> {
-        let (size, sizes) = match ROUNDED {
-            true => (self.size, *self.curve.derivative_sizes()),
-            false => (0.0, [[0.0; M]; 3]),
-        };
-        self.fill(table, |k| {
-            let term = |order: usize| match order {
-                0 => (tip[k], size),
-                order => (slopes[order - 1][k], sizes[order - 1][k]),
-            };
-            Jet {
-                value: std::array::from_fn(|order| term(order).0),
-                error: std::array::from_fn(|order| TIP_ROUNDINGS * term(order).1),
-            }
-        });
+        table: &mut [T::Kept],
+        tip: &[[T; M]; 4],
+        sizes: &[[f64; M]; E],
+    ) -> Bends<M, W, T> {
+        self.fill(table, tip, sizes);
+        let like = tip[0][0];
         // |C'|² by its axes.
-        let mut square = Jet::<3, ROUNDED>::constant(0.0);
-        for k in (0..M).filter(|&k| self.way_scale[k] != 0.0) {
+        let mut square = Jet::<3, W, T>::constant(like.filled(0.0));
+        for k in 0..M {
             let scale = self.way_scale[k];
-            let axis = Jet::<3, ROUNDED> {
-                value: std::array::from_fn(|order| scale * slopes[order][k]),
-                error: std::array::from_fn(|order| TIP_ROUNDINGS * scale * sizes[order][k]),
-            };
+            if scale == 0.0 {
+                continue;
+            }
+            let mut axis = square;
+            for order in 0..3 {
+                axis.value[order] = tip[order + 1][k] * scale;
+            }
+            for order in 0..W {
+                axis.error[order] = like.filled(TIP_ROUNDINGS * scale * sizes[order + 1][k]);
+            }
             let own = axis.times(&axis);
             for order in 0..3 {
-                square.value[order] += own.value[order];
-                if ROUNDED {
-                    square.error[order] += own.error[order] + own.value[order].abs();
-                }
+                square.value[order] = square.value[order] + own.value[order];
+            }
+            for order in 0..W {
+                square.error[order] = square.error[order] + (own.error[order] + own.value[order].size());
             }
         }
-        ([0, 1, 2, 3].map(|order| self.joint_rows(table, order)), square.root())
+        let joints = [
+            self.joint_rows::<4, E, T>(table, 0, like),
+            self.joint_rows::<4, E, T>(table, 1, like),
+            self.joint_rows::<4, E, T>(table, 2, like),
+            self.joint_rows::<4, E, T>(table, 3, like),
+        ];
+        (joints, square.root())
     }
 
-    /// From one position to another, both of this piece, or the first of an `other` one: joints known up to whole turns on one
-    /// of them turn by the smaller angle.
-    pub fn between(&self, before: &[f64; M], after: &[f64; M], other: Option<&Piece<M>>) -> [f64; M] {
-        std::array::from_fn(|k| {
-            let way = after[k] - before[k];
-            if self.turning(k) || other.is_some_and(|other| other.turning(k)) {
-                way - TURN * (way / TURN).round()
-            } else {
-                way
+    /// From one position to another, both of this piece: joints known up to whole turns turn by the smaller angle.
+    #[inline(always)]
+    pub fn way<T: Number>(&self, before: &[T; M], after: &[T; M]) -> [T; M] {
+        let mut way = *after;
+        for k in 0..M {
+            way[k] = after[k] - before[k];
+            if self.turning(k) {
+                way[k] = way[k] - (way[k] / way[k].filled(TURN)).rounded() * TURN;
             }
-        })
+        }
+        way
+    }
+
+    /// From a position on another piece to one on this: joints known up to whole turns on one of them turn by the smaller angle.
+    pub fn way_from(&self, other: &Piece<M>, before: &[f64; M], after: &[f64; M]) -> [f64; M] {
+        let way = self.way(before, after);
+        let turns = |k: usize| other.turning(k) && !self.turning(k);
+        vector_of(|k| if turns(k) { way[k] - TURN * (way[k] / TURN).round() } else { way[k] })
     }
 
     /// The greatest coordinate of the first control point.

@@ -27,7 +27,7 @@ pub fn audit_travel<const M: usize>(
     starts: &[f64],
     limits: &Limits<M>,
 ) -> Tally<M> {
-    let (mut tally, mut work, path) = (Tally::default(), of.work(), &of.path);
+    let (mut tally, mut room, path) = (Tally::default(), of.room(0.0), &of.path);
     let nowhere = (f64::NAN, Place { piece: 0, u: 0.0 });
     let mut spans: [Span; M] = [[nowhere; 2]; M];
     let mut turns = [f64::NAN; M];
@@ -38,11 +38,11 @@ pub fn audit_travel<const M: usize>(
         let intervals = INTERVALS * piece.curve.turns();
         for i in 0..=intervals {
             let u = piece.width * (i as f64 / intervals as f64);
-            let position = piece.at(u, &mut work);
+            let position = piece.at(u, &mut room);
             let reached = match &last {
                 None => position,
                 Some((before, own, seen)) => {
-                    let step = piece.between(own, &position, Some(before));
+                    let step = piece.way_from(before, own, &position);
                     std::array::from_fn(|k| seen[k] + step[k])
                 }
             };

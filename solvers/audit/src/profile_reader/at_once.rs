@@ -5,21 +5,19 @@
 
 use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat};
 
-use crate::curve::Curve;
 use crate::motion::Passage;
 use crate::nearest::Place;
+use crate::number::Lanes;
 use crate::phase_motion::ROUNDING;
 use crate::phases::Phases;
 use crate::quadrature::{by_gauss, by_rules, gauss_nodes, halves_by_rules, nodes, RULES_AGREE};
 use crate::speed_by_length::{cubic, cubic_acceleration, square, Pace};
-use crate::station::{Rounded, Roundings, Station, STILL};
+use crate::station::Rounded;
+use crate::together::Together;
 use crate::EPS;
 
 /// Places that are read at once.
 pub const PLACES: usize = 8;
-
-/// A number of each place.
-type Lanes = [f64; PLACES];
 
 /// The numbers of a phase that are used, and the place.
 const NUMBERS: usize = 8;
@@ -33,7 +31,12 @@ struct Found<const M: usize> {
 
 /// Fills in the passages at places of a piece without weights, each on its phase, where v² is a cubic of the length; and leaves out
 /// those that it cannot tell.
-pub fn read<const M: usize>(curve: &Curve<M>, phases: &Phases, places: &mut Vec<(Place, usize, Passage<M>)>) {
+pub fn read<const M: usize>(
+    on: &Together<M>,
+    phases: &Phases,
+    places: &mut Vec<(Place, usize, Passage<M>)>,
+    room: &mut [Lanes],
+) {
     for part in places.chunks_mut(PLACES) {
         let mut numbers = [[0.0; PLACES]; NUMBERS];
         for lane in 0..PLACES {
@@ -44,7 +47,7 @@ pub fn read<const M: usize>(curve: &Curve<M>, phases: &Phases, places: &mut Vec<
                 row[lane] = number;
             }
         }
-        let found = dispatch!(Level::new(), simd => look(simd, curve, &numbers));
+        let found = dispatch!(Level::new(), simd => look(simd, on, &numbers, room));
         for (lane, (_, _, passage)) in part.iter_mut().enumerate() {
             let since = found.since[lane];
             passage.since = since;
@@ -61,7 +64,12 @@ fn of_lane<const M: usize>(of: &Rounded<M, Lanes>, lane: usize) -> Rounded<M> {
 }
 
 #[inline(always)]
-fn look<const M: usize, S: Simd>(simd: S, curve: &Curve<M>, numbers: &[Lanes; NUMBERS]) -> Found<M> {
+fn look<const M: usize, S: Simd>(
+    simd: S,
+    on: &Together<M>,
+    numbers: &[Lanes; NUMBERS],
+    room: &mut [Lanes],
+) -> Found<M> {
     let nothing = f64x8::splat(simd, 0.0);
     let mut of = [nothing; NUMBERS];
     for row in 0..NUMBERS {
@@ -69,7 +77,7 @@ fn look<const M: usize, S: Simd>(simd: S, curve: &Curve<M>, numbers: &[Lanes; NU
     }
     let [u0, u1, p0, p1, a0, a1, duration, u] = of;
     // From the slower end; see `Phases::by_length`.
-    let (first, last) = (curve.polynomial_speed(u0) * p0.sqrt(), curve.polynomial_speed(u1) * p1.sqrt());
+    let (first, last) = (on.speed(u0) * p0.sqrt(), on.speed(u1) * p1.sqrt());
     let is_back = last.simd_lt(first);
     let speeds = [is_back.select(last, first), is_back.select(first, last)];
     let a = [is_back.select(a1 * -1.0, a0), is_back.select(a0 * -1.0, a1)];
@@ -78,7 +86,7 @@ fn look<const M: usize, S: Simd>(simd: S, curve: &Curve<M>, numbers: &[Lanes; NU
     let half = width * 0.5;
     let mut slopes = nodes(half, half);
     for i in 0..7 {
-        slopes[i] = curve.polynomial_speed(is_back.select(u1 - slopes[i], u0 + slopes[i]));
+        slopes[i] = on.speed(is_back.select(u1 - slopes[i], u0 + slopes[i]));
     }
     let ([length, doubt], first_half) = halves_by_rules(&slopes, half);
     let are_lengths_good = doubt.abs().simd_le(length * RULES_AGREE);
@@ -89,7 +97,7 @@ fn look<const M: usize, S: Simd>(simd: S, curve: &Curve<M>, numbers: &[Lanes; NU
     let reach = (d - from) * 0.5;
     let mut slopes = gauss_nodes((from + d) * 0.5, reach);
     for i in 0..3 {
-        slopes[i] = curve.polynomial_speed(is_back.select(u1 - slopes[i], u0 + slopes[i]));
+        slopes[i] = on.speed(is_back.select(u1 - slopes[i], u0 + slopes[i]));
     }
     let way = d.simd_gt(from + nudge).select(before + by_gauss(slopes, reach), before);
     let way = d.simd_ge(width).select(length, way);
@@ -105,10 +113,8 @@ fn look<const M: usize, S: Simd>(simd: S, curve: &Curve<M>, numbers: &[Lanes; NU
     let are_times_good = doubt.abs().simd_le(time.abs() * RULES_AGREE);
     let pace = Pace { v, a: is_back.select(a * -1.0, a), j: nothing };
     // The rates of the axes; see `Motion`.
-    let derivatives = curve.polynomial_derivatives(u);
-    let station = Station::anywhere(u, &derivatives);
-    let roundings = Roundings::new(curve, &station, &derivatives);
-    let is_directed = station.slope.simd_gt(f64x8::splat(simd, STILL * curve.size_lengths()[0]));
+    let (station, roundings) = on.rounded_station(u, room);
+    let is_directed = station.slope.simd_gt(f64x8::splat(simd, on.still()));
     let (velocity, acceleration) = (station.velocity(v), station.acceleration(pace));
     let [mut unsure, unsure_acceleration] = [roundings.velocity(v), roundings.acceleration(pace)];
     for k in 0..M {
@@ -137,6 +143,7 @@ mod tests {
     use super::*;
     use crate::columns::Columns;
     use crate::curve::{Followed, Pieces};
+    use crate::joints::path::{JointPath, Words};
     use crate::motion::Motion;
     use crate::phases::SPEED_CUBIC;
     use crate::Limits;
@@ -147,13 +154,15 @@ mod tests {
         control: &[f64],
         [u, speeds, a]: [[f64; 2]; 3],
         shares: &[f64],
+        has_joints: bool,
     ) -> Vec<(Passage<2>, Passage<2>)> {
         let degree = control.len() / 2 - 1;
         let (offsets, width) = ([0, degree + 1], [degree as f64]);
         let pieces = Pieces { axes: 2, stride: 2, control, weights: &[], offsets: &offsets, width: &width };
         let (path, free) = (Followed::of_one(pieces), Limits::none());
-        let mut columns = Columns::new(&path, &free, None);
-        let curve = columns.curve(0).clone();
+        let words = Words::polar();
+        let joints = JointPath::of_one(path, &words, &[1.0]);
+        let mut columns = Columns::new(&path, &free, has_joints.then_some(&joints));
         let p = speeds.map(|v| v * v);
         let phases =
             Phases { a0: &a[..1], a1: &a[1..], ..Phases::of_one(&[SPEED_CUBIC], &[255], &[0.0], &u, &p) };
@@ -161,7 +170,8 @@ mod tests {
         let at = |share: f64| Place { piece: 0, u: u[0] + share * (u[1] - u[0]) };
         let mut places: Vec<_> =
             shares.iter().map(|&share| (at(share), 0, Passage::unknown(at(share).u))).collect();
-        read(&curve, &phases, &mut places);
+        let on = columns.together(0).expect("a piece without weights");
+        read(&on, &phases, &mut places, &mut columns.room());
         places.iter().map(|(place, _, found)| (*found, motion.passage(place.u, &mut columns))).collect()
     }
 
@@ -177,12 +187,12 @@ mod tests {
     #[test]
     fn a_place_where_a_rule_is_not_enough_or_nothing_has_a_direction_is_left_out() {
         let wavy = [0.0, 0.0, 1.0, 3.0, 2.0, -3.0, 3.0, 3.0, 4.0, 0.0];
-        assert!(passages(&wavy, [[0.0, 4.0], [1.0; 2], [0.0; 2]], &SHARES).is_empty());
+        assert!(passages(&wavy, [[0.0, 4.0], [1.0; 2], [0.0; 2]], &SHARES, false).is_empty());
         let line = [0.0, 0.0, 1.0, 0.0, 2.0, 0.0];
-        let crawling = passages(&line, [[0.0, 2.0], [1e-6, 1.0], [0.0, 0.5]], &SHARES);
+        let crawling = passages(&line, [[0.0, 2.0], [1e-6, 1.0], [0.0, 0.5]], &SHARES, false);
         assert!(crawling.len() < SHARES.len(), "{}", crawling.len());
         let from_a_cusp = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0];
-        assert!(passages(&from_a_cusp, [[0.0, 1.0], [1.0; 2], [0.0; 2]], &[0.0]).is_empty());
+        assert!(passages(&from_a_cusp, [[0.0, 1.0], [1.0; 2], [0.0; 2]], &[0.0], false).is_empty());
     }
 
     proptest! {
@@ -196,12 +206,14 @@ mod tests {
             part in -4.0..-0.7_f64,
             speed in 0.9..1.1_f64,
             a in prop::array::uniform2(-0.1..0.1_f64),
+            has_joints: bool,
         ) {
-            let control: Vec<f64> = (0..=degree).flat_map(|i| [i as f64, 0.3 * bends[i]]).collect();
+            // Away from the origin, where joints have no direction.
+            let control: Vec<f64> = (0..=degree).flat_map(|i| [-4.0 + i as f64, 2.0 + 0.3 * bends[i]]).collect();
             let (degree, part) = (degree as f64, 10.0_f64.powf(part));
             let u = [degree * cut, degree * (cut + part)];
             let speeds = [speed, speed + 0.5 * (a[0] + a[1]) * (u[1] - u[0]) / speed];
-            let found = passages(&control, [u, speeds, a], &SHARES);
+            let found = passages(&control, [u, speeds, a], &SHARES, has_joints);
             prop_assert!(part > 1e-3 || found.len() == SHARES.len(), "{} at {part}", found.len());
             for (beside, alone) in &found {
                 prop_assert_eq!(bits(beside), bits(alone), "{:?} {:?}", beside, alone);

@@ -1,6 +1,6 @@
 //! Recorded formulas, evaluated by the Taylor series and intervals of the planner and by the jets of the audit.
 
-use feedplan_audit::joints::formula::{Formula, Jet};
+use feedplan_audit::joints::formula::{Argument, Formula, Jet, JET};
 use feedplan_audit::EPS;
 use feedplan_geometry::interval::Interval;
 use feedplan_kinematics::expression::Expression;
@@ -42,18 +42,18 @@ proptest! {
         let ours = Formula::new(INPUTS, &rows, &constants, &last).expect("a list in order");
         let mut table = theirs.table::<f64>(3);
         let mut bounds = theirs.table::<Interval>(3);
-        let mut jets = vec![Jet::<4, true>::constant(0.0); ours.places()];
+        let mut jets = vec![0.0; JET * ours.places()];
         let factorial = [1.0, 1.0, 2.0, 6.0];
         for (i, terms) in [x, y].into_iter().enumerate() {
             table.input(i).copy_from_slice(&terms);
             bounds.input(i).copy_from_slice(&terms.map(Interval::exactly));
-            jets[i].value = std::array::from_fn(|k| terms[k] * factorial[k]);
-            jets[i].error = jets[i].value.map(f64::abs);
+            let value: [f64; 4] = std::array::from_fn(|k| terms[k] * factorial[k]);
+            Jet { value, error: value.map(f64::abs) }.keep(&mut jets, i);
         }
         theirs.evaluate(&mut table);
         theirs.evaluate(&mut bounds);
-        ours.evaluate(&mut jets);
-        let jet = jets[ours.outputs[0]];
+        f64::evaluate::<4, 4>(&ours, &mut jets);
+        let jet = Jet::<4, 4>::taken(0.0, &jets, ours.outputs[0]);
         for k in 0..4 {
             let (value, error) = (jet.value[k], EPS * jet.error[k]);
             let bound = theirs.output(&bounds, 0)[k];
@@ -66,6 +66,33 @@ proptest! {
                 prop_assert!(near.lo <= series && series <= near.hi);
                 // The exact derivative is within the bounds and within the error of the audit's derivative.
                 prop_assert!(value + error >= near.lo && value - error <= near.hi, "{k}: {value} ± {error}, {near:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_formula_has_the_same_bits_at_one_place_and_at_eight_at_once(
+        choices in proptest::collection::vec(
+            (any::<bool>(), 0usize..8, 0usize..40, 0usize..40, -3.0f64..3.0), 1..12),
+        inputs in proptest::array::uniform8(proptest::array::uniform16(-2.0f64..2.0)),
+    ) {
+        let (rows, constants) = formula(&choices);
+        let last = [(INPUTS + rows.len() - 1) as i32];
+        let ours = Formula::new(INPUTS, &rows, &constants, &last).expect("a list in order");
+        let mut at_once = vec![[0.0; 8]; JET * ours.places()];
+        for (lane, numbers) in inputs.iter().enumerate() {
+            for (row, number) in at_once.iter_mut().zip(numbers) {
+                row[lane] = *number;
+            }
+        }
+        ours.evaluate_at_once::<4, 4>(&mut at_once);
+        for (lane, numbers) in inputs.iter().enumerate() {
+            let mut alone = vec![0.0; JET * ours.places()];
+            alone[..numbers.len()].copy_from_slice(numbers);
+            f64::evaluate::<4, 4>(&ours, &mut alone);
+            for (row, number) in at_once.iter().zip(&alone) {
+                // Numbers that are none have any sign.
+                prop_assert!(row[lane].to_bits() == number.to_bits() || row[lane].is_nan() && number.is_nan());
             }
         }
     }
