@@ -4,7 +4,7 @@
 //! follow from the law of each phase or are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `vectors`, `number`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
+//! The path: `vectors`, `number`, `elementary`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
 //! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics), `together` (at several places at once). The profile: `phases`, `phase_order`, `quadrature`,
 //! `phase_motion`, `speed_by_length`, `bulge`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
 //! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Loops: `parallel`. Other crates call `kernels`.
@@ -18,6 +18,7 @@ mod columns;
 pub mod curve;
 mod deviation;
 mod differences;
+mod elementary;
 mod hodographs;
 pub mod joints;
 pub mod kernels;

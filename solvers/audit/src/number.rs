@@ -32,10 +32,6 @@ pub trait Number:
     fn rounded(self) -> Self;
     /// `other` where `of` is not finite.
     fn where_finite(self, of: Self, other: f64) -> Self;
-    /// Sine and cosine of an angle in radians.
-    fn wave(self) -> [Self; 2];
-    /// The angle in radians of the vector (x, self).
-    fn angle(self, x: Self) -> Self;
 }
 
 impl Number for f64 {
@@ -89,17 +85,6 @@ impl Number for f64 {
             other
         }
     }
-
-    #[inline(always)]
-    fn wave(self) -> [Self; 2] {
-        let (sine, cosine) = self.sin_cos();
-        [sine, cosine]
-    }
-
-    #[inline(always)]
-    fn angle(self, x: Self) -> Self {
-        self.atan2(x)
-    }
 }
 
 impl<S: Simd> Number for f64x8<S> {
@@ -149,25 +134,6 @@ impl<S: Simd> Number for f64x8<S> {
     fn where_finite(self, of: Self, other: f64) -> Self {
         // 0 times what is not finite is no number.
         (of * 0.0).simd_eq(of.filled(0.0)).select(self, of.filled(other))
-    }
-
-    #[inline(always)]
-    fn wave(self) -> [Self; 2] {
-        let (angles, mut sines, mut cosines) = (self.kept(), [0.0; 8], [0.0; 8]);
-        for i in 0..8 {
-            (sines[i], cosines[i]) = angles[i].sin_cos();
-        }
-        [self.taken(&sines), self.taken(&cosines)]
-    }
-
-    #[inline(always)]
-    fn angle(self, x: Self) -> Self {
-        let (y, x) = (self.kept(), x.kept());
-        let mut angles = [0.0; 8];
-        for i in 0..8 {
-            angles[i] = y[i].atan2(x[i]);
-        }
-        self.taken(&angles)
     }
 }
 

@@ -10,7 +10,8 @@ use std::f64::consts::PI;
 
 use fearless_simd::{dispatch, f64x8, Level, Simd, SimdBase};
 
-use crate::number::{Lanes, Number};
+use crate::elementary::Elementary;
+use crate::number::Lanes;
 
 /// Error of an elementary function, in roundings of its value.
 const ELEMENTARY: f64 = 4.0;
@@ -26,7 +27,7 @@ pub struct Jet<const N: usize, const E: usize, T = f64> {
 pub const JET: usize = 8;
 
 /// What a formula is evaluated on: a number, or eight at once.
-pub trait Argument: Number {
+pub trait Argument: Elementary {
     /// Fills the table of results, in which the inputs are given; each result has N values and E errors.
     fn evaluate<const N: usize, const E: usize>(formula: &Formula, table: &mut [Self::Kept]);
 }
@@ -98,7 +99,7 @@ impl Formula {
 
     /// Fills the table of results, in which the inputs are given; `nothing` is 0 in all places.
     #[inline(always)]
-    fn fill<const N: usize, const E: usize, T: Number>(&self, nothing: T, table: &mut [T::Kept]) {
+    fn fill<const N: usize, const E: usize, T: Elementary>(&self, nothing: T, table: &mut [T::Kept]) {
         // The cosine of an angle comes right after its sine.
         let mut wave = [nothing; 2];
         for (i, step) in self.steps.iter().enumerate() {
@@ -139,7 +140,7 @@ impl Formula {
 const BINOMIAL: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
 
-impl<const N: usize, const E: usize, T: Number> Jet<N, E, T> {
+impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
     /// Known exactly, and the same everywhere.
     #[inline(always)]
     pub fn constant(value: T) -> Self {
