@@ -19,6 +19,15 @@ pub struct Bulge<T> {
     pub slope: T,
 }
 
+impl<T: Number> Bulge<T> {
+    /// Where nothing bounds what lies between; `like` has the places of its numbers.
+    #[inline(always)]
+    pub fn unknown(like: T) -> Self {
+        let any = like.filled(f64::INFINITY);
+        Self { rates: [any; 3], curvature: any, most_speed: any, slope: any }
+    }
+}
+
 /// What is known of places of a phase.
 pub struct Known<T> {
     /// The longest interval of u from one to the next.

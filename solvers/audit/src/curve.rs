@@ -308,9 +308,15 @@ impl<const M: usize> Curve<M> {
     /// C and its first three derivatives on a piece without weights, at one u or at several.
     #[inline(always)]
     pub fn polynomial_jet<T: Number>(&self, u: T) -> [[T; M]; 4] {
+        let [first, second, third] = self.polynomial_derivatives(u);
+        [self.polynomial_point(u), first, second, third]
+    }
+
+    /// C on a piece without weights, at one u or at several.
+    #[inline(always)]
+    pub fn polynomial_point<T: Number>(&self, u: T) -> [T; M] {
         let (t, rest) = self.parts(u);
-        let [first, second, third] = by_width(self.hodographs.polynomial_rates(t, rest), self.per_width);
-        [self.hodographs.polynomial_point(t, rest), first, second, third]
+        self.hodographs.polynomial_point(t, rest)
     }
 
     /// C and C' on a piece without weights, at one u or at several.

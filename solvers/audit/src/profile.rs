@@ -71,7 +71,8 @@ pub fn audit_profile<'a, const M: usize>(
 ) -> Tally<M> {
     let phases = of.phases;
     let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
-        let (mut columns, mut looks) = (columns(), Looks::default());
+        let mut columns = columns();
+        let mut looks = Looks::new(columns.room());
         let first = block.start;
         let groups = phases.groups(block, GROUP);
         for group in groups.iter().step_by(FIRST) {
@@ -210,17 +211,11 @@ impl<const M: usize> Audited<'_, M> {
         looks.phases.clear();
         looks.times.clear();
         looks.times.resize(group.len(), None);
-        if !columns.are_axes() || piece >= phases.pieces {
-            return;
-        }
-        let curve = columns.curve(piece).clone();
-        if curve.polygon.is_rational() {
-            return;
-        }
+        let Some(on) = (piece < phases.pieces).then(|| columns.together(piece)).flatten() else { return };
         looks.phases.extend(group.clone().map(|i| {
             let u = [phases.u0[i], phases.u1[i]];
             let is_cubic = phases.kind[i] != PATH_JERK && phases.is_by_length(i, columns);
-            let is_good = self.are_good[i] && is_order(u, curve.width());
+            let is_good = self.are_good[i] && is_order(u, on.curve.width());
             (is_cubic && is_good).then(|| at_once::Phase {
                 u,
                 p: [phases.p0[i], phases.p1[i]],
@@ -229,7 +224,8 @@ impl<const M: usize> Audited<'_, M> {
             })
         }));
         let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
-        Places { curve: &curve, columns, limits: self.limits, feeds, feeds_along }.look_at(looks, tally);
+        let Columns { rates, per_least, .. } = &*columns;
+        Places { on: &on, rates, per_least, limits: self.limits, feeds, feeds_along }.look_at(looks, tally);
     }
 
     /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share

@@ -2,9 +2,11 @@
 
 use std::rc::Rc;
 
+use fearless_simd::{dispatch, f64x8, Level, SimdBase};
+
 use super::formula::{Argument, Formula, Jet, JET};
 use crate::curve::{Curve, Followed};
-use crate::number::{inner, Number};
+use crate::number::{inner, Lanes, Number};
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{curvature, length, times, vector_of};
 use crate::{EPS, ROUNDINGS};
@@ -284,10 +286,42 @@ impl<const M: usize> Piece<'_, M> {
         Rounded { value, rounding }
     }
 
-    /// Positions of the joints, angles as the kinematics gives them.
-    pub fn at(&self, u: f64, room: &mut [f64]) -> [f64; M] {
-        self.fill(room, &[self.curve.at(u)], &[]);
-        self.joint_rows::<1, 0, f64>(room, 0, u).value
+    /// Positions of the joints at eight places, angles as the kinematics gives them.
+    pub fn at_each(&self, u: &Lanes, room: &mut [Lanes]) -> [Lanes; M] {
+        let mut tips = [[0.0; 8]; M];
+        if self.curve.polygon.is_rational() {
+            for i in 0..8 {
+                let tip = self.curve.at(u[i]);
+                for k in 0..M {
+                    tips[k][i] = tip[k];
+                }
+            }
+        }
+        dispatch!(Level::new(), simd => self.look_at_each(f64x8::from_slice(simd, u), &tips, room))
+    }
+
+    /// The same, the places of the tip being at hand on pieces with weights.
+    #[inline(always)]
+    fn look_at_each<T: Argument<Kept = Lanes>>(
+        &self,
+        u: T,
+        tips: &[Lanes; M],
+        room: &mut [Lanes],
+    ) -> [Lanes; M] {
+        let mut tip = [u; M];
+        if self.curve.polygon.is_rational() {
+            for k in 0..M {
+                tip[k] = u.taken(&tips[k]);
+            }
+        } else {
+            tip = self.curve.polynomial_point(u);
+        }
+        self.fill(room, &[tip], &[]);
+        let (found, mut positions) = (self.joint_rows::<1, 0, T>(room, 0, u).value, [[0.0; 8]; M]);
+        for k in 0..M {
+            positions[k] = found[k].kept();
+        }
+        positions
     }
 
     /// Positions and slopes of the joints where those of the tip are at hand.

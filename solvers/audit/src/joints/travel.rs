@@ -27,7 +27,7 @@ pub fn audit_travel<const M: usize>(
     starts: &[f64],
     limits: &Limits<M>,
 ) -> Tally<M> {
-    let (mut tally, mut room, path) = (Tally::default(), of.room(0.0), &of.path);
+    let (mut tally, mut room, path) = (Tally::default(), of.room([0.0; 8]), &of.path);
     let nowhere = (f64::NAN, Place { piece: 0, u: 0.0 });
     let mut spans: [Span; M] = [[nowhere; 2]; M];
     let mut turns = [f64::NAN; M];
@@ -36,9 +36,15 @@ pub fn audit_travel<const M: usize>(
     for number in 0..path.len() {
         let piece = Rc::new(of.piece(number));
         let intervals = INTERVALS * piece.curve.turns();
+        let place = |i: usize| piece.width * (i as f64 / intervals as f64);
+        let mut positions = [[0.0; 8]; M];
         for i in 0..=intervals {
-            let u = piece.width * (i as f64 / intervals as f64);
-            let position = piece.at(u, &mut room);
+            let (u, lane) = (place(i), i % 8);
+            if lane == 0 {
+                positions =
+                    piece.at_each(&std::array::from_fn(|lane| place(intervals.min(i + lane))), &mut room);
+            }
+            let position = std::array::from_fn(|k| positions[k][lane]);
             let reached = match &last {
                 None => position,
                 Some((before, own, seen)) => {

@@ -11,11 +11,11 @@ use fearless_simd::{dispatch, f64x8, mask64x8, Level, Select, Simd, SimdBase, Si
 
 use crate::bulge::{bulge, Bulge, Known};
 use crate::chord::chord_error;
-use crate::columns::{Columns, RATES};
-use crate::curve::Curve;
-use crate::number::{inner, Number};
+use crate::columns::RATES;
+use crate::number::{inner, Lanes, Number};
 use crate::speed_by_length::{cubic_bounds, is_same_speed, Pace, SpeedByLength};
-use crate::{Check, Limits, Tally, FEEDS};
+use crate::together::Together;
+use crate::{Check, Limits, Sided, Tally, FEEDS};
 
 use super::by_length::WIDE;
 
@@ -24,9 +24,6 @@ pub const PHASES: usize = 8;
 
 /// Places of a phase.
 pub const PLACES: usize = 8;
-
-/// A number of each phase.
-type Lanes = [f64; PHASES];
 
 /// Where the places are: from −1 at the start of the phase to 1 at its end; and in parts of the phase.
 const NODES: [f64; PLACES] = {
@@ -123,6 +120,9 @@ const LOWEST: Weights = weights([0, 2, 5, 7]);
 const CHANCE: f64 = 3e-3;
 const RULES_AGREE: f64 = 3e-8;
 
+/// The polynomial through all places is nowhere greater than this times the greatest value at one of them.
+const GREATEST: f64 = 2.0;
+
 /// The longest interval between two places, in parts of the phase.
 const LONGEST: f64 = SHARES[4] - SHARES[3];
 
@@ -131,6 +131,10 @@ const SLOW_SQ: f64 = 1e-4;
 
 /// Where |C'| is below this share of its size the piece has no direction to speak of.
 const STILL: f64 = 1e-6;
+
+/// A part of a phase of joints, of which nothing bounds what lies between the places, has no more than this part of its piece in degrees:
+/// as close to each other are the places that `by_length` looks at.
+const MOST_TURNED: f64 = 7.0 / 3.0;
 
 /// A part of a phase is halved so often at most: all places of one look cost as much as some five of `by_length`.
 const MOST_HALVINGS: u32 = 4;
@@ -179,12 +183,23 @@ pub struct Looks {
     pub times: Vec<Option<f64>>,
     /// Parts of them that have not been looked at.
     open: Vec<Part>,
+    /// See `Columns::room`.
+    room: Vec<Lanes>,
+}
+
+impl Looks {
+    /// Without any phases.
+    pub fn new(room: Vec<Lanes>) -> Self {
+        Self { room, ..Self::default() }
+    }
 }
 
 /// What holds on the piece of the phases.
 pub struct Places<'a, 'b, const M: usize> {
-    pub curve: &'a Curve<M>,
-    pub columns: &'a Columns<'b, M>,
+    pub on: &'a Together<'b, M>,
+    /// See `Columns`.
+    pub rates: &'a [[Sided<M>; 2]; 3],
+    pub per_least: &'a [[f64; M]; 3],
     pub limits: &'a Limits<M>,
     pub feeds: [f64; FEEDS],
     pub feeds_along: [bool; FEEDS],
@@ -192,7 +207,7 @@ pub struct Places<'a, 'b, const M: usize> {
 
 impl<const M: usize> Places<'_, '_, M> {
     /// Finds the times of those phases that cannot change the tally, by their laws.
-    pub fn look_at(&self, Looks { phases, times, open }: &mut Looks, tally: &Tally<M>) {
+    pub fn look_at(&self, Looks { phases, times, open, room }: &mut Looks, tally: &Tally<M>) {
         times.clear();
         times.extend(phases.iter().map(|phase| phase.map(|_| 0.0)));
         open.clear();
@@ -208,25 +223,30 @@ impl<const M: usize> Places<'_, '_, M> {
             }));
         }
         let Some((&any, Some(phase))) = open.last().map(|part| (part, &phases[part.number])) else { return };
-        let (mut parts, mut lanes) = ([any; PHASES], [phase; PHASES]);
+        let (mut parts, mut lanes, widest) = ([any; PHASES], [phase; PHASES], self.widest());
         loop {
             // Halves of parts that were open, and other phases.
             let mut count = 0;
             while let Some(part) = if count < PHASES { open.pop() } else { None } {
                 if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
+                    if part.u[1] - part.u[0] > widest {
+                        let halves = self.halve((&part, phase), None, open);
+                        times[part.number] = times[part.number].filter(|_| halves.is_some());
+                        continue;
+                    }
                     (parts[count], lanes[count], count) = (part, phase, count + 1);
                 }
             }
             if count == 0 {
                 return;
             }
-            let found = dispatch!(Level::new(), simd => self.look(simd, &parts, &lanes, tally));
+            let found = dispatch!(Level::new(), simd => self.look(simd, (&parts, &lanes), tally, room));
             for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
                 let sum = times[part.number];
                 times[part.number] = if found.verdict[i] == NOTHING {
                     sum.zip(part.time(phase, &found, i)).map(|(sum, time)| sum + time)
                 } else if found.verdict[i] == OPEN {
-                    sum.filter(|_| self.halve((part, phase), &found, i, open).is_some())
+                    sum.filter(|_| self.halve((part, phase), Some((&found, i)), open).is_some())
                 } else {
                     None
                 };
@@ -234,24 +254,24 @@ impl<const M: usize> Places<'_, '_, M> {
         }
     }
 
-    /// Adds both halves of a part that was found open.
+    /// Adds both halves of a part; what was found of it, if it has been looked at.
     fn halve(
         &self,
         (part, phase): (&Part, &Phase),
-        found: &Found,
-        i: usize,
+        found: Option<(&Found, usize)>,
         open: &mut Vec<Part>,
     ) -> Option<()> {
         let halvings = part.halvings.checked_sub(1)?;
         let known = |x: f64| Some(x).filter(|x| !x.is_nan());
-        let length = known(found.length[i]).or_else(|| self.length(part.u, MOST_HALVINGS))?;
+        let length = found.and_then(|(found, i)| known(found.length[i]));
+        let length = length.or_else(|| self.length(part.u, MOST_HALVINGS))?;
         let [start, end] = part.ends(length);
-        let (speed_sq, whole) = match known(found.whole[i]) {
-            Some(whole) => (found.speed_sq.map(|lanes| lanes[i]), whole),
-            None => {
-                let square = self.curve.speeds(part.u, &[1.0; M]).map(|slope| slope * slope);
-                (phase.speed_sq(square)?, length)
-            }
+        let of_phase =
+            found.and_then(|(found, i)| Some((found.speed_sq.map(|lanes| lanes[i]), known(found.whole[i])?)));
+        let (speed_sq, whole) = match of_phase {
+            Some(known) => known,
+            None if !part.whole.is_nan() => (part.speed_sq, part.whole),
+            None => (phase.speed_sq(self.speeds(part.u).map(|slope| slope * slope))?, length),
         };
         let middle = 0.5 * (part.u[0] + part.u[1]);
         let half = |u, ends| Part { u, ends, speed_sq, whole, halvings, ..*part };
@@ -260,11 +280,24 @@ impl<const M: usize> Places<'_, '_, M> {
         Some(())
     }
 
+    /// The widest part of a phase that is looked at, which of axes may be anything.
+    fn widest(&self) -> f64 {
+        let curve = &self.on.curve;
+        match self.on.joints {
+            Some(_) => MOST_TURNED / curve.turns() as f64 * curve.width(),
+            None => f64::INFINITY,
+        }
+    }
+
+    /// Derivatives of the length by u.
+    fn speeds<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        self.on.curve.speeds(u, &self.on.scale.unwrap_or([1.0; M]))
+    }
+
     /// The length between two parameters.
     fn length(&self, [from, to]: [f64; 2], halvings: u32) -> Option<f64> {
         let width = to - from;
-        let (length, doubts) =
-            integral(&self.curve.speeds(SHARES.map(|share| from + share * width), &[1.0; M]));
+        let (length, doubts) = integral(&self.speeds(SHARES.map(|share| from + share * width)));
         if doubts.iter().all(|&doubt| doubt <= RULES_AGREE * length) {
             return Some(length * width);
         }
@@ -277,9 +310,9 @@ impl<const M: usize> Places<'_, '_, M> {
     fn look<S: Simd>(
         &self,
         simd: S,
-        parts: &[Part; PHASES],
-        phases: &[&Phase; PHASES],
+        (parts, phases): (&[Part; PHASES], &[&Phase; PHASES]),
         tally: &Tally<M>,
+        room: &mut [Lanes],
     ) -> Found {
         let all = |x: f64| f64x8::splat(simd, x);
         let nothing = all(0.0);
@@ -287,14 +320,23 @@ impl<const M: usize> Places<'_, '_, M> {
         let width = of_each(simd, parts, |part| part.u[1]) - from;
         // Whatever they are before: nothing would be written by a call.
         let (mut derivatives, mut slope) = ([[[width; M]; 3]; PLACES], [width; PLACES]);
+        let (curve, mut tool) = (&self.on.curve, [[width; 2]; PLACES]);
         for i in 0..PLACES {
-            derivatives[i] = self.curve.polynomial_derivatives(from + width * SHARES[i]);
-            slope[i] = inner(&derivatives[i][0], &derivatives[i][0]).sqrt();
+            let u = from + width * SHARES[i];
+            if let Some(joints) = &self.on.joints {
+                let station = joints.station(u, &curve.polynomial_jet(u), room);
+                derivatives[i] = [station.first, station.second, station.third];
+                (slope[i], tool[i]) = (station.slope, [station.tip, station.curvature]);
+            } else {
+                derivatives[i] = curve.polynomial_derivatives(u);
+                slope[i] = inner(&derivatives[i][0], &derivatives[i][0]).sqrt();
+            }
         }
+        let are_axes = self.on.joints.is_none();
         let slopes = [joined(&slope, f64x8::min), joined(&slope, f64x8::max)];
         let (share, doubts) = integral(&slope);
         let is_good = agree(share, doubts);
-        let is_still = slopes[0].simd_le(all(STILL * self.curve.size_lengths()[0]));
+        let is_still = slopes[0].simd_le(all(STILL * curve.size_lengths()[0]));
         let length = share * width;
         // The motion along the path.
         let ends: [Lanes; 2] = [(slope[0] * slope[0]).into(), (slope[PLACES - 1] * slope[PLACES - 1]).into()];
@@ -344,6 +386,15 @@ impl<const M: usize> Places<'_, '_, M> {
             let ([c1, c2, c3], per) = (&derivatives[i], 1.0 / slope[i]);
             let (per2, square, mixed) = (per * per, v[i] * v[i], v[i] * a * 3.0);
             let (per3, cube) = (per2 * per, square * v[i]);
+            if !are_axes {
+                for k in 0..M {
+                    rates[0][k][i] = c1[k] * v[i];
+                    rates[1][k][i] = c1[k] * a + c2[k] * square;
+                    rates[2][k][i] = c1[k] * j + c2[k] * mixed + c3[k] * cube;
+                }
+                (v[i], second_sq[i]) = (v[i] * tool[i][0], tool[i][1] * tool[i][1]);
+                continue;
+            }
             let mut first = [nothing; M];
             for k in 0..M {
                 first[k] = c1[k] * per;
@@ -375,7 +426,7 @@ impl<const M: usize> Places<'_, '_, M> {
             third: third_sq.sqrt(),
             paces: cubic_bounds([&paces[0], &paces[PLACES - 1]], length),
         };
-        let bulge = bulge(self.curve.bounds(), &known);
+        let bulge = if are_axes { bulge(curve.bounds(), &known) } else { Bulge::unknown(width) };
         let is_bounded = bulge.slope.simd_gt(nothing);
         let (nothing_more, open, more) = (all(NOTHING), all(OPEN), all(MORE));
         let is_refused = first.simd_ne(first);
@@ -384,19 +435,22 @@ impl<const M: usize> Places<'_, '_, M> {
         verdict = is_good.select(verdict, open);
         verdict = is_still.select(more, verdict);
         let mut find = |found: f64x8<S>| verdict = verdict.simd_eq(nothing).select(found, verdict);
+        // How far what lies between two places may be off the straight line, in parts of a limit; where nothing bounds it, that is told
+        // by the polynomial through the places.
+        let off = |rate: f64x8<S>, per: f64| are_axes.then(|| rate * per);
         // The limits of the axes.
-        let (moves, judged) = (self.curve.derivative_size(), if self.limits.judges_jerk { 3 } else { 2 });
+        let (moves, judged) = (curve.derivative_size(), if self.limits.judges_jerk { 3 } else { 2 });
         for row in (0..judged).rev() {
             let worst = tally.ratios(RATES[row]);
-            let (per, per_least) = (&self.columns.rates[row][1], &self.columns.per_least[row]);
-            for k in (0..M).filter(|&k| moves[k] > 0.0) {
+            let (per, per_least) = (&self.rates[row][1], &self.per_least[row]);
+            for k in (0..self.limits.axes).filter(|&k| moves[k] > 0.0 || !are_axes) {
                 // No axis is faster than the tool.
                 if row == 0 && are_all((bulge.most_speed * per_least[k]).simd_le(all(worst[k]))) {
                     continue;
                 }
                 let (positive, negative) = (all(per.positive[k]), all(per.negative[k]));
                 let use_of = |rate: f64x8<S>| rate * rate.simd_lt(nothing).select(negative, positive);
-                find(verdict_of(&rates[row][k], use_of, bulge.rates[row] * per_least[k], worst[k]));
+                find(verdict_of(&rates[row][k], use_of, off(bulge.rates[row], per_least[k]), worst[k]));
             }
         }
         let worst = |check: Check| tally.get(check, 0).ratio;
@@ -417,9 +471,15 @@ impl<const M: usize> Places<'_, '_, M> {
                     speed[i] = square.sqrt();
                 }
             }
-            find(verdict_of(&speed, |v| v * per, bulge.rates[0] * per, worst));
+            find(verdict_of(&speed, |v| v * per, off(bulge.rates[0], per), worst));
         }
-        if self.limits.chord_tolerance.is_finite() {
+        if self.limits.chord_tolerance.is_finite() && !are_axes {
+            let (mut error, per) = (v, 1.0 / self.limits.chord_tolerance);
+            for i in 0..PLACES {
+                error[i] = chord_error(v[i] * self.limits.period, tool[i][1]);
+            }
+            find(verdict_of(&error, |error| error * per, None, worst(Check::Chord)));
+        } else if self.limits.chord_tolerance.is_finite() {
             let (period, most) = (self.limits.period, all(worst(Check::Chord) * self.limits.chord_tolerance));
             let mut are_low =
                 are_chords_low(bulge.most_speed, joined(&second_sq, f64x8::max), &bulge, period, most);
@@ -481,15 +541,16 @@ impl Part {
 }
 
 /// What the uses of a limit at the places say, where nothing between two of them is off the straight line from place to place by more
-/// than `off`: by that bound, or by a parabola through two places and the polynomial half-way between those; see `peak`.
+/// than `off`, if that is known: by that bound, by the polynomial through all places, which is nowhere greater than `GREATEST` times
+/// what is greatest at one of them, or by a parabola through two places and the polynomial half-way between those; see `peak`.
 #[inline(always)]
 fn verdict_of<S: Simd>(
     rate: &[f64x8<S>; PLACES],
     use_of: impl Fn(f64x8<S>) -> f64x8<S>,
-    off: f64x8<S>,
+    off: Option<f64x8<S>>,
     worst: f64,
 ) -> f64x8<S> {
-    let all = |x: f64| f64x8::splat(off.simd, x);
+    let all = |x: f64| f64x8::splat(rate[0].simd, x);
     let (most, mut used) = (all(worst), *rate);
     let (mut greatest, mut sum) = (all(0.0), all(0.0));
     for i in 0..PLACES {
@@ -499,9 +560,12 @@ fn verdict_of<S: Simd>(
         sum += used[i];
     }
     let are_below = greatest.simd_le(most) & (sum * 0.0).simd_eq(all(0.0));
-    let are_certain = are_below & (greatest + off).simd_le(most);
+    let (mut are_certain, mut are_narrow) = (greatest.simd_lt(greatest), are_below);
+    if let Some(off) = off {
+        are_certain = are_below & (greatest + off).simd_le(most);
+        are_narrow = are_below & !are_certain & off.simd_le(all(WIDE));
+    }
     let verdict = are_certain.select(all(NOTHING), are_below.select(all(OPEN), all(MORE)));
-    let are_narrow = are_below & !are_certain & off.simd_le(all(WIDE));
     if !is_any(are_narrow) {
         return verdict;
     }
@@ -511,6 +575,10 @@ fn verdict_of<S: Simd>(
     }
     let doubt = use_of(last).abs();
     let limit = most - doubt;
+    let are_nowhere_greater = are_narrow & (greatest * GREATEST).simd_le(limit);
+    if !is_any(are_narrow & !are_nowhere_greater) {
+        return are_nowhere_greater.select(all(NOTHING), verdict);
+    }
     let mut are_low = are_narrow;
     for i in 0..PLACES - 1 {
         let mut middle = all(0.0);
@@ -597,10 +665,10 @@ fn is_any<S: Simd>(mask: mask64x8<S>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::columns::Columns;
     use crate::curve::{Followed, Pieces};
+    use crate::joints::path::{JointPath, Words};
     use crate::phases::{Phases, SPEED_CUBIC};
-    use crate::station::Station;
-    use crate::vectors::length;
     use crate::Sided;
     use proptest::prelude::*;
 
@@ -629,30 +697,56 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_polynomial_through_all_places_is_nowhere_greater_than_its_bound() {
+        let mut most = 0.0_f64;
+        for step in 0..=10_000 {
+            let x = -1.0 + 2e-4 * f64::from(step);
+            let of = |j: usize| {
+                (0..PLACES).filter(|&i| i != j).map(|i| (x - NODES[i]) / (NODES[j] - NODES[i])).product()
+            };
+            most = most.max((0..PLACES).map(|j| f64::abs(of(j))).sum());
+        }
+        assert!((0.9 * GREATEST..GREATEST).contains(&most), "{most}");
+    }
+
     /// The answer where `worst` of each rate, of the feed and of the chord error have been found before, in parts of what the phase
     /// uses; the time by the law; and what it uses of each rate.
     fn look(
         control: &[f64],
+        phase: [[f64; 2]; 3],
+        worst: &dyn Fn(Check, usize) -> f64,
+    ) -> (Option<f64>, f64, [[f64; 2]; 3]) {
+        look_of(control, phase, worst, false)
+    }
+
+    /// The same of axes or of joints.
+    fn look_of(
+        control: &[f64],
         [u, speeds, a]: [[f64; 2]; 3],
         worst: &dyn Fn(Check, usize) -> f64,
+        has_joints: bool,
     ) -> (Option<f64>, f64, [[f64; 2]; 3]) {
         let degree = control.len() / 2 - 1;
         let (offsets, width) = ([0, degree + 1], [degree as f64]);
         let pieces = Pieces { axes: 2, stride: 2, control, weights: &[], offsets: &offsets, width: &width };
         let (path, free) = (Followed::of_one(pieces), Limits::none());
-        let mut columns = Columns::new(&path, &free, None);
-        let curve = columns.curve(0).clone();
-        let p = [0, 1].map(|i| (speeds[i] / length(&curve.derivative(u[i]))).powi(2));
+        let words = Words::polar();
+        let joints = JointPath::of_one(path, &words, &[1.0]);
+        let joints = has_joints.then_some(&joints);
+        let mut columns = Columns::new(&path, &free, joints);
+        let p = [0, 1].map(|i| (speeds[i] / columns.station(0, u[i]).unwrap().slope).powi(2));
         let phases =
             Phases { a0: &a[..1], a1: &a[1..], ..Phases::of_one(&[SPEED_CUBIC], &[255], &[0.0], &u, &p) };
         let motion = phases.by_length(0, &mut columns).unwrap();
         let (mut most, mut fastest, mut farthest) = ([[0.0_f64; 2]; 3], 0.0_f64, 0.0_f64);
         for i in 0..=2000 {
             let at = u[0] + (u[1] - u[0]) * f64::from(i) / 2000.0;
-            let (pace, station) = (motion.place(at).pace, Station::new(&curve, at).unwrap());
+            let (pace, station) = (motion.place(at).pace, columns.station(0, at).unwrap());
             let rates = [station.velocity(pace.v), station.acceleration(pace), station.jerk(pace)];
-            fastest = fastest.max(pace.v);
-            farthest = farthest.max(chord_error(pace.v * free.period, station.curvature));
+            let v = pace.v * station.tip;
+            fastest = fastest.max(v);
+            farthest = farthest.max(chord_error(v * free.period, station.curvature));
             for (row, rate) in rates.iter().enumerate() {
                 for k in 0..2 {
                     most[row][k] = most[row][k].max(rate[k].abs());
@@ -673,12 +767,14 @@ mod tests {
         tally.offer(Check::Feed, 0, worst(Check::Feed, 0), 1.0, 0.0, 1);
         tally.offer(Check::Chord, 0, worst(Check::Chord, 0) * farthest, farthest, 0.0, 1);
         let (feeds, feeds_along) = ([fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY], [true; FEEDS]);
-        let columns = Columns::new(&path, &limits, None);
-        let places = Places { curve: &curve, columns: &columns, limits: &limits, feeds, feeds_along };
+        let mut columns = Columns::new(&path, &limits, joints);
+        let on = &columns.together(0).expect("a piece without weights");
+        let Columns { rates, per_least, .. } = &columns;
+        let places = Places { on, rates, per_least, limits: &limits, feeds, feeds_along };
         // Beside other phases and alone it has the same answer; halves are added in another order.
         let phase = Some(Phase { u, p, a, held_sq: None });
         let gentle = Some(Phase { u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
-        let mut looks = Looks::default();
+        let mut looks = Looks::new(columns.room());
         let mut found_of = |phases: &[Option<Phase>]| {
             looks.phases = phases.to_vec();
             places.look_at(&mut looks, &tally);
@@ -757,18 +853,20 @@ mod tests {
             part in -3.0..-0.7_f64,
             speed in 0.9..1.1_f64,
             a in prop::array::uniform2(-0.1..0.1_f64),
+            has_joints: bool,
         ) {
-            let control: Vec<f64> = (0..=degree).flat_map(|i| [i as f64, bends[i]]).collect();
+            // Beside the origin, where joints have no direction.
+            let control: Vec<f64> = (0..=degree).flat_map(|i| [-4.0 + i as f64, 3.0 + bends[i]]).collect();
             let (degree, part) = (degree as f64, 10.0_f64.powf(part));
             let (u, gained) = ([degree * cut, degree * (cut + part)], 0.5 * (a[0] + a[1]) * degree * part);
             let speeds = [speed, speed + gained / speed];
-            let (found, time, most) = look(&control, [u, speeds, a], &|_, _| 1.001);
+            let (found, time, most) = look_of(&control, [u, speeds, a], &|_, _| 1.001, has_joints);
             prop_assert!(found.is_none_or(|found| (found / time - 1.0).abs() < 1e-9), "{found:?} {time}");
             let rates = RATES.into_iter().enumerate().flat_map(|(row, check)| [(row, check, 0), (row, check, 1)]);
             let rates = rates.filter(|&(row, _, k)| most[row][k] > 1e-6).map(|(_, check, k)| (check, k));
             for broken in rates.chain([(Check::Feed, 0), (Check::Chord, 0)]) {
                 let worst = |check, k| if (check, k) == broken { 0.9999 } else { 1.001 };
-                prop_assert_eq!(look(&control, [u, speeds, a], &worst).0, None, "{:?}", broken);
+                prop_assert_eq!(look_of(&control, [u, speeds, a], &worst, has_joints).0, None, "{:?}", broken);
             }
         }
     }
