@@ -1,16 +1,18 @@
 //! The motion at several times on phases of one piece, eight at once, in the vectors of the processor.
 //!
-//! It is that of `PhaseMotion` where v² is a cubic polynomial of the length of the axes on a piece without weights, in the same digits
-//! but for rounding. What takes longer is left to that: next to rest, where a phase needs several series or is longer than a panel of
-//! the table of lengths, and where the place is not known after so many steps of Newton's method. So what is found of one time does not
-//! depend on the others.
+//! It is that of `PhaseMotion` where v² is a cubic polynomial of a length, of the axes or of the tool's tip, on a piece without
+//! weights, in the same digits but for rounding. What takes longer is left to that: next to rest, where a phase needs several series
+//! or is longer than a panel of the table of lengths, and where the place is not known after so many steps of Newton's method. So what
+//! is found of one time does not depend on the others.
 
 use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use super::clock::cubic::{LAST_STEP, OVER, PER_TERM};
-use super::lengths::{AxesLengths, PiecePath, ERROR, SLOW};
+use super::lengths::{PiecePath, PolynomialLengths, Square, ERROR, SLOW};
+use super::rate::MAX_TIP;
 use super::{Rates, JERK_STEP_ERROR};
 use feedplan_geometry::arc_length::{W, X};
+use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::spline::{Piece, MAX_DEGREE};
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phase;
@@ -65,7 +67,7 @@ pub struct Moment<const M: usize> {
 impl<const M: usize> Moments<M> {
     /// At times since the starts of their phases, all of this piece, one to eight of them; `period` is the step whose length is to be met.
     pub fn new(path: &PiecePath<M>, times: &[(Phase, f64)], period: f64) -> Option<Self> {
-        let lengths = path.axes_lengths(PhaseLaw::SpeedCubic)?;
+        let lengths = path.polynomial_lengths(PhaseLaw::SpeedCubic)?;
         let mut numbers = [[f64::NAN; TIMES]; NUMBERS];
         let mut is_any = false;
         for (lane, (phase, t)) in times.iter().enumerate() {
@@ -100,7 +102,7 @@ impl<const M: usize> Moments<M> {
 #[inline(always)]
 fn look<const M: usize, S: Simd>(
     simd: S,
-    (piece, lengths): (&Piece<M>, &AxesLengths<M>),
+    (piece, lengths): (&Piece<M>, &PolynomialLengths<M>),
     numbers: &[Lanes; NUMBERS],
     period: f64,
 ) -> Moments<M> {
@@ -164,8 +166,16 @@ fn look<const M: usize, S: Simd>(
     }
     // The rates of the axes; see `PhaseMotion::sample`.
     let q = with_count!(piece.control.len(), n, derivatives(piece, n, u));
-    let (square, slope) = (inner(&q[1], &q[1]), inner(&q[1], &q[2]) * 2.0);
-    let bend = (inner(&q[2], &q[2]) + inner(&q[1], &q[3])) * 2.0;
+    let [square, slope, bend] = match lengths.square {
+        Square::Axes(_) => {
+            let bend = (inner(&q[2], &q[2]) + inner(&q[1], &q[3])) * 2.0;
+            [inner(&q[1], &q[1]), inner(&q[1], &q[2]) * 2.0, bend]
+        }
+        Square::Tip(tip) => {
+            let ([square, slope, bend], t) = (&*tip.derivatives, u * lengths.per_width);
+            [value(square, t).max(nothing), value(slope, t), value(bend, t)]
+        }
+    };
     let g = square.sqrt();
     let dg = slope * 0.5 / g;
     let ddg = (bend * 0.5 - dg * dg) / g;
@@ -191,26 +201,44 @@ fn look<const M: usize, S: Simd>(
 
 /// The length per u.
 #[inline(always)]
-fn speed<const M: usize, S: Simd>(lengths: &AxesLengths<M>, u: f64x8<S>) -> f64x8<S> {
+fn speed<const M: usize, S: Simd>(lengths: &PolynomialLengths<M>, u: f64x8<S>) -> f64x8<S> {
     let t = u * lengths.per_width;
-    let (rest, mut sum) = (f64x8::splat(u.simd, 1.0) - t, t);
-    with_count!(lengths.rows.len() + 1, n, {
-        let rows = &lengths.rows[..n - 1];
-        for k in 0..M {
-            let (mut h, mut power) = (f64x8::splat(u.simd, rows[0][k]), t);
-            for row in &rows[1..] {
-                h = h * rest + power * row[k];
-                power *= t;
-            }
-            sum = if k == 0 { h * h } else { sum + h * h };
+    match lengths.square {
+        Square::Axes(rows) => {
+            let (rest, mut sum) = (f64x8::splat(u.simd, 1.0) - t, t);
+            with_count!(rows.len() + 1, n, {
+                let rows = &rows[..n - 1];
+                for k in 0..M {
+                    let (mut h, mut power) = (f64x8::splat(u.simd, rows[0][k]), t);
+                    for row in &rows[1..] {
+                        h = h * rest + power * row[k];
+                        power *= t;
+                    }
+                    sum = if k == 0 { h * h } else { sum + h * h };
+                }
+            });
+            sum.sqrt() * lengths.per_width
         }
-    });
-    sum.sqrt() * lengths.per_width
+        // A square that touches 0 may be a rounding error below it.
+        Square::Tip(tip) => value(&tip.derivatives[0], t).max(f64x8::splat(u.simd, 0.0)).sqrt(),
+    }
+}
+
+/// A polynomial at t.
+#[inline(always)]
+fn value<S: Simd>(polynomial: &Polynomial<MAX_TIP>, t: f64x8<S>) -> f64x8<S> {
+    let (coefficients, rest) = (polynomial.coefficients(), f64x8::splat(t.simd, 1.0) - t);
+    let (mut sum, mut power) = (f64x8::splat(t.simd, coefficients[0]), t);
+    for c in &coefficients[1..] {
+        sum = sum * rest + power * *c;
+        power *= t;
+    }
+    sum
 }
 
 /// The length from one place to another, by the rule of the table.
 #[inline(always)]
-fn way<const M: usize, S: Simd>(lengths: &AxesLengths<M>, from: f64x8<S>, to: f64x8<S>) -> f64x8<S> {
+fn way<const M: usize, S: Simd>(lengths: &PolynomialLengths<M>, from: f64x8<S>, to: f64x8<S>) -> f64x8<S> {
     let (middle, half) = ((from + to) * 0.5, (to - from) * 0.5);
     let mut sum = f64x8::splat(from.simd, 0.0);
     for i in 0..X.len() {
@@ -328,7 +356,7 @@ fn inner<const M: usize, S: Simd>(a: &[f64x8<S>; M], b: &[f64x8<S>; M]) -> f64x8
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phase_motion::{Counts, PhaseMotion};
+    use crate::phase_motion::{Counts, PhaseMotion, TipSpeed};
     use feedplan_geometry::quadratic::norm;
     use proptest::prelude::*;
     use std::rc::Rc;
@@ -338,6 +366,20 @@ mod tests {
     fn path<'a>(control: &'a [[f64; 2]], weights: &'a [f64]) -> PiecePath<'a, 2> {
         let piece = Piece { control, weights, width: (control.len() - 1) as f64 };
         PiecePath::new(piece, Counts::Axes, Counts::Axes)
+    }
+
+    /// The same where laws are about the way of a tip, which goes half as far in Y and farther with X.
+    fn path_of_tip(control: &[[f64; 2]]) -> PiecePath<'_, 2> {
+        let (piece, degree) =
+            (Piece { control, weights: &[], width: (control.len() - 1) as f64 }, control.len() - 1);
+        let slopes = [[1.0, 0.0], [0.1, 0.5]].map(|row| {
+            let steps = control.windows(2).map(|pair| [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]]);
+            let along = steps.map(|step| (row[0] * step[0] + row[1] * step[1]) * degree as f64 / piece.width);
+            Polynomial::<MAX_TIP>::from_bernstein(along)
+        });
+        let square = Polynomial::sum_of_squares(&slopes);
+        let coefficients: Vec<f64> = (0..=square.degree()).map(|i| square.bernstein(i)).collect();
+        PiecePath::new(piece, Counts::Axes, Counts::Tip(TipSpeed::new(&coefficients, piece.width)))
     }
 
     /// A phase from one speed to another, with the accelerations there, and as long as it takes.
@@ -405,16 +447,18 @@ mod tests {
             part in -4.0..-1.0_f64,
             speed in 9.0..11.0_f64,
             a in prop::array::uniform2(-20.0..20.0_f64),
+            is_of_tip: bool,
         ) {
             let control: Vec<[f64; 2]> = (0..=degree).map(|i| [i as f64, 0.3 * bends[i]]).collect();
-            let (curve, degree, part) = (path(&control, &[]), degree as f64, 10.0_f64.powf(part));
+            let path_of = || if is_of_tip { path_of_tip(&control) } else { path(&control, &[]) };
+            let (curve, degree, part) = (path_of(), degree as f64, 10.0_f64.powf(part));
             let u = [degree * cut, degree * (cut + part)];
             let end = (speed * speed + (a[0] + a[1]) * (u[1] - u[0])).sqrt();
             let phase = phase(&curve, u, [speed, end], a);
-            let motion = PhaseMotion::new(Rc::new(path(&control, &[])), &phase);
+            let motion = PhaseMotion::new(Rc::new(path_of()), &phase);
             let shares = [1e-9, 0.1, 0.4, 0.5, 0.6, 0.8, 0.99, 1.0 - 1e-9];
             let times = shares.map(|share| (phase, share * phase.duration));
-            let lengths = curve.axes_lengths(phase.law).expect("the piece has no weights");
+            let lengths = curve.polynomial_lengths(phase.law).expect("the piece has no weights");
             let is_easy = part < 0.01 && lengths.is_rule_good(u[0], u[1]);
             let moments = Moments::new(&curve, &times, PERIOD);
             for (lane, time) in times.iter().enumerate() {

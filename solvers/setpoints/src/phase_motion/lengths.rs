@@ -96,17 +96,20 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         Located { miss: found.miss + error, ..found }
     }
 
-    /// The lengths that a law is about, where those are of the axes on a piece without weights.
-    pub(super) fn axes_lengths(&self, law: PhaseLaw) -> Option<AxesLengths<'_, M>> {
-        let lengths = self.of(law);
-        let (Speeds::Axes { coefficients, width }, false) = (&lengths.speeds, self.piece.is_rational())
-        else {
+    /// The lengths that a law is about, where the square of their speed is a polynomial and the piece has no weights.
+    pub(super) fn polynomial_lengths(&self, law: PhaseLaw) -> Option<PolynomialLengths<'_, M>> {
+        if self.piece.is_rational() {
             return None;
+        }
+        let (lengths, per_width) = (self.of(law), 1.0 / self.piece.width);
+        let square = match (&lengths.speeds, self.counts(law).1) {
+            (Speeds::Axes { coefficients, .. }, _) => Square::Axes(coefficients.hodograph()),
+            (_, Counts::Tip(tip)) => Square::Tip(tip),
+            _ => return None,
         };
-        let (rows, per_width) = (coefficients.hodograph(), 1.0 / width);
         if lengths.even.is_some() {
-            return Some(AxesLengths {
-                rows,
+            return Some(PolynomialLengths {
+                square,
                 per_width,
                 nodes: &[],
                 error: 0.0,
@@ -116,7 +119,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         }
         let Filled { nodes, error, steepest } = lengths.filled();
         let rounding = lengths.table().rounding();
-        Some(AxesLengths { rows, per_width, nodes, error: *error, steepest: *steepest, rounding })
+        Some(PolynomialLengths { square, per_width, nodes, error: *error, steepest: *steepest, rounding })
     }
 
     /// The length of a phase from one quadrature.
@@ -238,10 +241,16 @@ impl<const M: usize> Speeds<M> {
     }
 }
 
-/// Lengths of the axes on a piece without weights.
-pub(super) struct AxesLengths<'a, const M: usize> {
-    /// Bernstein coefficients of the hodograph times binomials.
-    pub rows: &'a [[f64; M]],
+/// The square of a speed on a piece without weights.
+pub(super) enum Square<'a, const M: usize> {
+    /// Of the axes: Bernstein coefficients of the hodograph times binomials.
+    Axes(&'a [[f64; M]]),
+    Tip(&'a TipSpeed),
+}
+
+/// Lengths whose speed has such a square.
+pub(super) struct PolynomialLengths<'a, const M: usize> {
+    pub square: Square<'a, M>,
     pub per_width: f64,
     /// Of the table; none of a line.
     nodes: &'a [Node],
@@ -251,7 +260,7 @@ pub(super) struct AxesLengths<'a, const M: usize> {
     pub rounding: f64,
 }
 
-impl<const M: usize> AxesLengths<'_, M> {
+impl<const M: usize> PolynomialLengths<'_, M> {
     /// Whether the rule of the table is as good between two places as on its panels: they are no farther apart than the panels that
     /// they and what is between them are on are wide. The bound of the derivatives that makes a panel so wide holds on all of it.
     pub fn is_rule_good(&self, from: f64, to: f64) -> bool {

@@ -65,6 +65,16 @@ impl Tip<'_> {
     fn greatest(&self) -> f64 {
         self.square.range().1.max(0.0).sqrt()
     }
+
+    // |D'| / 2√D, each at its bound; where D may vanish there is none.
+    fn steepest(&self) -> f64 {
+        let least = self.square.range().0;
+        let (low, high) = self.square.derivative().range();
+        match least > 0.0 {
+            true => low.abs().max(high.abs()) / (2.0 * least.sqrt() * self.width),
+            false => f64::INFINITY,
+        }
+    }
 }
 
 /// Whose speed.
@@ -102,7 +112,7 @@ impl<const M: usize> Source<'_, M> {
     pub fn steepest(&self) -> f64 {
         match self {
             Self::Own(speed) => speed.steepest(),
-            Self::Tip(_) => f64::INFINITY,
+            Self::Tip(tip) => tip.steepest(),
         }
     }
 
