@@ -239,13 +239,27 @@ class Store:
         if waiting >= limits.max_queue:
             said = f"{waiting} jobs wait, as many as max_queue allows: send it again in a while"
             raise over(limits, BUSY, said)
-        kept = db.execute("SELECT COALESCE(SUM(size), 0) FROM jobs").fetchone()[0]
-        if kept + size > limits.max_disk * MB:
-            said = (
-                f"the jobs that are kept take {kept / MB:.6g} MB of the {limits.max_disk:g} MB of max_disk: "
-                "delete some of them"
-            )
-            raise over(limits, DISK, said)
+        full = self._full(db, size)
+        if full is not None:
+            raise full
+
+    def _full(self, db: sqlite3.Connection, size: int, job: str = "") -> Refusal | None:
+        """The refusal of so many bytes of a job beside those of all others; None if there is room."""
+        limits = self._limits
+        query = "SELECT COALESCE(SUM(size), 0) FROM jobs WHERE id != ?"
+        kept = db.execute(query, (job,)).fetchone()[0]
+        if kept + size <= limits.max_disk * MB:
+            return None
+        said = (
+            f"the jobs that are kept take {kept / MB:.6g} MB of the {limits.max_disk:g} MB of max_disk, and "
+            f"this one {size / MB:.6g} MB: delete some of them"
+        )
+        return over(limits, DISK, said)
+
+    def _size(self, record: Record) -> int:
+        """The size of a job's files, record and events [bytes]."""
+        files = (file for file in self.folder(record).rglob("*") if file.is_file())
+        return RECORD + sum(file.stat().st_size for file in files)
 
     def claim(self) -> Record | None:
         """Sets the job that has waited longest to running and returns it; None if no job waits."""
@@ -271,8 +285,8 @@ class Store:
     def finish(
         self, record: Record, state: str, *, result: Mapping[str, Any] | None, problem: str | None
     ) -> None:
-        """Records the end of a running job; without a result its result folder is removed."""
-        size = sum(file.stat().st_size for file in self.folder(record).rglob("*") if file.is_file())
+        """Records the end of a running job; without a result its result folder is removed. A job whose result
+        has no room below max_disk has failed."""
         self._end_run(
             record,
             state=state,
@@ -280,7 +294,6 @@ class Store:
             done=1.0 if state == "done" else record["done"],
             result=None if result is None else json.dumps(result),
             problem=problem,
-            size=size + RECORD,
         )
 
     def wait_again(self, record: Record) -> None:
@@ -288,11 +301,18 @@ class Store:
         self._end_run(record, **_WAITS)
 
     def _end_run(self, record: Record, **columns: object) -> None:
-        """Sets columns of a running job; without a `result` in them its result folder is removed."""
-        if columns.get("result") is None:
-            _remove(self.result(record))
+        """Sets columns of a running job, and its size; without a `result` in them, or room for it, its result
+        folder is removed."""
         with self._database.change() as db:
-            known = _set(db, record["id"], "running", record["attempt"], **columns)
+            full = None
+            if columns.get("result") is not None:
+                full = self._full(db, self._size(record), record["id"])
+            if full is not None:
+                columns.update(state="failed", result=None, problem=full.text())
+            if columns.get("result") is None:
+                _remove(self.result(record))
+            size = self._size(record)
+            known = _set(db, record["id"], "running", record["attempt"], size=size, **columns)
         if not known:  # the job was deleted
             _remove(self.folder(record))
         self.changed(record["id"])

@@ -130,6 +130,22 @@ def test_memory_of_a_job_and_size_of_all(tmp_path: Path) -> None:
         assert server.submit(options='{"tolerance": 0.03}').status == 202
 
 
+def test_results_beyond_the_size_of_all_jobs_are_not_kept(tmp_path: Path) -> None:
+    # A report alone is greater than a megabyte.
+    with running(tmp_path, "--max-disk", "2.5") as server:
+        assert server.planned()["state"] == "done"
+        second = server.planned(options='{"tolerance": 0.03}')
+        assert second["state"] == "failed"
+        assert named(second["problem"]) == ("max_disk", 2.5)
+        assert second["problem"]["status"] == 507
+        kept = sum(file.stat().st_size for file in (tmp_path / "jobs").rglob("*") if file.is_file())
+        assert kept < 2.5e6
+        # There is room for requests, and for another result in place of the first.
+        first = server.get("/v1/jobs").json["jobs"][-1]
+        server.send("DELETE", f"/v1/jobs/{first['id']}")
+        assert server.planned(options='{"tolerance": 0.03}')["state"] == "done"
+
+
 def test_every_limit_is_an_option_with_a_unit(small: Server) -> None:
     told = small.get("/v1/health").json["limits"]
     assert set(told) == {own.name for own in fields(Limits)}
