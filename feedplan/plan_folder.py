@@ -125,7 +125,10 @@ def write_plan(
                     with output.writer(stage / output.FILE, header, knots.count) as add:
                         for chunk in knots.chunks(_ROWS_AT_ONCE):
                             add(chunk)
+        # Numbers of curves and entities are no lines of their file.
+        has_lines = plan.program is not None and plan.program.reading is not None
         data = chart_data(plan.problem, account, figures, audit, over_length)
+        data["has_lines"] = has_lines
         if drawing:
             (stage / DRAWING_FILE).write_bytes(contained(data))
             data["path"] = tool_path.data(account.activity, POINTS)
@@ -136,7 +139,7 @@ def write_plan(
             account=account,
             audit=audit,
             data=data,
-            text=plan.program.text if plan.program else None,
+            text=plan.program.text if plan.program and has_lines else None,
         )
         (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())

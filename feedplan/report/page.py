@@ -44,7 +44,7 @@ def write_report(
     text: FilePath | bytes | None = None,
 ) -> None:
     """Writes the page. `summary` is the content of plan.json, `data` the result of `chart_data`, `text` the
-    text of the part program, or its file."""
+    text of the part program, or its file; None where its lines have no numbers."""
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
     name = FilePath(summary["program"] or "path").name
     judged = (
@@ -101,11 +101,14 @@ def pictures(charts: str) -> str:
 
 
 def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
-    """The text of these lines; empty if the file is gone."""
+    """The text of these lines, which end as a reader's do (LF, CR LF, CR); empty if the file is gone."""
     try:
-        with io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as stream:
+        with (
+            io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as content,
+            io.TextIOWrapper(content, "utf-8", "replace") as stream,
+        ):
             lines = enumerate(islice(stream, max(wanted, default=0)), 1)
-            return {number: line.decode("utf-8", "replace") for number, line in lines if number in wanted}
+            return {number: line for number, line in lines if number in wanted}
     except OSError:
         return {}
 

@@ -171,6 +171,23 @@ def test_a_path_without_a_program_has_no_lines(tmp_path: Path) -> None:
     assert '<tr><td class="n">–</td>' in slowest
 
 
+def test_source_lines_are_those_of_the_reader_and_curves_have_none(tmp_path: Path) -> None:
+    def slowest(name: str, content: bytes) -> str:
+        (tmp_path / name).write_bytes(content)
+        feedplan.write_plan(feedplan.plan(tmp_path / name, "mill"), tmp_path / "out", formats=[])
+        return (tmp_path / "out" / "report.html").read_text(encoding="utf-8").split("Slowest lines")[1]
+
+    for end in (b"\n", b"\r\n", b"\r"):
+        lines = (b"G21 G90", b"", b"G1 X10 F6000", b"M2", b"")
+        row = '<td class="n">3</td><td class="code"><code>G1 X10 F6000</code></td>'
+        assert row in slowest("part.ngc", end.join(lines))
+    # The number of a curve is no line of the file.
+    curves = b'{"feed": 80,\n"curves": [\n{"degree": 1, "control_points": [[0, 0], [10, 0]]}]}\n'
+    told = slowest("curves.json", curves)
+    assert '<td class="n">1</td>' in told
+    assert "feed&quot;: 80" not in told
+
+
 def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:
     figures = SetpointFigures(square.problem, ToolPath(square.problem), 1_000_000)
     random = np.random.default_rng(5)

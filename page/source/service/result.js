@@ -51,7 +51,7 @@ export class Result {
     at("axes-tools").replaceChildren(this.axes.scaling());
     this.#slow();
     this.#figures();
-    this.source.show(plan.order.program);
+    this.source.show(plan.order.program, data.has_lines);
     at("report").href = plan.job.links.report;
   }
 

@@ -24,11 +24,14 @@ export class SourceText {
     new ResizeObserver(() => this.#draw()).observe(container);
   }
 
-  /* Shows a program (a Blob). */
-  async show(blob) {
+  /* Shows a program (a Blob); without `hasLines` no line of it is marked. */
+  async show(blob, hasLines = true) {
+    this.hasLines = hasLines;
     const bytes = new Uint8Array(await blob.arrayBuffer()), starts = [0];
     this.#bytes = bytes;
-    for (let at = bytes.indexOf(10); at >= 0; at = bytes.indexOf(10, at + 1)) {
+    // Lines end with LF, CR LF or CR.
+    for (let at = 0; at < bytes.length; at += 1) {
+      if (bytes[at] !== 10 && (bytes[at] !== 13 || bytes[at + 1] === 10)) continue;
       starts.push(at + 1);
       if (starts.length % LINES === 0) await new Promise((resolve) => setTimeout(resolve)); // lets the page react
       if (this.#bytes !== bytes) return; // another program is shown
@@ -44,8 +47,9 @@ export class SourceText {
     return new TextDecoder().decode(this.#bytes.subarray(this.#starts[line - 1], Math.min(end, this.#starts[line - 1] + 400))).trimEnd();
   }
 
-  /* Marks a line (from 1) and scrolls it into view. */
-  choose(line) {
+  /* Marks a line (from 1, 0 for none) and scrolls it into view. */
+  choose(number) {
+    const line = this.hasLines ? number : 0;
     if (line === this.#chosen && line) return;
     this.#chosen = line;
     const first = this.#first(), shown = Math.floor(this.container.clientHeight / ROW);
