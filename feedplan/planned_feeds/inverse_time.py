@@ -54,7 +54,9 @@ def inverse_feeds(
     Raises InputError where a line has no one length: in loops and cycles, and on turns of a tool.
     """
     if not np.isfinite(program.feed).any():
-        raise InputError(f"{program.name} has no feed moves: inverse time (G93) is for them: {_REMEDY}")
+        raise InputError(
+            f"{program.name} has no feed moves: inverse time (G93) is for them: leave out --inverse-time"
+        )
     counts = np.bincount(program.line.astype(np.int64) - 1, minlength=len(blocks))
     idle = _idle(blocks, counts)
     away = idle[(exclusion[idle] != Exclusion.NO) & (exclusion[idle] != Exclusion.DELETED)]

@@ -40,6 +40,7 @@ def test_the_sentence_names_file_line_and_word() -> None:
         ("X1,5", "',5' is not understood: numbers have a decimal point"),
         ("X1e3", "word e3 is not understood"),
         ("X1 \x1a", "the control character 0x1A is not understood: remove it"),
+        ("\x0c(FACE)", "the control character 0x0C is not understood: remove it"),
         ("X1E3", "numbers have no exponents"),
         ("XNAN", "word XNAN is not understood"),
         ("Xinf", "word Xinf is not understood"),

@@ -272,17 +272,17 @@ impl Formula<'_> {
     }
 }
 
-/// The text from `at` to the end of the line, quoted, in at most 24 characters that can be printed.
+/// The text from `at` to the end of the line, quoted, in at most 24 characters that can be printed; the first character
+/// alone, by its number, where it cannot be printed.
 pub fn excerpt(source: &[u8], at: usize) -> String {
     let rest = source.get(at..).unwrap_or_default();
     let line = rest.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();
     let text = String::from_utf8_lossy(&line[..line.len().min(96)]);
     let text: String = text.trim_end().chars().filter(|letter| !letter.is_control()).take(24).collect();
-    let unseen = line.iter().find(|byte| byte.is_ascii_control() && **byte != b'\t');
-    match (text.is_empty(), unseen) {
-        (false, _) => format!("'{text}'"),
-        (true, Some(byte)) => format!("the control character 0x{byte:02X}"),
-        (true, None) => "the end of the line".into(),
+    match line.iter().find(|byte| !matches!(byte, b' ' | b'\t')) {
+        Some(byte) if byte.is_ascii_control() => format!("the control character 0x{byte:02X}"),
+        _ if text.is_empty() => "the end of the line".into(),
+        _ => format!("'{text}'"),
     }
 }
 
