@@ -14,7 +14,6 @@ from typing import IO, Any
 from feedplan.batch.sweep import JOURNAL
 from feedplan.errors import InputError
 from feedplan.outputs._staging import require_folder
-from feedplan.plan_folder import SUMMARY_FILE
 
 
 class Journal:
@@ -61,11 +60,9 @@ class Journal:
         self._file.close()
 
     def done(self, folder: str, fingerprint: str) -> dict[str, Any] | None:
-        """The row of a finished plan in the folder of that name, or None."""
+        """The row of a finished plan that was written into the folder of that name, or None."""
         row = self._known.get(folder)
-        if row is None or row.get("fingerprint") != fingerprint:
-            return None
-        return row if (self._folder / folder / SUMMARY_FILE).exists() else None
+        return row if row is not None and row.get("fingerprint") == fingerprint else None
 
     def remove(self, folder: str) -> None:
         """Removes the folder of that name if the journal has it from an earlier plan."""

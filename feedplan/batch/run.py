@@ -15,6 +15,7 @@ from feedplan.errors import InputError
 from feedplan.jobs.executor import Executor
 from feedplan.jobs.outcome import Outcome
 from feedplan.jobs.work import of_whole
+from feedplan.plan_folder import files_of_plan
 from feedplan.progress import Progress
 
 STAGE = "batch"
@@ -108,7 +109,7 @@ class _Batch:
                 self._left -= 1
                 fingerprint = _fingerprint(item)
                 row = None if fingerprint is None else self._journal.done(item.folder, fingerprint)
-                if row is not None:
+                if row is not None and all(file.exists() for file in item.files):
                     self._found.put((number, row, True))
                     continue
                 chunk.append((number, item, fingerprint))
@@ -142,6 +143,7 @@ def _fingerprint(item: Item) -> str | None:
 def row_of(item: Item, fingerprint: str | None, outcome: Outcome) -> Row:
     """A row of the batch's table: times in s; `error` is None if there is a plan."""
     figures, failure = outcome.figures or {}, outcome.failure
+    others = [] if failure else [file for file in files_of_plan(item.job.folder) if file not in item.files]
     return {
         "folder": item.folder,
         "program": item.program,
@@ -152,7 +154,7 @@ def row_of(item: Item, fingerprint: str | None, outcome: Outcome) -> Row:
         "computing": outcome.seconds,
         "ok": figures.get("ok"),
         "failures": figures.get("failures", []),
-        "warnings": figures.get("warnings", []),
+        "warnings": figures.get("warnings", []) + [f"{file.name} is of an earlier plan" for file in others],
         "error": failure.sentence if failure else None,
         "kind": failure.kind if failure else None,
         "fingerprint": fingerprint,

@@ -17,6 +17,7 @@ from feedplan.errors import InputError
 from feedplan.jobs.order import Job, Order
 from feedplan.machine.machine import Machine
 from feedplan.outputs import formats_named
+from feedplan.plan_folder import SUMMARY_FILE
 from feedplan.planners import given_options, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
@@ -92,6 +93,12 @@ class Item:
     def folder(self) -> str:
         """The name of its folder."""
         return self.job.folder.name
+
+    @property
+    def files(self) -> list[FilePath]:
+        """What its folder has once it is planned, besides the report."""
+        outputs = formats_named(self.job.order.formats).values()
+        return [self.job.folder / name for name in (SUMMARY_FILE, *(output.FILE for output in outputs))]
 
     def fingerprint(self) -> str:
         """A hash that is equal for equal plans; files that a program calls are not part of it.

@@ -121,6 +121,17 @@ def test_a_stopped_batch_continues(tmp_path: Path) -> None:
     assert (out / "part1").exists()
 
 
+def test_files_that_are_gone_are_made_again_and_those_of_an_earlier_plan_are_told(tmp_path: Path) -> None:
+    [program] = write(tmp_path, 1)
+    out, made = tmp_path / "out", tmp_path / "out" / "part0" / "setpoints.npz"
+    assert run(program, "-o", out).code == 0
+    made.unlink()
+    assert "before" not in run(program, "-o", out).said
+    assert made.exists()
+    told = "part0: warning: setpoints.npz is of an earlier plan\n"
+    assert told in run(program, "-o", out, "--format", "csv").told
+
+
 def test_an_interrupt_ends_a_batch_and_leaves_whole_folders_alone(tmp_path: Path) -> None:
     short, out = write(tmp_path, 1), tmp_path / "out"
     long = tmp_path / "long.ngc"
