@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import tempfile
 from collections.abc import Callable
 from functools import partial
 from math import comb
@@ -118,10 +117,7 @@ def example(name: str) -> ModuleType:
 def part(name: str, blocks: int, model: str | None = None) -> tuple[Program, Machine]:
     """A program of the examples of about this many blocks, and its machine or the given one."""
     machine = Machine.load(model or PROGRAMS[name][0])
-    with tempfile.TemporaryDirectory() as directory:
-        file = FilePath(directory, f"{name}.ngc")
-        file.write_text(example(name).program(blocks), encoding="ascii")
-        return read_program(file, machine), machine
+    return read_program(example(name).program(blocks), machine, name=f"{name}.ngc"), machine
 
 
 def _curve(make: Callable[[], CompositeCurve], machine: Machine) -> Named:
