@@ -37,14 +37,12 @@ class ToolPath:
         # Column by column, so that the points are not copied.
         control = problem.path.curve.control_points
         sides = [np.ptp(control[:, column]) for column in columns if len(control)]
-        extent = float(np.linalg.norm(sides))
-        extent = extent if extent > 0 else 1.0
+        extent = float(np.linalg.norm(sides)) or 1.0
         cut = problem.feed[np.isfinite(problem.path.feed)]
         top = float((cut if len(cut) else problem.feed).max(initial=0.0)) or 1.0
         self._speed_weight = _TOLERANCE * extent / (_SPEED_TOLERANCE * top)
-        self._tolerance = (_TOLERANCE if points <= POINTS else _FINEST) * extent
         self._overview = _TOLERANCE * extent
-        self._path = Polyline(points, self._tolerance)
+        self._path = Polyline(points, (_TOLERANCE if points <= POINTS else _FINEST) * extent)
         self._length, self._before = 0.0, (0.0, 0.0)
         self._marks: list[list[float]] = []
         self._is_cut = np.isfinite(problem.path.feed)
