@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -45,8 +46,6 @@ def run(quick: bool = False) -> Result:
 
 def _programs(folder: Path, count: int) -> list[Path]:
     """Different circles of points."""
-    import math
-
     folder.mkdir()
     files = [folder / f"part{number:04}.ngc" for number in range(count)]
     for number, file in enumerate(files):

@@ -48,24 +48,13 @@ def run(quick: bool = False) -> Result:
         best = plan_path(path, MACHINE, "jerk-limited", accuracy=ACCURACY)
         again = partial(planner("jerk-limited", accuracy=ACCURACY), best.problem)
         spent = best_of(again, 5).wall
+        row = partial(_row, name, best.time, spent)
         for method in METHODS:
             made = plan_path(path, MACHINE, method)
             excess = jerk_excess(made.problem, made.profile).worst if method != "bang-bang" else float("nan")
-            rows.append(
-                _row(name, method, made.time, best.time, made.gap, excess, made.compute["plan"], spent)
-            )
-        rows.append(
-            _row(
-                name,
-                f"jerk-limited, accuracy {ACCURACY:g}",
-                best.time,
-                best.time,
-                best.gap,
-                jerk_excess(best.problem, best.profile).worst,
-                spent,
-                spent,
-            )
-        )
+            rows.append(row(method, made.time, made.gap, excess, made.compute["plan"]))
+        excess = jerk_excess(best.problem, best.profile).worst
+        rows.append(row(f"jerk-limited, accuracy {ACCURACY:g}", best.time, best.gap, excess, spent))
         grid = grid_of(best.problem, best.profile)
         for solver, solve in OTHERS.items():
             if (name, solver) == ("butterfly", "IPOPT"):
@@ -73,7 +62,7 @@ def run(quick: bool = False) -> Result:
             start = time.perf_counter()
             found = solve(grid)
             cost = time.perf_counter() - start
-            rows.append(_row(name, f"{solver}, the same grid", found, best.time, 0.0, 0.0, cost, spent))
+            rows.append(row(f"{solver}, the same grid", found, 0.0, 0.0, cost))
     rows.extend(_cost(length) for length in (WINDING[:1] if quick else WINDING))
     return Result(
         "Limits of jerk",
@@ -106,7 +95,7 @@ def _cost(length: float) -> dict[str, Cell]:
     (profile,) = made
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return {
-        **_row("winding", "jerk-limited", profile.time, profile.time, np.nan, np.nan, cost.wall, cost.wall),
+        **_row("winding", profile.time, cost.wall, "jerk-limited", profile.time, np.nan, np.nan, cost.wall),
         "computing ratio": cost.processor / cost.wall,
         "intervals": len(profile),
         "µs each": 1e6 * cost.wall / len(profile),
@@ -115,8 +104,9 @@ def _cost(length: float) -> dict[str, Cell]:
 
 
 def _row(
-    curve: str, method: str, found: float, best: float, gap: float, excess: float, cost: float, unit: float
+    curve: str, best: float, unit: float, method: str, found: float, gap: float, excess: float, cost: float
 ) -> dict[str, Cell]:
+    """A row whose time and computing time are told over those of the `best` plan, too."""
     return {
         "curve": curve,
         "method": method,
