@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import partial
 from time import process_time
 
+import copp_py as copp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,16 +63,14 @@ def run(quick: bool = False) -> Result:
         alone = partial(plan_jerk_limited, problem, *settings, False)
         profile, with_bound, ours = proven(), best_of(proven, 5), best_of(alone, 5)
         excess = jerk_excess(problem, profile).jerk
-        rows.append(_row(name, "feedplan", profile.time, excess, ours.processor, 1.0, 1.0))
-        spent, ratio = with_bound.processor, with_bound.processor / ours.processor
-        rows.append(_row(name, "the same with its bound", profile.time, excess, spent, 1.0, ratio))
+        row = partial(_row, name, profile.time, ours.processor)
+        rows.append(row("feedplan", profile.time, excess, ours.processor))
+        rows.append(row("the same with its bound", profile.time, excess, with_bound.processor))
         begin = process_time()
         time, excess, programs = _by_copp(problem, stations)
-        spent = process_time() - begin
-        times, ratio = time / profile.time, spent / ours.processor
-        rows.append(_row(name, f"copp, {programs} programs", time, excess, spent, times, ratio))
+        rows.append(row(f"copp, {programs} programs", time, excess, process_time() - begin))
     return Result(
-        f"Jerk-limited plans against copp {_version()}",
+        f"Jerk-limited plans against copp {copp.version()}",
         tuple(rows),
         (
             f"{VELOCITY:g} mm/s, {ACCELERATION:g} mm/s², {JERK:g} mm/s³ of each axis, rest to rest.",
@@ -94,8 +93,6 @@ def _problem(curve: CompositeCurve) -> Problem:
 def _by_copp(problem: Problem, stations: int) -> tuple[float, float, int]:
     """copp's time [s], the relative excess of its third differences over the limit of jerk, and the number of
     its programs."""
-    import copp_py as copp
-
     piece, u, s = _stations(problem, stations)
     total = s[-1]
     first, second, third = derivatives_by_length(problem, piece, u)
@@ -143,21 +140,16 @@ def _stations(problem: Problem, count: int) -> tuple[NDArray[np.int64], Array, A
     return piece, np.where(found == piece, u, 0.0), s
 
 
-def _version() -> str:
-    import copp_py
-
-    return str(copp_py.version())
-
-
 def _row(
-    curve: str, solver: str, time: float, excess: float, computing: float, longer: float, ratio: float
+    curve: str, best: float, unit: float, solver: str, time: float, excess: float, computing: float
 ) -> dict[str, Cell]:
+    """A row whose time and computing time are told over `best` and `unit` [s], too."""
     return {
         "curve": curve,
         "solver": solver,
         "time [s]": f"{time:.5f}",
-        "time over ours": f"{longer:.4f}",
+        "time over ours": f"{time / best:.4f}",
         "excess of jerk": excess,
         "computing [s]": computing,
-        "computing over ours": ratio,
+        "computing over ours": computing / unit,
     }

@@ -106,7 +106,7 @@ def _cost(length: float) -> dict[str, Cell]:
 def _row(
     curve: str, best: float, unit: float, method: str, found: float, gap: float, excess: float, cost: float
 ) -> dict[str, Cell]:
-    """A row whose time and computing time are told over those of the `best` plan, too."""
+    """A row whose time and computing time are told over `best` and `unit` [s], too."""
     return {
         "curve": curve,
         "method": method,
