@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from feedplan.errors import InputError
+from feedplan.service.database import Database
 from feedplan.service.limits import Limits
 from feedplan.service.refusals import Refusal
 from feedplan.service.requests import Order
@@ -102,3 +103,19 @@ def test_a_store_has_one_server_and_one_version(tmp_path: Path) -> None:
     (tmp_path / "jobs.sqlite").write_bytes(b"damaged " * 1000)
     with pytest.raises(InputError, match=r"jobs.sqlite is damaged \(.*\): choose another folder"):
         Store(tmp_path, Limits())
+
+
+def test_a_change_that_cannot_be_kept_is_undone_and_the_next_one_is_made(tmp_path: Path) -> None:
+    database = Database(tmp_path / "jobs.sqlite")
+
+    def add_a_key_without_its_job() -> None:
+        with database.change() as db:
+            # A deferred foreign key is checked at the end of the transaction.
+            db.execute("PRAGMA defer_foreign_keys = ON")
+            db.execute("INSERT INTO keys (key, job, fingerprint) VALUES ('a', 'gone', 'b')")
+
+    with pytest.raises(sqlite3.IntegrityError):
+        add_a_key_without_its_job()
+    with database.change() as db:
+        assert db.execute("SELECT COUNT(*) FROM keys").fetchone()[0] == 0
+    database.close()
