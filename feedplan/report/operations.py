@@ -104,18 +104,13 @@ def operation_times(
         ("dwell", of_rest, rest),
         ("change", of_event[changes], np.full(int(changes.sum()), tool_change)),
     )
-    own = np.concatenate([of_part for _, of_part, _ in parts])
-    keys, group = np.unique(own, return_inverse=True)
+    keys, row_of = np.unique(np.concatenate([of_move, of_event]), return_inverse=True)
     spent = {name: np.zeros(len(keys)) for name in PARTS}
-    ends = np.cumsum([len(of_part) for _, of_part, _ in parts])
-    for (name, _, time), each in zip(parts, np.split(group, ends[:-1]), strict=True):
-        spent[name] += np.bincount(each, time, len(keys))
+    for name, of_part, time in parts:
+        spent[name] += np.bincount(np.searchsorted(keys, of_part), time, len(keys))
     # The number of moves before the begin of each.
-    begin = np.concatenate([np.arange(len(program)), events.move])
     first = np.full(len(keys), len(program))
-    known = np.concatenate([of_move, of_event])
-    at = np.minimum(np.searchsorted(keys, known), len(keys) - 1)
-    np.minimum.at(first, at[keys[at] == known], begin[keys[at] == known])
+    np.minimum.at(first, row_of, np.concatenate([np.arange(len(program)), events.move]))
     tools = [None, *(int(number) if np.isfinite(number) else None for number in numbers[changes])]
     rows: dict[tuple[int | None, int], OperationTime] = {}
     for k in np.lexsort((keys, first)):
