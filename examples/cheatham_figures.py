@@ -31,6 +31,7 @@ from panel import FEED, panel
 
 import feedplan
 
+plt.style.use(Path(__file__).with_name("figures.mplstyle"))
 Array = NDArray[np.float64]
 
 SHADE, AMBER, BLUE, RED = "#9aa3ad", "#e8a33d", "#1f6fd0", "#d1495b"
@@ -90,12 +91,8 @@ def motion_of(plan: feedplan.Plan) -> Motion:
 
 
 def save(drawing: Figure, path: Path) -> Path:
-    for axes in drawing.axes:
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(True, color="#e6e9ec", linewidth=0.6)
-        axes.set_axisbelow(True)
     drawing.tight_layout()
-    drawing.savefig(path, dpi=130)
+    drawing.savefig(path)
     plt.close(drawing)
     return path
 
@@ -113,7 +110,7 @@ def draw_speed(motions: dict[str, Motion], path: Path) -> Path:
         )
         axes.set_ylim(0.0, 1.15 * FEED)
         axes.set_ylabel("speed [mm/s]")
-    whole.set_title("Speed of the tool", loc="left", fontsize=11, fontweight="bold")
+    whole.set_title("Speed of the tool")
     whole.axvspan(0.0, CLOSE, color="#fff3c4", zorder=0)
     whole.set_xlim(0.0, max(motion.t[-1] for motion in motions.values()))
     close.set_xlim(0.0, CLOSE)
@@ -131,7 +128,7 @@ def draw_use(motion: Motion, order: int, title: str, path: Path) -> Path:
         axes.plot(motion.t, use, color=BLUE, linewidth=0.6)
         axes.set_ylim(-1.2, 1.2)
         axes.set_ylabel(f"{name} axis")
-    rows[0].set_title(title, loc="left", fontsize=11, fontweight="bold")
+    rows[0].set_title(title)
     rows[-1].set_xlim(0.0, motion.t[-1])
     rows[-1].set_xlabel("time [s]")
     return save(drawing, path)
@@ -140,7 +137,7 @@ def draw_use(motion: Motion, order: int, title: str, path: Path) -> Path:
 def draw_chord(motion: Motion, tolerance: float, path: Path) -> Path:
     drawing, axes = plt.subplots(figsize=(9.0, 3.0))
     axes.plot(motion.t, motion.chord / tolerance, color=BLUE, linewidth=0.7)
-    axes.set_title("Chord error over its tolerance", loc="left", fontsize=11, fontweight="bold")
+    axes.set_title("Chord error over its tolerance")
     axes.set_xlim(0.0, motion.t[-1])
     axes.set_ylim(0.0, None)
     axes.set_xlabel("time [s]")

@@ -29,6 +29,7 @@ from vase import LENGTH, pass_points
 
 import feedplan
 
+plt.style.use(Path(__file__).with_name("figures.mplstyle"))
 Array = NDArray[np.float64]
 
 PLANE = 0.0  # x of the pass [mm]
@@ -105,16 +106,13 @@ def figure(path: Path, title: str, unit: str, draw: Callable[[Axes, bool], None]
     for axes in (whole, close):
         draw(axes, axes is close)
         axes.set_ylabel(unit)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(True, color="#e6e9ec", linewidth=0.6)
-        axes.set_axisbelow(True)
-    whole.set_title(title, loc="left", fontsize=11, fontweight="bold")
+    whole.set_title(title)
     whole.axvspan(*DETAIL, color="#fff3c4", zorder=0)
     whole.set_xlim(0.0, LENGTH)
     close.set_xlim(*DETAIL)
     close.set_xlabel("y [mm]")
     drawing.tight_layout()
-    drawing.savefig(path, dpi=130)
+    drawing.savefig(path)
     plt.close(drawing)
 
 
