@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem, speed_square
 from feedplan.profile import PhaseLaw, SpeedProfile
+from feedplan.report.limits import chord_speed
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(20)
@@ -60,24 +61,17 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     jerk = np.abs(q3 * v**3 + 3 * q2 * v * a + q1 * j) / problem.max_jerk
     tool_v = v[:, 0] * _tool_share(problem, piece, inside.ravel())
     feed = tool_v / problem.feed[piece]
-    chord = np.zeros(1)
-    if np.isfinite(problem.chord_tolerance):
-        tool = (problem.tip_curve or problem.path.curve).evaluate(piece, inside.ravel(), 2)
-        square = np.maximum((tool[1] ** 2).sum(axis=1), 1e-300)
-        off = tool[2] - tool[1] * ((tool[1] * tool[2]).sum(axis=1) / square)[:, None]
-        curvature = np.linalg.norm(off, axis=1) / square
-        delta = problem.chord_tolerance
-        with np.errstate(divide="ignore"):
-            limit = np.where(curvature * delta < 1, 8 * delta / curvature - 4 * delta**2, 4 * delta**2)
-        chord = tool_v * problem.period / np.sqrt(limit)
+    _, tangent, second = (problem.tip_curve or problem.path.curve).evaluate(piece, inside.ravel(), 2)
+    chord = tool_v / chord_speed(problem, tangent, second)
     v, a, _ = pace
     joined = np.ones(len(profile) - 1, dtype=bool)
     joined[profile.runs[1:-1] - 1] = False
+    off_length, off_time = _misfits(profile, v, s)
     gaps = [
         np.abs(v[1:, 0] - v[:-1, -1])[joined] / v.max(),
         np.abs(profile.a0[1:] - profile.a1[:-1])[joined] / np.abs(a).max(),
-        _misfits(profile, v, s)[0] / s[:, -1].sum(),
-        _misfits(profile, v, s)[1] / profile.time,
+        off_length / s[:, -1].sum(),
+        off_time / profile.time,
         np.abs(profile.u0[1:] - np.where(profile.piece[1:] == profile.piece[:-1], profile.u1[:-1], 0.0)),
     ]
     return Excess(
@@ -101,7 +95,7 @@ def derivatives_by_length(
         curvature = bent / d
         turning = (curvature**2).sum(axis=1, keepdims=True)
         return tangent, curvature, (twisted - 3 * bent * along / np.sqrt(d)) / d**1.5 - turning * tangent
-    d, d1, d2 = (rate[:, None] for rate in _speed_sq(problem, piece, u, 2))
+    d, d1, d2 = (rate[:, None] for rate in _speed_sq(problem, piece, u))
     u1, u2 = 1 / np.sqrt(d), -d1 / (2 * d**2)
     u3 = u1 * (d1**2 / d**3 - d2 / (2 * d**2))
     return c1 * u1, c2 * u1**2 + c1 * u2, c3 * u1**3 + 3 * c2 * u1 * u2 + c1 * u3
@@ -110,8 +104,8 @@ def derivatives_by_length(
 def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, Array, Array]:
     """Speed, acceleration and jerk along the path at lengths (phases, samples) from the starts of the
     phases."""
-    d0 = _speed_sq(problem, profile.piece, profile.u0, 0)[0]
-    d1 = _speed_sq(problem, profile.piece, profile.u1, 0)[0]
+    d0 = _speed_sq(problem, profile.piece, profile.u0)[0]
+    d1 = _speed_sq(problem, profile.piece, profile.u1)[0]
     with np.errstate(invalid="ignore"):
         v0, v1 = (np.nan_to_num(np.sqrt(d * p)) for d, p in ((d0, profile.p0), (d1, profile.p1)))
     h = s[:, -1:]
@@ -167,7 +161,7 @@ def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array)
     half = (u - low) / 2
     places = low[..., None] + half[..., None] * (NODES + 1)
     rows = np.repeat(piece, places[0].size)
-    speed = np.sqrt(_speed_sq(problem, rows, places.ravel(), 0)[0]).reshape(places.shape)
+    speed = np.sqrt(_speed_sq(problem, rows, places.ravel())[0]).reshape(places.shape)
     return np.cumsum(half * (speed @ WEIGHTS), axis=1)
 
 
@@ -175,33 +169,11 @@ def _tool_share(problem: Problem, piece: NDArray[np.integer], u: Array) -> Array
     """The speed that the feed limits over the speed along the path, at the samples."""
     if problem.way_speed is None:
         return np.ones(len(u))
-    return np.sqrt(speed_square(problem, piece, u) / _speed_sq(problem, piece, u, 0)[0])
+    return np.sqrt(speed_square(problem, piece, u) / _speed_sq(problem, piece, u)[0])
 
 
-def _speed_sq(problem: Problem, piece: NDArray[np.integer], u: Array, order: int) -> list[Array]:
-    """|C'|² of the path at the samples, and its derivatives by u."""
-    tip = problem.way_speed
-    if tip is None:
-        _, c1, c2, c3 = problem.path.curve.evaluate(piece, u, 3)
-        return [
-            (c1**2).sum(axis=1),
-            2 * (c1 * c2).sum(axis=1),
-            2 * (c2**2 + c1 * c3).sum(axis=1),
-        ][: order + 1]
-    out = [np.empty(len(u)) for _ in range(order + 1)]
-    counts = np.diff(tip.offsets)[piece]
-    for count in np.unique(counts):
-        own = np.flatnonzero(counts == count)
-        width = problem.path.width[piece[own]]
-        rows = tip.coefficients[tip.offsets[piece[own]][:, None] + np.arange(count)]
-        for derivative in range(order + 1):
-            out[derivative][own] = _bernstein(rows, u[own] / width)
-            degree = rows.shape[1] - 1
-            rows = degree * np.diff(rows, axis=1) / width[:, None] if degree else np.zeros((len(own), 1))
-    return out
-
-
-def _bernstein(rows: Array, t: Array) -> Array:
-    while rows.shape[1] > 1:
-        rows = (1 - t)[:, None] * rows[:, :-1] + t[:, None] * rows[:, 1:]
-    return rows[:, 0]
+def _speed_sq(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[Array, Array, Array]:
+    """|C'|² of the path at the samples, and its first two derivatives by u."""
+    curve = problem.path.curve if problem.way_curve is None else problem.way_curve
+    _, c1, c2, c3 = curve.evaluate(piece, u, 3)
+    return (c1**2).sum(axis=1), 2 * (c1 * c2).sum(axis=1), 2 * (c2**2 + c1 * c3).sum(axis=1)
