@@ -140,7 +140,7 @@ def test_the_length_of_a_tool_of_the_table_is_known() -> None:
     assert by_name.tool_length is not None
     assert by_name.tool_length[1] == 80
     assert by_name.change_start.tolist() == in_force.change_start.tolist() == [[0, 0, 220, 0, 0]]
-    with pytest.raises(ProgramError, match="line 2: G43.4 works with a tool length in Z and X has one too"):
+    with pytest.raises(ProgramError, match=r"line 2: G43\.4 works with a tool length in Z and X has one too"):
         read_gcode("G21\nG43.4 H2\nG0 X5\nM2\n", machine, tools=tools)
     with pytest.raises(ProgramError, match="line 2: the tool table has no tool 3"):
         read_gcode("G21\nG43.4 H3\nG0 X5\nM2\n", machine, tools=tools)
