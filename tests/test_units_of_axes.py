@@ -164,3 +164,14 @@ def test_distances_from_the_path_are_told_in_its_unit(tmp_path: FilePath, capsys
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert re.search(r"Tolerance asked for</td><td[^>]*>0.01 rad<", page)
     assert re.search(r"Deviation from the program</td><td[^>]*>0.00\d+ rad<", page)
+
+
+def test_a_program_that_only_turns_is_judged_in_degrees() -> None:
+    turning, moving = (
+        feedplan.plan(f"G21\nG1 A90 {word} F1000\nM2\n", "rotary-table") for word in ("", "X10")
+    )
+    for plan, unit in ((turning, "deg"), (moving, "mm")):
+        units = {check.name: check.length for check in plan.audit().checks if check.axis is None}
+        assert (units["feed"], units["deviation"], plan.trajectory.unit) == (unit, unit, unit)
+    with pytest.raises(feedplan.InfeasibleError, match="no profile starts at 500 deg/s"):
+        feedplan.plan("G21\nG1 A90 F60000\nM2\n", "rotary-table", start_speed=500.0)

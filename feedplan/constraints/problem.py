@@ -159,8 +159,8 @@ class Problem:
 
     @property
     def unit(self) -> str:
-        """The unit of the length of the path."""
-        return self.way_units[0 if feed_groups(self.path.axes)[:-1].any() else 1]
+        """The unit of the length of the path: that of turning if it moves no tool."""
+        return self.tool_motion.unit
 
     @cached_property
     def native(self) -> NativeProblem:
