@@ -62,8 +62,9 @@ class Place:
             )
         name = kinematics.joint_names[self.joint]
         unit = "deg" if kinematics.rotary[self.joint] else "mm"
+        end = "begins" if self.value < self.limit else "ends"
         return (
-            f"line {line}: {name} would go to {self.value:.6g} {unit}, its travel ends at {self.limit:g} "
+            f"line {line}: {name} would go to {self.value:.6g} {unit}, its travel {end} at {self.limit:g} "
             f"{unit}: place the part elsewhere, or choose another machine"
         )
 

@@ -127,6 +127,9 @@ def test_a_singular_place_and_a_travel_end_are_told_with_their_lines() -> None:
     far = CompositeCurve.from_bezier([[100.0, 0.0, 0.0], [2000.0, 0.0, 0.0]]).elevated(2)
     with pytest.raises(InputError, match="line 10: X would go to 2000 mm, its travel ends at 900 mm"):
         build_problem(path_along(far, feed=200.0), Machine.load("cylindrical"))
+    near = CompositeCurve.from_bezier([[100.0, 0.0, 0.0], [10.0, 0.0, 0.0]]).elevated(2)
+    with pytest.raises(InputError, match="X would go to 10 mm, its travel begins at 20 mm: place"):
+        build_problem(path_along(near, feed=200.0), Machine.load("cylindrical"))
     belts = Machine.load("corexy")
     short = replace(belts, axes=(replace(belts.axes[0], travel=(-10.0, 300.0)), *belts.axes[1:]))
     with pytest.raises(InputError, match=r"line 10: \w would go to 2000 mm, its travel ends at 300 mm"):
