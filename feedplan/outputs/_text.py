@@ -158,7 +158,7 @@ def read_rows(
 @contextmanager
 def _opened(file: FilePath) -> Iterator[IO[str]]:
     try:
-        with file.open(encoding="utf-8", newline="\n") as stream:
+        with file.open(encoding="utf-8-sig", newline="\n") as stream:
             yield stream
     except UnicodeDecodeError:
         raise InputError(f"{file} is not text: give a file of setpoints") from None

@@ -173,6 +173,13 @@ def test_csv_has_a_header_with_units_and_exact_numbers(tmp_path: Path) -> None:
     ]
 
 
+def test_csv_that_a_spreadsheet_has_stored_is_read(tmp_path: Path) -> None:
+    whole = chunk(20)
+    file = written("csv", tmp_path, whole)
+    file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes().replace(b"\n", b"\r\n"))
+    assert same(load_setpoints(file), whole)
+
+
 def test_csv_tells_angles_in_degrees(tmp_path: Path) -> None:
     first = written("csv", tmp_path, chunk(1, "XA")).read_text().splitlines()[1]
     assert first.startswith("t [s],position X [mm],position A [deg],velocity X [mm/s],velocity A [deg/s],")
