@@ -7,7 +7,7 @@ import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path as FilePath
-from typing import Annotated, Any
+from typing import Annotated, Any, get_origin
 
 from fastapi import APIRouter, Depends, FastAPI, Header, Query
 from fastapi.responses import (
@@ -56,11 +56,13 @@ Time = Annotated[float | None, Query(allow_inf_nan=False)]
 
 
 def _known_query(request: Request) -> None:
-    """Raises Refusal for a parameter in the address that it does not take."""
-    known = [own.alias for own in request.scope["route"].dependant.query_params]
+    """Raises Refusal for a parameter in the address that it does not take, or not so often."""
+    known = {own.alias: own.field_info.annotation for own in request.scope["route"].dependant.query_params}
     for name in request.query_params:
         if name not in known:
             raise Refusal(INPUT, f"query.{name[:60]}: there is no such parameter: give {', '.join(known)}")
+        if get_origin(known[name]) is not list and len(request.query_params.getlist(name)) > 1:
+            raise Refusal(INPUT, f"query.{name}: it comes more than once: give it once")
 
 
 QUERY = Depends(_known_query)

@@ -53,11 +53,11 @@ def setpoints_file(
     if len(set(axes)) < len(axes):
         raise Refusal(INPUT, "axes has an axis twice: give each once")
     units = tuple(points.units[points.axes.index(name)] for name in axes)
-    low, high = -np.inf if start is None else start, np.inf if end is None else end
+    low, high = points.t[0] if start is None else start, points.t[-1] if end is None else end
     first, last = int(np.searchsorted(points.t, low, "left")), int(np.searchsorted(points.t, high, "right"))
     if first >= last:
         span = f"{points.t[0]:g} to {points.t[-1]:g} s"
-        raise Refusal(INPUT, f"there are no setpoints from {start} to {end} s: give times within {span}")
+        raise Refusal(INPUT, f"there are no setpoints from {low:g} to {high:g} s: give times within {span}")
     if format_name not in formats():
         raise Refusal(
             INPUT, f"{format_name} has no rows at servo periods: give one of {', '.join(formats())}"

@@ -241,7 +241,9 @@ def test_setpoints_by_time_and_axis_in_every_format(server: Server, tmp_path: Pa
     for query, sentence in (
         ({"axes": "Q"}, "the plan has no axis Q: give some of X, Y, Z"),
         ({"axes": "X,X"}, "axes has an axis twice: give each once"),
-        ({"from": 1e9}, "there are no setpoints from "),
+        ({"from": 1e9}, "there are no setpoints from 1e+09 to "),
+        ({"to": -5}, "there are no setpoints from 0 to -5 s: give times within 0 to "),
+        ({"axes": ["X", "Y"]}, "query.axes: it comes more than once: give it once"),
         ({"from": 0.5, "to": 0.2}, "there are no setpoints from 0.5 to 0.2 s: give times within 0 to "),
         ({"from": "nan"}, "query.from: input should be a finite number"),
         ({"format": "xls"}, "query.format: input should be "),
