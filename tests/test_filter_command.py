@@ -70,6 +70,14 @@ def test_the_machine_is_that_of_the_ini_file_without_its_travel(tmp_path: Path) 
     assert "has no acceleration of X, Y, Z" in error
 
 
+def test_without_a_machine_and_an_ini_file_nothing_is_planned() -> None:
+    code, out, error = run(str(EXAMPLES / "part.ngc"), INI_FILE_NAME="")
+    assert (code, out) == (2, b"")
+    assert error == (
+        "error: LinuxCNC has named no INI file (INI_FILE_NAME): give the machine with --machine\n"
+    )
+
+
 @pytest.mark.parametrize("stages", [[("read", 0.5), ("fit", 1.0), ("plan", 2.0), ("write", 1.0)]])
 def test_each_per_cent_is_reported_once(stages: list[tuple[str, float]]) -> None:
     lines: list[str] = []

@@ -22,7 +22,7 @@ from feedplan import planners
 from feedplan.cli import terminal
 from feedplan.cli.options import METHOD, PROGRAM, TOLERANCE
 from feedplan.cli.reading_options import machine_for, reading_options
-from feedplan.errors import InfeasibleError
+from feedplan.errors import InfeasibleError, InputError
 from feedplan.machine.machine import Machine
 from feedplan.program.program import Program
 from feedplan.program.read import Reading
@@ -71,10 +71,12 @@ def filter_(
     source: Source | Program
     # LinuxCNC sets this variable for the filters that it starts.
     own = os.environ.get("INI_FILE_NAME")
-    if machine is None and own:
+    if machine is not None:
+        known, source, reading = machine_for(machine, program, reading)
+    elif own:
         known, source = _without_travel(import_machine(own)), program
     else:
-        known, source, reading = machine_for(machine or "mill", program, reading)
+        raise InputError("LinuxCNC has named no INI file (INI_FILE_NAME): give the machine with --machine")
     result = plan(source, known, method=method, tolerance=tolerance, reading=reading, progress=tell)
     audit = result.audit(tell)
     if not audit.ok:
