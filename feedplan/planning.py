@@ -87,7 +87,7 @@ class Plan:
         name = self.program.name if self.program else "a path"
         return (
             f"<Plan of {name} on {self.machine.name} by {self.method}: {self.time:.6g} s, "
-            f"gap {100 * self.gap:.3g} %, {counted(len(self.path), 'piece')}>"
+            f"{self._distance}, {counted(len(self.path), 'piece')}>"
         )
 
     def _repr_html_(self) -> str:
@@ -104,7 +104,7 @@ class Plan:
             "machine": self.machine.name,
             "method": self.method,
             "time": f"{self.time:.6g} s",
-            "no plan of this path is faster than": f"{self.lower_bound:.6g} s (gap {100 * self.gap:.3g} %)",
+            "no plan within the limits is faster than": f"{self.lower_bound:.6g} s ({self._distance})",
             "path": f"{counted(len(self.path), 'piece')} in {counted(len(self.path.runs) - 1, 'run')}",
             "audit": judged,
             **({"warnings": "; ".join(self.warnings)} if self.warnings else {}),
@@ -124,6 +124,11 @@ class Plan:
     def gap(self) -> float:
         """How far the time can be from the optimum at most: (time − lower_bound) / time."""
         return (self.time - self.lower_bound) / self.time if self.time > 0 else 0.0
+
+    @property
+    def _distance(self) -> str:
+        """The gap in words. Beyond rounding, only a plan that breaks limits is faster than the bound."""
+        return f"gap {100 * self.gap:.3g} %" if self.gap > -1e-9 else "this one breaks limits"
 
     def setpoints(
         self,

@@ -54,6 +54,14 @@ def test_a_notebook_shows_a_card_with_a_small_plot(made: Plan) -> None:
     assert len(html) < 20_000
 
 
+def test_a_plan_that_is_faster_than_the_bound_is_told_as_one_that_breaks_limits(made: Plan) -> None:
+    broken = plan("G21 G64 P0.05\nG1 F60000 X10\nY10\nX0\nY20\nM2\n", "mill", "tangential")
+    assert broken.gap < -0.01
+    assert broken.figures()["no plan within the limits is faster than"].endswith("(this one breaks limits)")
+    assert "s, this one breaks limits, " in repr(broken)
+    assert "(gap " in made.figures()["no plan within the limits is faster than"]
+
+
 def test_plans_and_setpoints_go_to_other_processes(made: Plan) -> None:
     copy = pickle.loads(pickle.dumps(made))
     assert copy.time == made.time
