@@ -54,9 +54,8 @@ class ToolMotion:
         return cls(curve, share, turns, units)
 
     @cached_property
-    def _table(self) -> CurveLength | None:
-        """The lengths along the curve; None for a curve without pieces."""
-        return CurveLength(self.curve) if len(self.curve) else None
+    def _way(self) -> CurveLength:
+        return CurveLength(self.curve)
 
     @property
     def unit(self) -> str:
@@ -75,19 +74,16 @@ class ToolMotion:
     @cached_property
     def lengths(self) -> Floats:
         """Length of each piece (n,): [deg] if it turns, else [mm]."""
-        return np.diff(self._way(np.arange(len(self.curve)), self.curve.width), prepend=0.0)
+        return np.diff(self._way.length(np.arange(len(self.curve)), self.curve.width), prepend=0.0)
 
     def drawn_length(self, piece: NDArray[np.integer], u: Floats) -> Floats:
         """Length of the drawn pieces from the start of the path to parameters (m,) of such pieces."""
-        return np.asarray(self._way(piece, u) - self._left_out[piece])
+        return np.asarray(self._way.length(piece, u) - self._left_out[piece])
 
     @cached_property
     def _left_out(self) -> Floats:
         """Length (n,) of the pieces up to each that are not drawn."""
         return np.cumsum(np.where(self.drawn, 0.0, self.lengths))
-
-    def _way(self, piece: NDArray[np.integer], u: Floats) -> Floats:
-        return np.zeros(len(u)) if self._table is None else self._table.length(piece, u)
 
 
 def linear_motion(curve: CompositeCurve, axes: tuple[str, ...]) -> CompositeCurve:
