@@ -48,9 +48,8 @@ def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
     at_stop = piece < 0
     after = np.where(at_stop & (run >= 0), times[run], 0.0)
     passing = ~at_stop
-    if passing.any():
-        reached = motion.along(piece[passing].astype(np.uint32), u[passing])[0]
-        after[passing] = reached - starts[run[passing]]
+    reached = motion.along(piece[passing].astype(np.uint32), u[passing])[0]
+    after[passing] = reached - starts[run[passing]]
     done = actions(events)
     # Dwells belong to stops; those before an event of the same stop have passed.
     waits = np.where(done.kind == "dwell", done.value, 0.0)
@@ -84,11 +83,10 @@ def _places(program: Program, path: Path, moves: Integers) -> tuple[Integers, In
     piece = np.where(ends, -1, low - 1)
     u = np.where(ends, 0.0, path.width[np.maximum(low - 1, 0)])
     run = np.where(moves == 0, -1, run)
-    if shared.any():
-        columns = [program.axes.index(name) for name in path.axes]
-        points = program.target[moves[shared] - 1][:, columns]
-        piece[shared], u[shared] = nearest(path, points, low[shared], high[shared])
-        run[shared] = np.searchsorted(path.runs[1:], piece[shared], side="right")
+    columns = [program.axes.index(name) for name in path.axes]
+    points = program.target[moves[shared] - 1][:, columns]
+    piece[shared], u[shared] = nearest(path, points, low[shared], high[shared])
+    run[shared] = np.searchsorted(path.runs[1:], piece[shared], side="right")
     return run, piece, u
 
 

@@ -38,10 +38,9 @@ class SpeedPolynomial:
         offsets = np.concatenate([[0], np.cumsum(count)])
         coefficients = np.zeros(int(offsets[-1]))
         rows = np.flatnonzero(rational)
-        if len(rows):
-            coefficients[offsets[rows][:, None] + np.arange(SPEED_NODES)] = interpolated_squares(
-                lambda piece, u: (curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1), rows, curve.width[rows]
-            )
+        coefficients[offsets[rows][:, None] + np.arange(SPEED_NODES)] = interpolated_squares(
+            lambda piece, u: (curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1), rows, curve.width[rows]
+        )
         first = curve.offsets[:-1]
         for d in np.unique(curve.degree[~rational]).tolist():
             rows = np.flatnonzero((curve.degree == d) & ~rational)

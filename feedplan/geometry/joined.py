@@ -62,8 +62,7 @@ def _ends(program: Program, tolerance: Floats, halt: Flags) -> Integers:
     alone = (program.kind == MoveKind.LINE) & (tolerance > 0.0) & ~moving[:, others].any(axis=1)
     with_next = alone[:-1] & alone[1:] & ~halt[:-1]
     with_next &= (program.feed[1:] == program.feed[:-1]) & (tolerance[1:] == tolerance[:-1])
-    if len(program.change_move):
-        with_next[program.change_move[program.change_move > 0] - 1] = False
+    with_next[program.change_move[program.change_move > 0] - 1] = False
     points = np.concatenate([program.start[None, columns], program.target[:, columns]])
     ends = np.ones(len(program), dtype=np.bool_)
     # Ranges of moves that may be joined; move i goes from point i to point i + 1.

@@ -73,9 +73,6 @@ def line_speeds(program: Program, greatest: Floats, group: Integers) -> LineSpee
     line = program.line.astype(np.int64) - 1
     order = feeds[np.argsort(line[feeds], kind="stable")]
     lines, first = np.unique(line[order], return_index=True)
-    if not len(lines):
-        none = np.empty(0)
-        return LineSpeeds(lines, none, none, none > 0.0)
     most = np.maximum.reduceat(program.feed[order], first)
     least = np.minimum.reduceat(program.feed[order], first)
     top = np.fmax.reduceat(ratio[order], first)
@@ -164,8 +161,7 @@ def _programmed_feeds(
     lost = blocks.voids[lines] & ~own
     if blocks.calls_set_feed:
         lost |= (exclusion == Exclusion.FLOW) | (exclusion == Exclusion.MODES)
-    event = np.where(own | lost, np.arange(len(lines)), -1)
-    event = np.maximum.accumulate(event) if len(event) else event
+    event = np.maximum.accumulate(np.where(own | lost, np.arange(len(lines)), -1))
     known = (event >= 0) & ~lost[event] & (number[event] > 0.0)
     return np.where(known, number[event], np.nan), np.where(known, lines[event], -1)
 

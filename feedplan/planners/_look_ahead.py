@@ -148,12 +148,11 @@ def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> 
     rate = np.stack([parts.rate[segment]] * 2)
     length = rate[0] * (u1 - u0)
     curved = np.flatnonzero(~line)
-    if len(curved):
-        ends = (problem.curve.evaluate(piece[curved], at[curved], 1)[1] for at in (u0, u1))
-        rate[:, curved] = [np.linalg.norm(tangent, axis=1) for tangent in ends]
-        length[curved] = _weighted_length(
-            problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
-        )
+    ends = (problem.curve.evaluate(piece[curved], at[curved], 1)[1] for at in (u0, u1))
+    rate[:, curved] = [np.linalg.norm(tangent, axis=1) for tangent in ends]
+    length[curved] = _weighted_length(
+        problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
+    )
     # The speeds at the ends of the segments hold where a ramp is left out as well.
     by_law = ~constant | (even == PhaseLaw.FEED)
     first = np.flatnonzero(np.diff(segment, prepend=-1) * by_law)

@@ -98,8 +98,6 @@ def plan(
 def corner_speed(problem: Problem, junctions: Junctions) -> Floats:
     """Speed (n + 1,) [mm/s] at the ends of the pieces, infinite where there is no corner."""
     speed = np.full(len(problem.path) + 1, np.inf)
-    if len(problem.path) < 2:
-        return speed
     curve = problem.curve
     corner = np.flatnonzero((tangent_jumps(curve) > 0.0).any(axis=1))
     start, end = end_edges(curve)

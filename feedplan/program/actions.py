@@ -99,4 +99,4 @@ def _last(marks: Flags) -> Integers:
 def _latest(values: Floats, marks: Flags) -> Floats:
     """The value of the last marked row up to each row; 0 before the first."""
     last = _last(marks)
-    return np.where(last >= 0, values[last], 0.0) if len(values) else values
+    return np.where(last >= 0, values[last], 0.0)

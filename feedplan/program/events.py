@@ -56,13 +56,12 @@ class Events:
         is_text = np.isin(self.letter, [ord(MESSAGE), ord(COMMENT)])
         texts = [""] * len(self)
         words = np.flatnonzero(~is_text)
-        if len(words):
-            first, place = _different(self.letter[words], self.number[words], self.p[words], self.q[words])
-            rows = words[first]
-            columns = (self.letter[rows], self.number[rows], self.p[rows], self.q[rows])
-            spelt = [_word(*row) for row in np.stack(columns, axis=1).tolist()]
-            for row, own in zip(words.tolist(), place.tolist(), strict=True):
-                texts[row] = spelt[own]
+        first, place = _different(self.letter[words], self.number[words], self.p[words], self.q[words])
+        rows = words[first]
+        columns = (self.letter[rows], self.number[rows], self.p[rows], self.q[rows])
+        spelt = [_word(*row) for row in np.stack(columns, axis=1).tolist()]
+        for row, own in zip(words.tolist(), place.tolist(), strict=True):
+            texts[row] = spelt[own]
         for row in np.flatnonzero(is_text).tolist():
             texts[row] = self.texts[int(self.number[row])]
         return texts, is_text.tolist()
