@@ -12,24 +12,32 @@ from feedplan.errors import InfeasibleError, InputError, SolverError, at_line
 def error_of(problem: Problem, fault: PlanError) -> InfeasibleError | InputError | SolverError:
     """The planner's fault in our words: with the source line, and a speed that will do."""
     kind, piece, reachable, sentence = fault.args
-    line = None if piece is None else int(problem.path.line[piece])
-    place = at_line(line or 0)
+    line = 0 if piece is None else int(problem.path.line[piece])
     if reachable is not None:
-        shown, unit = _rounded_down(reachable), f"{problem.unit}/s"
-        if kind == "start":
-            sentence = (
-                f"{place}no profile starts at {problem.start_speed:g} {unit}: "
-                f"the limits ahead allow at most {shown} {unit}: give a lower speed"
-            )
-        else:
-            sentence = (
-                f"{place}no profile ends at {problem.end_speed:g} {unit}: "
-                f"at most {shown} {unit} can be reached: give a lower speed"
-            )
-        return InfeasibleError(sentence, line, reachable)
+        most = f"at most {_rounded_down(reachable)} {problem.unit}/s"
+        at_start = kind == "start"
+        why = f"the limits ahead allow {most}: " if at_start else f"{most} can be reached: "
+        return end_error(problem, at_start, line, why, reachable)
     if kind == "stuck":
-        return SolverError(f"{place}{sentence}: this is a fault of the planner; please report the program")
-    return InputError(f"{place}{sentence}")
+        return SolverError(
+            f"{at_line(line)}{sentence}: this is a fault of the planner; please report the program"
+        )
+    return InputError(f"{at_line(line)}{sentence}")
+
+
+def end_error(
+    problem: Problem,
+    at_start: bool,
+    line: int,
+    why: str = "",
+    reachable: float | None = None,
+    what: str = "no profile",
+) -> InfeasibleError:
+    """The error that no profile has the speed given at the start or at the end of the path; `why` ends with
+    a colon."""
+    verb, speed = ("starts", problem.start_speed) if at_start else ("ends", problem.end_speed)
+    sentence = f"{what} {verb} at {speed:g} {problem.unit}/s: {why}give a lower speed"
+    return InfeasibleError(f"{at_line(line)}{sentence}", line, reachable)
 
 
 def _rounded_down(speed: float) -> str:

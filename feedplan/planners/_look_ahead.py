@@ -16,7 +16,7 @@ import numpy as np
 from feedplan._solvers import look_ahead as native_look_ahead
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square, speed_square
-from feedplan.errors import InfeasibleError, at_line
+from feedplan.planners._faults import end_error
 from feedplan.planners._queue import Queue
 from feedplan.planners._segments import CurvePlaces, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
@@ -92,20 +92,13 @@ def _speed_at_ends(
 
 
 def _check_ends(problem: Problem, speed: Floats) -> None:
-    for name, place, wanted, reached in (
-        ("starts", 0, problem.start_speed, float(speed[0])),
-        ("ends", -1, problem.end_speed, float(speed[-1])),
-    ):
+    for place, wanted in ((0, problem.start_speed), (-1, problem.end_speed)):
+        reached = float(speed[place])
         if reached < wanted * (1.0 - ROUNDING):
-            line = int(problem.path.line[place])
             shown = math.floor(reached * 1e6) / 1e6
-            raise InfeasibleError(
-                f"{at_line(line)}no profile of this method {name} at {wanted:g} {problem.unit}/s: "
-                f"at most {shown:.9g} {problem.unit}/s is possible: give "
-                "a lower speed",
-                line,
-                reached,
-            )
+            why = f"at most {shown:.9g} {problem.unit}/s is possible: "
+            line = int(problem.path.line[place])
+            raise end_error(problem, place == 0, line, why, reached, "no profile of this method")
 
 
 def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> SpeedProfile:

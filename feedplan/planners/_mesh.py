@@ -18,7 +18,7 @@ from numpy.polynomial import legendre
 
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem, feed_square, speed_square
-from feedplan.errors import InfeasibleError, at_line
+from feedplan.planners._faults import end_error
 
 # Places of a cell in [0, 1]: both ends, and the extremes of the Legendre polynomial between them.
 _DEGREE = 10
@@ -194,24 +194,13 @@ def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
     for side, (known, station) in enumerate(((subrun.start, 0), (subrun.end, -1))):
         p = None if known is None else known / float(square[side * -1, station])
         if p is not None and p > cap[station] * (1.0 + 1e-12):
-            raise end_error(problem, subrun, side, float(np.sqrt(cap[station] * square[side * -1, station])))
+            most = float(np.sqrt(cap[station] * square[side * -1, station]))
+            why = f"at most {most:.6g} {problem.unit}/s is allowed there: "
+            raise end_error(problem, side == 0, int(problem.path.line[piece[station]]), why, most)
         fixed.append(p)
     ends = np.stack([u[0], u[-1]])
     ends[:, :] = np.where(np.stack([lower, upper]) == 1.0, whole, ends)
     return Mesh(piece, ends, width, slope, bend, per_p, way, gain, cap, (fixed[0], fixed[1]))
-
-
-def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | None = None) -> InfeasibleError:
-    """The error that no profile has the given speed at the start (`side` 0) or at the end."""
-    line = int(problem.path.line[subrun.first if side == 0 else subrun.last - 1])
-    speed = problem.start_speed if side == 0 else problem.end_speed
-    known = "" if reachable is None else f" at most {reachable:.6g} {problem.unit}/s is allowed there:"
-    which = "starts" if side == 0 else "ends"
-    return InfeasibleError(
-        f"{at_line(line)}no profile {which} at {speed:g} {problem.unit}/s:{known} give a lower speed",
-        line,
-        reachable,
-    )
 
 
 def _chord_speed_square(problem: Problem, piece: Integers, u: Floats) -> Floats:

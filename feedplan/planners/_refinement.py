@@ -24,7 +24,8 @@ from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError, at_line
 from feedplan.planners._arcs import Arcs, arcs_between, profile
-from feedplan.planners._mesh import Cuts, Mesh, Subrun, end_error, even_cuts, mesh, subruns
+from feedplan.planners._faults import end_error
+from feedplan.planners._mesh import Cuts, Mesh, Subrun, even_cuts, mesh, subruns
 from feedplan.planners._transcription import Rows, Transcription, transcribe
 from feedplan.profile import SpeedProfile
 
@@ -255,9 +256,11 @@ class _Planner:
             return self.method.solve(transcription, left)
         except Refusal as refusal:
             if refusal.infeasible:
-                sides = [side for side, x in enumerate(transcription.fixed) if x]
-                if sides:
-                    raise end_error(self.problem, self.subrun, sides[0]) from None
+                ends = (True, self.subrun.first), (False, self.subrun.last - 1)
+                for (at_start, piece), x in zip(ends, transcription.fixed, strict=True):
+                    if x:
+                        line = int(self.problem.path.line[piece])
+                        raise end_error(self.problem, at_start, line) from None
             raise SolverError(
                 f"{self._place}{name} found no profile ({refusal}): allow more time, ask for another "
                 "accuracy, or use bang-bang"
