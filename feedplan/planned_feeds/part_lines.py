@@ -70,15 +70,15 @@ def words_of(line: bytes) -> list[Word] | None:
     return words if known and codes and len(set(letters)) == len(letters) else None
 
 
-def moved_axes_are_named(words: Sequence[Word], axes: Sequence[str], moving: Sequence[bool]) -> bool:
-    """Whether the line says where each axis that it moves goes."""
-    named = {word.letter.decode() for word in words}
-    return all(name in named for name, moves in zip(axes, moving, strict=True) if moves)
+def may_be_split(line: bytes, axes: Sequence[str], moving: Sequence[bool]) -> bool:
+    """Whether a line is a plain line or arc that says where each of the `axes` goes that it moves."""
+    words = words_of(line)
+    named = {word.letter.decode() for word in words or ()}
+    return words is not None and all(name in named for name, moves in zip(axes, moving, strict=True) if moves)
 
 
 def part_lines(
     line: bytes,
-    words: Sequence[Word],
     sense: Sense,
     axes: Sequence[str],
     start: Floats,
@@ -87,11 +87,12 @@ def part_lines(
     texts: Sequence[bytes | None],
     usual: bytes,
 ) -> bytes:
-    """The lines of the parts, each with its F where `texts` has one.
+    """The lines of the parts of a line that may be split, each with its F where `texts` has one.
 
     `start` (axes,) is where the move begins; `centre` are the coordinates of an arc's, in its plane; `usual`
     is the blank between words of the program. The first part has the line's other words and comments.
     """
+    words = words_of(line) or []
     ends = np.concatenate([start[None, :], parts.ends])
     rows: list[dict[bytes, bytes]] = []
     summed: dict[bytes, Decimal] = {}

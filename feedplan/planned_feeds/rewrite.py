@@ -20,7 +20,7 @@ from feedplan.planned_feeds.dialects import DIALECTS, DialectName, gone, lacks, 
 from feedplan.planned_feeds.expand import expanded
 from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, exclusions_of, line_speeds, planned_feeds
 from feedplan.planned_feeds.inverse_time import inverse_feeds, require_no_splines
-from feedplan.planned_feeds.part_lines import Sense, Word, moved_axes_are_named, part_lines, words_of
+from feedplan.planned_feeds.part_lines import Sense, may_be_split, part_lines
 from feedplan.planned_feeds.parts import Parts, motions, parts_of
 from feedplan.planned_feeds.read_back import SAME, require_same
 from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_along
@@ -164,12 +164,16 @@ def planned_program(
     # A plan exceeds the requested feed only by rounding.
     greatest = np.fmin(along.greatest(), plan.problem.request.of(program.feed))
     speeds, exclusion = line_speeds(program, greatest, along.group), exclusions_of(blocks, program)
-    words: dict[int, list[Word]] = {}
     parts: dict[int, Parts] = {}
     if feed_step is not None:
         candidates = _candidates(blocks, program, exclusion)
-        parts = parts_of(plan.problem, plan.profile, program, along, candidates, feed_step)
-        parts, words = _writable(blocks, program, parts)
+        found = parts_of(plan.problem, plan.profile, program, along, candidates, feed_step)
+        moving = program.moving()
+        parts = {
+            m: own
+            for m, own in found.items()
+            if may_be_split(blocks.line(int(program.line[m]) - 1), program.axes, moving[m])
+        }
     point = writes_points(dialect)
     if inverse_time:
         feeds = inverse_feeds(blocks, program, exclusion, greatest, parts, point)
@@ -180,7 +184,7 @@ def planned_program(
         feeds = planned_feeds(blocks, speeds, exclusion, by_line, point)
         # A line whose F could not be changed is not split.
         parts = {m: own for m, own in parts.items() if int(program.line[m]) - 1 not in feeds.left}
-    result = rewritten(blocks, feeds, _split(blocks, program, parts, words, feeds))
+    result = rewritten(blocks, feeds, _split(blocks, program, parts, feeds))
     if result != content:
         require_same(result, program, parts, _most(blocks, program, feeds, speeds))
     return PlannedProgram(
@@ -298,27 +302,7 @@ def _candidates(blocks: Blocks, program: Program, exclusion: NDArray[np.uint8]) 
     return np.flatnonzero(alone & plain[line] & kinds & (program.control != PathControl.EXACT_STOP))
 
 
-def _writable(
-    blocks: Blocks, program: Program, parts: Mapping[int, Parts]
-) -> tuple[dict[int, Parts], dict[int, list[Word]]]:
-    """Those moves whose lines can be written in parts, and the words of these lines."""
-    moving = program.moving()
-    kept: dict[int, Parts] = {}
-    words: dict[int, list[Word]] = {}
-    for m, own in parts.items():
-        found = words_of(blocks.line(int(program.line[m]) - 1))
-        if found is not None and moved_axes_are_named(found, program.axes, moving[m]):
-            kept[m], words[m] = own, found
-    return kept, words
-
-
-def _split(
-    blocks: Blocks,
-    program: Program,
-    parts: Mapping[int, Parts],
-    words: Mapping[int, list[Word]],
-    feeds: Feeds,
-) -> dict[int, bytes]:
+def _split(blocks: Blocks, program: Program, parts: Mapping[int, Parts], feeds: Feeds) -> dict[int, bytes]:
     """The lines that are split, by index, written anew."""
     motion_of = motions(program)
     replaced: dict[int, bytes] = {}
@@ -333,7 +317,7 @@ def _split(
         )
         texts = feeds.texts.get(line, [None] * len(own))
         replaced[line] = part_lines(
-            blocks.line(line), words[m], sense, program.axes, motion.start, own, centre, texts, usual
+            blocks.line(line), sense, program.axes, motion.start, own, centre, texts, usual
         )
     return replaced
 
