@@ -1,4 +1,4 @@
-"""Checks arrays of users, of curves and setpoints: type, shape and range."""
+"""Checks arrays of users, of curves and of places and times along them: type, shape and range."""
 
 from __future__ import annotations
 
