@@ -62,11 +62,10 @@ def joint_motion(path: Path, machine: Machine, feed: Floats) -> tuple[Path, dict
     `feed` (n,) [mm/s] is the greatest speed of a piece. Raises InputError where the tool passes a singular
     position or a joint leaves its travel, with the line.
     """
-    runs = [_words(path, machine, run) for run in range(len(path.runs) - 1)]
     motions: list[_Motion] = []
     words: list[AxisWords] = []
     start = None
-    for own, group in groupby(runs):
+    for own, group in groupby(_words(path, machine)):
         first = len(words)
         words += group
         pieces = np.arange(path.runs[first], path.runs[len(words)])
@@ -159,14 +158,17 @@ class _Motion:
         )
 
 
-def _words(path: Path, machine: Machine, run: int) -> AxisWords:
-    length = math.nan if path.tool_length is None else float(path.tool_length[run])
-    return axis_words(
-        machine,
-        path.axes,
-        None if path.coordinate_mode is None else CoordinateMode(int(path.coordinate_mode[run])),
-        tool_length=None if math.isnan(length) else length,
-    )
+def _words(path: Path, machine: Machine) -> list[AxisWords]:
+    """The words of each run, made once for each mode and tool length."""
+    same: list[Any] = [None] * (len(path.runs) - 1)
+    modes = same if path.coordinate_mode is None else map(CoordinateMode, path.coordinate_mode.tolist())
+    lengths = same if path.tool_length is None else path.tool_length.tolist()
+    keys = [(mode, None if length != length else length) for mode, length in zip(modes, lengths, strict=True)]
+    known = {
+        (mode, length): axis_words(machine, path.axes, mode, tool_length=length)
+        for mode, length in dict.fromkeys(keys)
+    }
+    return [known[key] for key in keys]
 
 
 def _posed(task: _Task) -> _Motion:
