@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import Problem as NativeProblem
 from feedplan.arguments import not_negative, number
-from feedplan.arrays import Floats
+from feedplan.arrays import Floats, Integers
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.constraints.tool_motion import ToolMotion, linear_motion
@@ -185,14 +185,14 @@ class Problem:
             return self.path.curve.evaluate(piece, u, order)
         from feedplan.machine.path_derivatives import derivatives
 
-        run = np.searchsorted(self.path.runs, piece, side="right") - 1
+        first = self._first_run[np.searchsorted(self.path.runs, piece, side="right") - 1]
         result = np.empty((order + 1, len(u), len(self.axes)))
         curve, whole = self._uncut.even, self._uncut.piece[piece]
         start, end = self._uncut.part[piece].T
         fraction = start + (end - start) * (u / self.path.width[piece])
         control, weights = curve.by_piece, curve.weights_by_piece
-        for words in dict.fromkeys(self.words):
-            own = np.flatnonzero(np.array([other == words for other in self.words])[run])
+        for run in np.unique(first).tolist():
+            words, own = self.words[run], np.flatnonzero(first == run)
             result[:, own] = derivatives(
                 words.kinematics,
                 words.tip(control[whole[own]]),
@@ -202,6 +202,12 @@ class Problem:
                 None if weights is None else weights[whole[own]],
             )
         return result
+
+    @cached_property
+    def _first_run(self) -> Integers:
+        """The first run that has the same words as each run (r,)."""
+        first: dict[AxisWords, int] = {}
+        return np.array([first.setdefault(words, run) for run, words in enumerate(self.words)])
 
     @cached_property
     def _uncut(self) -> Cut:
