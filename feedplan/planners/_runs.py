@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,4 +41,6 @@ def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:
     times = np.stack([profile.run_times for profile in profiles])
     planned = np.stack([np.diff(profile.runs) > 0 for profile in profiles])
     best = np.argmin(np.where(planned, times, np.inf), axis=0)
-    return joined_runs((profiles[chosen], slice(run, run + 1), 0) for run, chosen in enumerate(best))
+    # Neighbouring runs of one profile are taken together.
+    ends = [0, *(np.flatnonzero(np.diff(best)) + 1).tolist(), len(best)]
+    return joined_runs((profiles[best[first]], slice(first, last), 0) for first, last in pairwise(ends))
