@@ -105,9 +105,8 @@ impl Flow {
         // Blocks that are open: the step that begins each, and the branches of an `if` so far.
         let mut open: Vec<Vec<usize>> = Vec::new();
         for i in 0..self.steps.len() {
-            let kind = self.steps[i].kind;
-            match kind {
-                Kind::While if open.last().is_some_and(|top| self.closes_do(top, i)) => {
+            match self.steps[i].kind {
+                Kind::While if open.last().is_some_and(|top| self.opens(top, Kind::Do, i)) => {
                     self.steps[i].kind = Kind::DoWhile;
                     self.close(&mut open, i, Kind::Do)?;
                 }
@@ -118,12 +117,13 @@ impl Flow {
                         outer.line
                     ));
                 }
-                Kind::Sub | Kind::If | Kind::While | Kind::Do | Kind::Repeat => open.push(vec![i]),
+                Kind::Sub => {
+                    self.begin_sub(i)?;
+                    open.push(vec![i]);
+                }
+                Kind::If | Kind::While | Kind::Do | Kind::Repeat => open.push(vec![i]),
                 Kind::ElseIf | Kind::Else => match open.last_mut() {
-                    Some(top)
-                        if self.steps[top[0]].kind == Kind::If
-                            && self.steps[top[0]].label == self.steps[i].label =>
-                    {
+                    Some(top) if self.opens(top, Kind::If, i) => {
                         let before = top[top.len() - 1];
                         if self.steps[before].kind == Kind::Else {
                             return self.refuse(i, "follows the else of its block: put it before");
@@ -151,9 +151,6 @@ impl Flow {
                 Kind::Return | Kind::Call | Kind::DoWhile | Kind::When | Kind::GoTo => {}
                 Kind::Number => self.begin_sub(i)?,
             }
-            if kind == Kind::Sub {
-                self.begin_sub(i)?;
-            }
         }
         match open.last() {
             Some(top) => self.refuse(top[0], "is not ended: the file may be truncated"),
@@ -173,16 +170,15 @@ impl Flow {
         Ok(())
     }
 
-    fn closes_do(&self, top: &[usize], i: usize) -> bool {
-        let start = &self.steps[top[0]];
-        start.kind == Kind::Do && start.label == self.steps[i].label
+    /// Whether a block that is open begins with a step of a kind and with the label of step `i`.
+    fn opens(&self, block: &[usize], kind: Kind, i: usize) -> bool {
+        let start = &self.steps[block[0]];
+        start.kind == kind && start.label == self.steps[i].label
     }
 
     fn close(&mut self, open: &mut Vec<Vec<usize>>, i: usize, kind: Kind) -> Outcome<()> {
         match open.pop() {
-            Some(top)
-                if self.steps[top[0]].kind == kind && self.steps[top[0]].label == self.steps[i].label =>
-            {
+            Some(top) if self.opens(&top, kind, i) => {
                 self.steps[top[top.len() - 1]].partner = i;
                 for step in &top {
                     self.steps[*step].end = i;

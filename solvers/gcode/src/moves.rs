@@ -183,11 +183,7 @@ impl Moves {
         control: &Control,
         line: u32,
     ) -> Outcome<()> {
-        let mut step = 0.0f64;
-        for k in 0..9 {
-            step = step.max((target[k] - self.position[k]).abs());
-        }
-        if step <= NO_MOTION {
+        if !apart(target, &self.position) {
             return Ok(());
         }
         self.row(kind, target, feed, control, line)
@@ -366,8 +362,9 @@ impl Moves {
 }
 
 /// True where two positions differ by more than rounding.
+#[inline(always)]
 fn apart(a: &Point, b: &Point) -> bool {
-    a.iter().zip(b).any(|(a, b)| (a - b).abs() > NO_MOTION)
+    a.iter().zip(b).fold(0.0, |step: f64, (a, b)| step.max((a - b).abs())) > NO_MOTION
 }
 
 /// The length of a straight move that its feed refers to, as in LinuxCNC: along X, Y, Z if one of these moves, else along

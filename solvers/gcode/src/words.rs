@@ -138,7 +138,8 @@ impl<'a> Lexer<'a> {
                     b'N' => self.number_word(value, at, end, first)?,
                     b'O' if keyword(self.source, end).is_some() => return self.flow(at, first),
                     b'O' => self.program_number(at, end, first)?,
-                    b'E' if self.is_exponent(at) => return self.exponent(at, end),
+                    // The word of an extruder follows a blank.
+                    b'E' if at > 0 && self.source[at - 1].is_ascii_digit() => return self.exponent(at, end),
                     _ if block.set(upper, value) => {}
                     _ => return self.twice(at, end),
                 }
@@ -342,11 +343,6 @@ impl<'a> Lexer<'a> {
                 "word {word} is not understood: remove it, or post the program for LinuxCNC (RS-274/NGC)"
             ),
         }
-    }
-
-    /// True where the E at `at` follows a digit; the word of an extruder follows a blank.
-    fn is_exponent(&self, at: usize) -> bool {
-        at > 0 && self.source[at - 1].is_ascii_digit()
     }
 
     #[cold]

@@ -130,7 +130,12 @@ pub fn fit_points<const M: usize>(
 /// The chain cut at its breaking points, and long groups cut at feature points, each with its tangents at both ends.
 fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<usize>]) -> Vec<Block<M>> {
     let count = features.len();
-    let direction = |g: usize| chain.direction(breaks[g].at, breaks[g + 1].at);
+    // The condition at break `at`, where the other side is group `beside`.
+    let end =
+        |beside: Option<usize>, at: usize| match beside.filter(|&g| breaks[g].line && !breaks[at].corner) {
+            Some(g) => EndCondition::Tangent(chain.direction(breaks[g].at, breaks[g + 1].at)),
+            None => EndCondition::Free,
+        };
     let mut blocks = Vec::with_capacity(count);
     let mut g = 0;
     while g < count {
@@ -145,14 +150,8 @@ fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<us
         while g < count && !breaks[g].corner && !breaks[g].line {
             g += 1;
         }
-        let start = match first > 0 && breaks[first - 1].line && !breaks[first].corner {
-            true => EndCondition::Tangent(direction(first - 1)),
-            false => EndCondition::Free,
-        };
-        let finish = match g < count && breaks[g].line && !breaks[g].corner {
-            true => EndCondition::Tangent(direction(g)),
-            false => EndCondition::Free,
-        };
+        let start = end(first.checked_sub(1), first);
+        let finish = end(Some(g).filter(|&g| g < count), g);
         append_blocks(chain, &breaks[first..=g], &features[first..g], start, finish, &mut blocks);
     }
     blocks

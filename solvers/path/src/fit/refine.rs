@@ -217,7 +217,10 @@ impl<'a, const M: usize> Refinement<'a, M> {
                 };
                 changed = true;
                 if round == LAST {
-                    self.give_up(first, end, &mut added);
+                    for step in &mut self.steps[first..end] {
+                        added.extend(step.from + 1..step.to);
+                        step.line = true;
+                    }
                     break;
                 }
                 let StepState { from, to, .. } = self.steps[j];
@@ -330,14 +333,6 @@ impl<'a, const M: usize> Refinement<'a, M> {
     fn refit(&mut self, j: usize) {
         for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
             self.steps[k].fitted = None;
-        }
-    }
-
-    /// Makes each chord of the spline `[first, end)` a line.
-    fn give_up(&mut self, first: usize, end: usize, added: &mut Vec<usize>) {
-        for step in &mut self.steps[first..end] {
-            added.extend(step.from + 1..step.to);
-            step.line = true;
         }
     }
 
