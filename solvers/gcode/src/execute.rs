@@ -17,7 +17,7 @@ use super::tip::takes_direction;
 use super::tolerance::{LONG_DWELL, MM_PER_INCH, MOST_DWELL, RATES};
 
 /// What the spindle does within a cycle.
-pub(super) enum Spindle {
+pub enum Spindle {
     Off,
     Reversed,
     AsBefore,
@@ -235,7 +235,7 @@ impl Interpreter<'_> {
     }
 
     /// A stop at which a cycle turns the spindle otherwise, told as M3, M4 or M5. One that stands is left alone.
-    pub(super) fn turn_spindle(&mut self, spindle: Spindle) {
+    pub fn turn_spindle(&mut self, spindle: Spindle) {
         self.moves.stop(Stop::Switch);
         if self.state.spindle_on {
             let code = match spindle {
