@@ -4,20 +4,9 @@
 use super::block::{Block, AXES};
 use super::coordinates::Point;
 use super::fault::Outcome;
-use super::interpreter::Interpreter;
+use super::interpreter::{Corner, Interpreter};
 use super::moves::{Arc, Kind};
 use super::tolerance::ON_ONE_LINE;
-
-/// A corner that waits for the next move: its word, and the row, line, start and feed of the move before.
-#[derive(Clone, Copy, Debug)]
-pub struct Corner {
-    letter: u8,
-    size: f64,
-    row: usize,
-    line: u32,
-    start: Point,
-    feed: f64,
-}
 
 impl Interpreter<'_> {
     /// Keeps the corner of a block whose move has been added.

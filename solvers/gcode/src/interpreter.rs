@@ -3,14 +3,24 @@
 use super::block::{bit, rotary, Block, AXES, AXIS_OF_LETTER, AXIS_WORDS};
 use super::compensation::Compensation;
 use super::coordinates::Point;
-use super::corner::Corner;
 use super::fault::Outcome;
 use super::modal::{Feed, FeedMode, State};
 use super::moves::Moves;
+use super::nurbs::Nurbs;
 use super::options::{Options, Tool};
 use super::parameters::{first_of_system, Parameters, HOME, SECOND_HOME, SYSTEM};
-use super::spline::Nurbs;
 use super::tolerance::{FARTHEST, FARTHEST_TURN};
+
+/// A corner that waits for the next move: its word, and the row, line, start and feed of the move before.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    pub letter: u8,
+    pub size: f64,
+    pub row: usize,
+    pub line: u32,
+    pub start: Point,
+    pub feed: f64,
+}
 
 /// The state of the program between two blocks.
 pub struct Interpreter<'a> {

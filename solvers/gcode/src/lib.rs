@@ -9,7 +9,7 @@
 //! 3. `intent` finds the motion of the block and checks that each of its words has a use.
 //! 4. `execute` runs the block on the state of the `interpreter` in LinuxCNC's order, with the modes of `modal` and `modes`
 //!    and the zero of `offsets`.
-//! 5. `motion`, `arc`, `spline`, `cycle`, `thread` and `corner` make moves; `compensation` offsets them by the tool's
+//! 5. `motion`, `arc`, `spline`, `cycle`, `thread` and `corner` make moves; `compensate` offsets them by the tool's
 //!    radius; `tip` converts between joints and the tool's tip.
 //! 6. `moves` holds the moves, `events` what happens between them; `moves/columns` gives both as columns.
 
@@ -20,6 +20,7 @@ mod fault;
 mod arc;
 mod arithmetic;
 mod block;
+mod compensate;
 mod compensation;
 mod coordinates;
 mod corner;
@@ -36,6 +37,7 @@ mod modes;
 mod motion;
 mod moves;
 mod number;
+mod nurbs;
 mod offsets;
 mod options;
 mod parameters;

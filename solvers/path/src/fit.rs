@@ -10,7 +10,8 @@
 //! | `features` | the feature points of a group, which are interpolated | 3.2, Algorithm 1 |
 //! | `spline` | the spline through feature points | 3.3 |
 //! | `certificate` | a bound of the distance between spline and polygon, both ways | own |
-//! | `refine` | more feature points until the bound is within the tolerance, and breaks where none helps; the pieces | own |
+//! | `refine` | more feature points until the bound is within the tolerance, and breaks where none helps | own |
+//! | `piece_builder` | the quadratic pieces of a spline | |
 //!
 //! The paper tests its tolerance on the Bézier curves of Algorithm 1 only, not on the spline.
 //!
@@ -21,6 +22,7 @@ mod breaking;
 mod certificate;
 mod chain;
 mod features;
+mod piece_builder;
 mod refine;
 mod spline;
 
@@ -29,6 +31,7 @@ use chain::{lengths_along, Chain};
 use features::select;
 use feedplan_geometry::quadratic::{dot, norm, Quadratic};
 use feedplan_geometry::watch::Watch;
+pub use piece_builder::FittedPiece;
 use refine::Block;
 use spline::{interpolate, EndCondition};
 
@@ -47,18 +50,6 @@ pub struct FitOptions {
     pub max_curvature: f64,
     /// A breaking point that turns by more is a corner, where the tangent may jump, in rad.
     pub corner_angle: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FittedPiece<const M: usize> {
-    pub piece: Quadratic<M>,
-    /// First and last chord that the piece follows; chord i goes from point i to point i + 1.
-    pub first: usize,
-    pub last: usize,
-    /// Certified bound of the distance between the piece and its chords, both ways, in mm.
-    pub deviation: f64,
-    /// Number of the B-spline (or line) that the piece belongs to.
-    pub spline: u32,
 }
 
 /// Lines and C1 quadratic B-splines within the tolerance of the polygon of `points`, both ways.

@@ -7,43 +7,18 @@
 
 mod cusp_ends;
 mod lines;
+mod pieces;
 
 use std::ops::Range;
 
 use self::cusp_ends::{cut_in_cusps, joined_in_cusps};
 use self::lines::{form, Form, Straight};
+pub use self::pieces::Regular;
+use self::pieces::{is_smooth, near};
 use super::cusps::rests_at_ends;
 use super::{CompositeCurve, Piece};
-use crate::quadratic::{norm, sub};
-use crate::tolerance::{ROUNDING, SAME_DIRECTION};
+use crate::tolerance::ROUNDING;
 use crate::watch::Watch;
-
-/// The regular pieces of a curve.
-pub struct Regular<const M: usize> {
-    pub curve: CompositeCurve<M>,
-    /// For each piece, the first and the last of the given pieces that it goes along.
-    pub source: Vec<[usize; 2]>,
-    /// Whether a piece begins and ends in a cusp, where the tool rests.
-    pub rests: Vec<[bool; 2]>,
-    /// The pieces that each of the given ranges has become.
-    pub ranges: Vec<Range<usize>>,
-}
-
-impl<const M: usize> Regular<M> {
-    fn push(&mut self, source: [usize; 2], piece: &Piece<M>, rounding: f64) {
-        self.curve.push(piece.control, piece.weights, piece.width);
-        let last = self.curve.len() - 1;
-        // A piece without length before this one may have been left out.
-        if last > 0 {
-            let end = self.curve.control[self.curve.offsets[last] - 1];
-            let start = &mut self.curve.control_mut(last)[0];
-            if near(&end, start, rounding) {
-                *start = end;
-            }
-        }
-        self.source.push(source);
-    }
-}
 
 /// The regular pieces of a curve, of each range of its pieces by itself.
 ///
@@ -119,18 +94,6 @@ fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Form<M>)], roundi
             }
         }
     }
-}
-
-/// Whether two edges have one direction, up to the rounding of their ends.
-fn is_smooth<const M: usize>(before: &[f64; M], after: &[f64; M], rounding: f64) -> bool {
-    let (own, others) = (norm(before), norm(after));
-    let turn = norm(&std::array::from_fn::<f64, M, _>(|k| after[k] / others - before[k] / own));
-    turn <= SAME_DIRECTION + rounding / own.min(others)
-}
-
-/// Whether two points are equal up to rounding.
-fn near<const M: usize>(a: &[f64; M], b: &[f64; M], rounding: f64) -> bool {
-    norm(&sub(a, b)) <= rounding
 }
 
 #[cfg(test)]

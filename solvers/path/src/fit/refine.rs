@@ -13,10 +13,10 @@
 
 use super::certificate::{Defect, Step, StepBound};
 use super::chain::{turn_cosine, Chain};
+use super::piece_builder::{line, FittedPiece, PieceBuilder};
 use super::spline::{interpolate, EndCondition};
-use super::FittedPiece;
 use crate::tolerance;
-use feedplan_geometry::quadratic::{norm, sub, Quadratic, Segment};
+use feedplan_geometry::quadratic::{norm, sub};
 
 /// From this round on, a step out of tolerance is halved as well.
 const HALVE: usize = 4;
@@ -409,52 +409,5 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
         let (step, to) = (&fitted(end - 1).0, self.steps[end - 1].to);
         pieces.push(builder.piece(step.end, step.tangent[2], to - 1, to));
-    }
-}
-
-/// The line from point `a` to point `b`, with its distance from the points between.
-fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize, spline: u32) -> FittedPiece<M> {
-    let points = chain.points;
-    let segment = Segment::new(&points[a], &points[b]);
-    let deviation =
-        points[a + 1..b].iter().fold(0.0_f64, |worst, p| worst.max(segment.distance_sq(p))).sqrt();
-    FittedPiece { piece: Quadratic::line(points[a], points[b]), first: a, last: b - 1, deviation, spline }
-}
-
-/// The place that the pieces of one spline have reached, and what is known of the next piece.
-struct PieceBuilder<const M: usize> {
-    point: [f64; M],
-    tangent: [f64; M],
-    /// The chord on which the next piece starts.
-    chord: usize,
-    spline: u32,
-    /// Since the last knot, as is the deviation in mm.
-    width: f64,
-    deviation: f64,
-}
-
-impl<const M: usize> PieceBuilder<M> {
-    /// Adds half a step to the next piece.
-    fn pass(&mut self, width: f64, deviation: f64) {
-        self.width += width;
-        self.deviation = self.deviation.max(deviation);
-    }
-
-    /// The piece that ends at `point`, on chord `last`; the next one starts on chord `next`.
-    fn piece(&mut self, point: [f64; M], tangent: [f64; M], last: usize, next: usize) -> FittedPiece<M> {
-        let quarter = 0.25 * self.width;
-        // The mean of both ends, so that a reversed chain gives the same piece.
-        let middle = std::array::from_fn(|k| {
-            0.5 * (self.point[k] + point[k]) + quarter * (self.tangent[k] - tangent[k])
-        });
-        let piece = FittedPiece {
-            piece: Quadratic { control: [self.point, middle, point], width: self.width },
-            first: self.chord,
-            last,
-            deviation: self.deviation,
-            spline: self.spline,
-        };
-        *self = Self { point, tangent, chord: next, spline: self.spline, width: 0.0, deviation: 0.0 };
-        piece
     }
 }

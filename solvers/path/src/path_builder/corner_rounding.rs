@@ -12,8 +12,8 @@
 
 use rayon::prelude::*;
 
+use super::built_path::Axes;
 use super::chunk::Chunk;
-use super::Axes;
 use crate::corner::{share_lengths, Rounding, Sides, TangentJump};
 use crate::path_piece::{PathPiece, Shape};
 use crate::tolerance;

@@ -15,9 +15,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::built_path::{Axes, BuiltPath, NotSmooth};
 use super::chords::{Chord, Chords};
 use super::chunk::Chunk;
-use super::{Axes, BuiltPath, NotSmooth};
 use crate::moves::{of_move, MoveError, Moves, PathOptions, RAPID};
 use crate::path_piece::{PathPiece, Shape};
 use crate::program_pieces::FitCounts;

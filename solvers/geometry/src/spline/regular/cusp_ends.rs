@@ -1,7 +1,7 @@
 //! Curved pieces cut in their cusps, so that C' is exactly 0 at both ends there.
 
 use super::lines::{form, Form};
-use super::{is_smooth, near, Regular};
+use super::pieces::{is_smooth, near, Regular};
 use crate::quadratic::{norm, sub};
 use crate::spline::bezier::split;
 use crate::spline::cusps::piece_cusps;

@@ -1,6 +1,6 @@
 //! The form of a piece, and straight pieces of any degree, or neighbours on one line, as lines from turn to turn.
 
-use super::{near, Regular};
+use super::pieces::{near, Regular};
 use crate::polynomial::Polynomial;
 use crate::quadratic::{dot, norm, sub};
 use crate::spline::bezier::point;
