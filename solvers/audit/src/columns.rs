@@ -79,6 +79,13 @@ impl<'a, const M: usize> Columns<'a, M> {
         Some(Together { curve: curve.clone(), joints, scale, bend })
     }
 
+    /// Looks at once at places, no more than eight, which will be asked for where that saves time: where the columns are joints.
+    pub fn look_ahead(&mut self, on: &Together<M>, places: &[f64], room: &mut [Lanes]) {
+        if let (Some(joints), Some(piece)) = (&mut self.joints, &on.joints) {
+            joints.look_ahead(piece, places, room);
+        }
+    }
+
     /// Room for what joints are made of at several places at once.
     pub fn room(&self) -> Vec<Lanes> {
         self.joints.as_ref().map_or(Vec::new(), |joints| joints.of.room([0.0; 8]))
@@ -177,6 +184,14 @@ impl<'a, const M: usize> Columns<'a, M> {
         let [slope, size] = [curve.derivative(u), curve.derivative_size()]
             .map(|of| length::<M>(&vector_of(|k| share[k] * of[k])));
         [slope, ROUNDINGS * EPS * size]
+    }
+
+    /// The same derivative at several places.
+    pub fn held_slopes<const K: usize>(&mut self, piece: usize, u: [f64; K], share: &[f64; M]) -> [f64; K] {
+        let curve = self.curves.get(piece);
+        let Some(joints) = &mut self.joints else { return curve.speeds(u, share) };
+        let on = joints.piece(piece, curve);
+        on.fed_axes().map_or_else(|| u.map(|u| on.feed_slope(u)), |counts| curve.speeds(u, &counts))
     }
 
     /// The greatest speeds of a piece.

@@ -137,6 +137,16 @@ impl<S: Simd> Number for f64x8<S> {
     }
 }
 
+/// How a vector is kept in memory.
+#[inline(always)]
+pub fn kept<const M: usize, T: Number>(a: [T; M]) -> [T::Kept; M] {
+    let mut kept = [a[0].kept(); M];
+    for k in 1..M {
+        kept[k] = a[k].kept();
+    }
+    kept
+}
+
 /// Inner product of two vectors of numbers.
 #[inline(always)]
 pub fn inner<const M: usize, T: Number>(a: &[T; M], b: &[T; M]) -> T {

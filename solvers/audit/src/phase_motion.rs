@@ -270,11 +270,9 @@ impl<const M: usize> PhaseMotion<M> {
             Law::Speed { .. } => {
                 let [near, far] = [a, b].map(|state| self.held(state.place.u));
                 let (u, way) = (a.place.u, b.place.u - a.place.u);
-                let mut slope = |y: f64| {
-                    let u = u + way * y * (2.0 * near + (far - near) * y) / (near + far);
-                    columns.held_slope(a.place.piece, u, &self.share)[0]
-                };
-                let whole = integral(&mut |y: [f64; 8]| y.map(&mut slope), 0.0, 1.0, &mut { MOST_HALVINGS });
+                let place = |y: f64| u + way * y * (2.0 * near + (far - near) * y) / (near + far);
+                let mut slopes = |y: [f64; 8]| columns.held_slopes(a.place.piece, y.map(place), &self.share);
+                let whole = integral(&mut slopes, 0.0, 1.0, &mut { MOST_HALVINGS });
                 [2.0 * step / (near + far) * whole, rounding]
             }
         }

@@ -9,6 +9,7 @@ use super::number::Lanes;
 use super::phases::SPEED_CUBIC;
 use super::profile_clock::ProfileClock;
 use super::station::Rounded;
+use super::together::Together;
 use super::vectors::{length, vector_of};
 use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
@@ -36,6 +37,8 @@ pub struct Reader<'a, const M: usize> {
     last: Option<(Place, Passage<M>)>,
     /// The places that come next, the last one first; the phase of each, and what the profile does there.
     ahead: Vec<(Place, usize, Passage<M>)>,
+    /// Places on phases of other kinds among them.
+    others: Vec<f64>,
     room: Vec<Lanes>,
 }
 
@@ -44,8 +47,17 @@ impl<'a, const M: usize> Reader<'a, M> {
     pub fn new(clock: &ProfileClock<'a>, mut columns: Columns<'a, M>) -> Self {
         let motion = (0, Motion::new(&clock.phases, 0, &mut columns));
         let room = columns.room();
-        let mut reader =
-            Self { clock: *clock, phase: 0, run: 0, columns, motion, last: None, ahead: vec![], room };
+        let mut reader = Self {
+            clock: *clock,
+            phase: 0,
+            run: 0,
+            columns,
+            motion,
+            last: None,
+            ahead: vec![],
+            others: vec![],
+            room,
+        };
         reader.enter(0);
         reader
     }
@@ -96,21 +108,22 @@ impl<'a, const M: usize> Reader<'a, M> {
     }
 
     /// Reads the profile at once at places of one piece, in their order, which it will be asked for.
-    pub fn look_ahead(&mut self, places: impl Iterator<Item = Place>) {
+    pub fn look_ahead(&mut self, on: &Together<M>, piece: usize, places: &[f64]) {
         self.ahead.clear();
+        self.others.clear();
         let (phases, mut phase) = (self.clock.phases, self.phase);
-        for place in places {
+        for &u in places {
+            let place = Place { piece, u };
             phase = self.phase_from(phase, place);
-            if phases.kind[phase] == SPEED_CUBIC && phases.piece[phase] as usize == place.piece {
-                self.ahead.push((place, phase, Passage::unknown(place.u)));
+            if phases.kind[phase] != SPEED_CUBIC {
+                self.others.push(u);
+            } else if phases.piece[phase] as usize == piece {
+                self.ahead.push((place, phase, Passage::unknown(u)));
             }
         }
-        let Some((place, ..)) = self.ahead.first() else { return };
-        match self.columns.together(place.piece) {
-            Some(on) => at_once::read(&on, &phases, &mut self.ahead, &mut self.room),
-            None => self.ahead.clear(),
-        }
+        at_once::read(on, &phases, &mut self.ahead, &mut self.room);
         self.ahead.reverse();
+        self.columns.look_ahead(on, &self.others, &mut self.room);
     }
 
     /// The phase that holds a place; as a rule this one or one of the next.

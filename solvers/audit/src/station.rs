@@ -7,7 +7,7 @@
 
 use super::curve::Curve;
 use super::joints::formula::Jet;
-use super::number::{inner, scaled, Number};
+use super::number::{inner, kept, scaled, Lanes, Number};
 use super::speed_by_length::Pace;
 use super::vectors::vector_of;
 use super::{EPS, ROUNDINGS};
@@ -23,18 +23,47 @@ pub struct Rounded<const M: usize, T = f64> {
 }
 
 /// A place of a piece: the columns and their slopes by u, each with a bound of its error; of positions beside the rounding of the
-/// greatest coordinate.
+/// greatest coordinate. Or several places.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<const M: usize> {
+pub struct Place<const M: usize, T = f64> {
     pub piece: usize,
-    pub u: f64,
+    pub u: T,
     /// The tool's place, in axes of the path.
-    pub tip: [f64; M],
-    pub position: Rounded<M>,
-    pub slope: Rounded<M>,
+    pub tip: [T; M],
+    pub position: Rounded<M, T>,
+    pub slope: Rounded<M, T>,
     /// Derivatives by u of the length of the path and of the way of the tool that the feed limits.
-    pub way_slope: f64,
-    pub tip_slope: f64,
+    pub way_slope: T,
+    pub tip_slope: T,
+}
+
+impl<const M: usize> Place<M, Lanes> {
+    /// One of them.
+    pub fn of_lane(&self, lane: usize) -> Place<M> {
+        Place {
+            piece: self.piece,
+            u: self.u[lane],
+            tip: self.tip.map(|of| of[lane]),
+            position: self.position.of_lane(lane),
+            slope: self.slope.of_lane(lane),
+            way_slope: self.way_slope[lane],
+            tip_slope: self.tip_slope[lane],
+        }
+    }
+}
+
+impl<const M: usize> Rounded<M, Lanes> {
+    /// One of them.
+    pub fn of_lane(&self, lane: usize) -> Rounded<M> {
+        Rounded { value: self.value.map(|of| of[lane]), rounding: self.rounding.map(|of| of[lane]) }
+    }
+}
+
+impl<const M: usize, T: Number> Rounded<M, T> {
+    #[inline(always)]
+    pub fn kept(self) -> Rounded<M, T::Kept> {
+        Rounded { value: kept(self.value), rounding: kept(self.rounding) }
+    }
 }
 
 /// A place, and what is known there whatever the speed; or several places.

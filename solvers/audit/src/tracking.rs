@@ -162,8 +162,10 @@ struct Finder<'a, const M: usize> {
     columns: Option<Columns<'a, M>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
-    /// Whether the profile has phases on which v² is a cubic of the length.
-    is_by_length: bool,
+    /// Whether places are guessed at once: on phases on which v² is a cubic of the length, of joints on all. On others the places of axes
+    /// follow each other so evenly that each leads to the next one.
+    guesses_cubics: bool,
+    guesses_all: bool,
     /// Guesses of the places of the next setpoints, the last one first, and the phase of the last one.
     guesses: Vec<Guess>,
     phase: usize,
@@ -181,14 +183,15 @@ struct Guess {
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let (mut profile, mut columns, new) = (None, None, plan.columns(limits));
-        let room = new.room();
+        let (room, guesses_all) = (new.room(), !new.are_axes());
         match &plan.profile {
             Some(clock) => profile = Some(Reader::new(clock, new)),
             None => columns = Some(new),
         }
-        let is_by_length = plan.profile.is_some_and(|clock| clock.phases.kind.contains(&SPEED_CUBIC));
+        let guesses_cubics = plan.profile.is_some_and(|clock| clock.phases.kind.contains(&SPEED_CUBIC));
         let reach = 2.0 * limits.period * length(&limits.velocity.greater());
-        Self { plan, limits, profile, columns, reach, is_by_length, guesses: vec![], phase: 0, room }
+        let guesses = vec![];
+        Self { plan, limits, profile, columns, reach, guesses_cubics, guesses_all, guesses, phase: 0, room }
     }
 
     fn columns(&mut self) -> &mut Columns<'a, M> {
@@ -281,18 +284,23 @@ impl<'a, const M: usize> Finder<'a, M> {
     /// guessed of one does not depend on the others.
     fn guess_at_once(&mut self, rows: &[Row<M>]) {
         self.guesses.clear();
-        let Some(clock) = self.plan.profile.as_ref().filter(|_| self.is_by_length) else { return };
+        let guesses = self.guesses_cubics || self.guesses_all;
+        let Some(clock) = self.plan.profile.as_ref().filter(|_| guesses) else { return };
         let (mut starts, mut q) = ([0.0; at_once::COUNT], [[0.0; at_once::COUNT]; M]);
         let (mut first, mut count) = (None, 0);
         for row in rows.iter().take(at_once::COUNT).take_while(|row| Self::is_finite(row)) {
             let Some(phase) = clock.phase_from(self.phase, row.t) else { break };
             self.phase = phase;
-            // On other phases the places follow each other more evenly, and the profile is not read at once.
             let piece = clock.phases.piece[phase] as usize;
-            if clock.phases.kind[phase] != SPEED_CUBIC || *first.get_or_insert(piece) != piece {
+            let is_guessed = self.guesses_all || clock.phases.kind[phase] == SPEED_CUBIC;
+            if !is_guessed || *first.get_or_insert(piece) != piece {
                 break;
             }
             starts[count] = clock.place_about(phase, row.t).u;
+            // The start of a piece is also the end of the one before.
+            if starts[count] <= 0.0 {
+                break;
+            }
             for k in 0..M {
                 q[k][count] = row.q[k];
             }
@@ -307,10 +315,12 @@ impl<'a, const M: usize> Finder<'a, M> {
             distance: found.distance[i],
             slope: found.slope[i],
         }));
-        let (guesses, width) = (&self.guesses, self.plan.path.width[piece]);
         if let Some(profile) = &mut self.profile {
-            let places = guesses.iter().rev().map(|guess| guess.place);
-            profile.look_ahead(places.filter(|place| 0.0 <= place.u && place.u <= width));
+            let (mut places, mut known, width) = ([0.0; at_once::COUNT], 0, self.plan.path.width[piece]);
+            for &u in found.u[..count].iter().filter(|u| (0.0..=width).contains(*u)) {
+                (places[known], known) = (u, known + 1);
+            }
+            profile.look_ahead(&on, piece, &places[..known]);
         }
     }
 

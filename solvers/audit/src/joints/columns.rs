@@ -4,6 +4,7 @@ use std::rc::Rc;
 
 use super::path::{JointPath, Piece};
 use crate::curve::{Curve, Curves};
+use crate::number::Lanes;
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{length, vector_of};
 
@@ -19,12 +20,22 @@ pub struct JointColumns<'a, const M: usize> {
     /// The last place, the last station with its piece, and the last two whose rounding is known, the last one first.
     last: Option<Place<M>>,
     known: Option<(usize, Station<M>)>,
+    /// Places that come next.
+    ahead: Vec<Place<M>>,
     rounded: [Option<(usize, Station<M>, Roundings<M>)>; 2],
 }
 
 impl<'a, const M: usize> JointColumns<'a, M> {
     pub fn new(of: &'a JointPath<'a>) -> Self {
-        Self { of, room: of.room(0.0), pieces: [None, None], last: None, known: None, rounded: [None, None] }
+        Self {
+            of,
+            room: of.room(0.0),
+            pieces: [None, None],
+            last: None,
+            known: None,
+            ahead: vec![],
+            rounded: [None, None],
+        }
     }
 
     /// A piece of the path, on its curve.
@@ -40,10 +51,19 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     }
 
     pub fn place(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
-        let last = self.last.filter(|place| place.piece == piece && place.u == u);
-        let place = last.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.room));
+        let is_here = |place: &&Place<M>| place.piece == piece && place.u == u;
+        let known = self.last.iter().find(is_here).or_else(|| self.ahead.iter().find(is_here)).copied();
+        let place = known.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.room));
         self.last = Some(place);
         place
+    }
+
+    /// Looks at some places of a piece without weights at once, no more than eight, which will be asked for.
+    pub fn look_ahead(&mut self, on: &Piece<M>, places: &[f64], room: &mut [Lanes]) {
+        let Some(last) = places.len().checked_sub(1) else { return };
+        let found = on.places(&std::array::from_fn(|lane| places[lane.min(last)]), room);
+        self.ahead.clear();
+        self.ahead.extend((0..places.len()).map(|lane| found.of_lane(lane)));
     }
 
     pub fn station(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Station<M> {

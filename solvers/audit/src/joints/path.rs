@@ -6,7 +6,7 @@ use fearless_simd::{dispatch, f64x8, Level, SimdBase};
 
 use super::formula::{Argument, Formula, Jet, JET};
 use crate::curve::{Curve, Followed};
-use crate::number::{inner, Lanes, Number};
+use crate::number::{inner, kept, Lanes, Number};
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{curvature, length, times, vector_of};
 use crate::{EPS, ROUNDINGS};
@@ -317,11 +317,7 @@ impl<const M: usize> Piece<'_, M> {
             tip = self.curve.polynomial_point(u);
         }
         self.fill(room, &[tip], &[]);
-        let (found, mut positions) = (self.joint_rows::<1, 0, T>(room, 0, u).value, [[0.0; 8]; M]);
-        for k in 0..M {
-            positions[k] = found[k].kept();
-        }
-        positions
+        kept(self.joint_rows::<1, 0, T>(room, 0, u).value)
     }
 
     /// Positions and slopes of the joints where those of the tip are at hand.
@@ -334,17 +330,47 @@ impl<const M: usize> Piece<'_, M> {
 
     /// The place at u.
     pub fn place(&self, u: f64, room: &mut [f64]) -> Place<M> {
-        let (tip, slope) = (self.curve.at(u), self.curve.derivative(u));
-        self.fill(room, &[tip, slope], &[self.sizes[0], self.sizes[1]]);
-        let joints = [0, 1].map(|order| self.joint_rows::<2, 2, f64>(room, order, u));
-        self.place_of(u, tip, slope, joints)
+        self.place_by(u, &[self.curve.at(u), self.curve.derivative(u)], room)
     }
 
-    fn place_of(&self, u: f64, tip: [f64; M], tip_slope: [f64; M], joints: [Rounded<M>; 2]) -> Place<M> {
-        let [position, slope] = joints;
-        let (way_slope, feed_slope) =
-            (length(&times(&self.way_scale, &tip_slope)), self.feed_slope_of(&tip, &tip_slope));
-        Place { piece: self.number, u, tip, position, slope, way_slope, tip_slope: feed_slope }
+    /// The places at each u of a piece without weights.
+    pub fn places(&self, u: &Lanes, room: &mut [Lanes]) -> Place<M, Lanes> {
+        dispatch!(Level::new(), simd => self.look_at_places(f64x8::from_slice(simd, u), room))
+    }
+
+    #[inline(always)]
+    fn look_at_places<T: Argument<Kept = Lanes>>(&self, u: T, room: &mut [Lanes]) -> Place<M, Lanes> {
+        let Place { piece, u, tip, position, slope, way_slope, tip_slope } =
+            self.place_by(u, &self.curve.polynomial_place(u), room);
+        Place {
+            piece,
+            u: u.kept(),
+            tip: kept(tip),
+            position: position.kept(),
+            slope: slope.kept(),
+            way_slope: way_slope.kept(),
+            tip_slope: tip_slope.kept(),
+        }
+    }
+
+    /// The place, where the tip and its slope are at hand.
+    #[inline(always)]
+    fn place_by<T: Argument>(&self, u: T, tip: &[[T; M]; 2], room: &mut [T::Kept]) -> Place<M, T> {
+        self.fill(room, tip, &[self.sizes[0], self.sizes[1]]);
+        let joints = [self.joint_rows::<2, 2, T>(room, 0, u), self.joint_rows::<2, 2, T>(room, 1, u)];
+        self.place_of(u, tip, joints)
+    }
+
+    #[inline(always)]
+    fn place_of<T: Argument>(
+        &self,
+        u: T,
+        [tip, tip_slope]: &[[T; M]; 2],
+        joints: [Rounded<M, T>; 2],
+    ) -> Place<M, T> {
+        let ([position, slope], way) = (joints, counted(tip_slope, &self.way_scale));
+        let (way_slope, feed_slope) = (inner(&way, &way).root(), self.feed_slope_of(tip, tip_slope));
+        Place { piece: self.number, u, tip: *tip, position, slope, way_slope, tip_slope: feed_slope }
     }
 
     /// The first three derivatives of the joints by the length of the way at u, where the tip and its own derivatives are at hand.
@@ -360,7 +386,7 @@ impl<const M: usize> Piece<'_, M> {
         let bends = self.bends::<4, 3, f64>(room, &tip, &self.sizes);
         let ([position, q1, ..], _) = &bends;
         (
-            self.place_of(u, tip[0], slope, [*position, *q1]),
+            self.place_of(u, &[tip[0], slope], [*position, *q1]),
             self.station_of(u, &tip, &bends),
             Roundings::of_joints(&bends.0, &bends.1),
         )
@@ -453,5 +479,39 @@ impl<const M: usize> Piece<'_, M> {
     /// The greatest coordinate of the first control point.
     pub fn start_size(&self) -> f64 {
         self.start_size
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Pieces;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn places_that_are_looked_at_at_once_have_the_same_numbers_as_alone(
+            bends in prop::array::uniform6(-1.0..1.0_f64),
+            shares in prop::array::uniform8(0.0..1.0_f64),
+            is_rational: bool,
+        ) {
+            let control: Vec<f64> = (0..6).flat_map(|i| [-2.5 + f64::from(i), 2.0 + bends[i as usize]]).collect();
+            let weights: &[f64] = if is_rational { &[1.0, 2.0, 1.5, 1.0, 0.7, 1.0] } else { &[] };
+            let pieces = Pieces { axes: 2, stride: 2, control: &control, weights, offsets: &[0, 6], width: &[5.0] };
+            let words = Words::polar();
+            let joints = JointPath::of_one(Followed::of_one(pieces), &words, &[1.0]);
+            let (piece, u) = (joints.piece::<2>(0), shares.map(|share| 5.0 * share));
+            let (mut room, mut lanes) = (joints.room(0.0), joints.room([0.0; 8]));
+            let positions = piece.at_each(&u, &mut lanes);
+            let places = (!is_rational).then(|| piece.places(&u, &mut lanes));
+            for (lane, &u) in u.iter().enumerate() {
+                let alone = piece.place(u, &mut room);
+                prop_assert_eq!(positions.map(|position| position[lane]), alone.position.value);
+                if let Some(places) = &places {
+                    // All digits, of numbers and of the bounds of their errors.
+                    prop_assert_eq!(format!("{:?}", places.of_lane(lane)), format!("{alone:?}"));
+                }
+            }
+        }
     }
 }

@@ -52,15 +52,11 @@ pub fn read<const M: usize>(
             let since = found.since[lane];
             passage.since = since;
             passage.doubt = ROUNDING * since.abs();
-            passage.velocity = of_lane(&found.velocity, lane);
-            passage.acceleration = Some(of_lane(&found.acceleration, lane));
+            passage.velocity = found.velocity.of_lane(lane);
+            passage.acceleration = Some(found.acceleration.of_lane(lane));
         }
     }
     places.retain(|(.., passage)| !passage.since.is_nan());
-}
-
-fn of_lane<const M: usize>(of: &Rounded<M, Lanes>, lane: usize) -> Rounded<M> {
-    Rounded { value: of.value.map(|lanes| lanes[lane]), rounding: of.rounding.map(|lanes| lanes[lane]) }
 }
 
 #[inline(always)]
@@ -124,18 +120,9 @@ fn look<const M: usize, S: Simd>(
     let since = is_back.select(duration - time, time);
     Found {
         since: is_known.select(since, f64x8::splat(simd, f64::NAN)).into(),
-        velocity: Rounded { value: to_lanes(velocity), rounding: to_lanes(unsure) },
-        acceleration: Rounded { value: to_lanes(acceleration), rounding: to_lanes(unsure_acceleration) },
+        velocity: Rounded { value: velocity, rounding: unsure }.kept(),
+        acceleration: Rounded { value: acceleration, rounding: unsure_acceleration }.kept(),
     }
-}
-
-#[inline(always)]
-fn to_lanes<const M: usize, S: Simd>(of: [f64x8<S>; M]) -> [Lanes; M] {
-    let mut lanes = [[0.0; PLACES]; M];
-    for k in 0..M {
-        lanes[k] = of[k].into();
-    }
-    lanes
 }
 
 #[cfg(test)]
