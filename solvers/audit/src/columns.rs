@@ -188,8 +188,10 @@ impl<'a, const M: usize> Columns<'a, M> {
 
     /// The same derivative at several places.
     pub fn held_slopes<const K: usize>(&mut self, piece: usize, u: [f64; K], share: &[f64; M]) -> [f64; K] {
-        let curve = self.curves.get(piece);
-        let Some(joints) = &mut self.joints else { return curve.speeds(u, share) };
+        let (curve, Some(joints)) = (self.curves.get(piece), &mut self.joints) else {
+            // Mostly lines, whose derivative takes no longer alone.
+            return u.map(|u| self.held_slope(piece, u, share)[0]);
+        };
         let on = joints.piece(piece, curve);
         on.fed_axes().map_or_else(|| u.map(|u| on.feed_slope(u)), |counts| curve.speeds(u, &counts))
     }

@@ -321,14 +321,16 @@ impl<const M: usize> Places<'_, '_, M> {
         // Whatever they are before: nothing would be written by a call.
         let (mut derivatives, mut slope) = ([[[width; M]; 3]; PLACES], [width; PLACES]);
         let (curve, mut tool) = (&self.on.curve, [[width; 2]; PLACES]);
-        for i in 0..PLACES {
-            let u = from + width * SHARES[i];
-            if let Some(joints) = &self.on.joints {
+        if let Some(joints) = &self.on.joints {
+            for i in 0..PLACES {
+                let u = from + width * SHARES[i];
                 let station = joints.station(u, &curve.polynomial_jet(u), room);
                 derivatives[i] = [station.first, station.second, station.third];
                 (slope[i], tool[i]) = (station.slope, [station.tip, station.curvature]);
-            } else {
-                derivatives[i] = curve.polynomial_derivatives(u);
+            }
+        } else {
+            for i in 0..PLACES {
+                derivatives[i] = curve.polynomial_derivatives(from + width * SHARES[i]);
                 slope[i] = inner(&derivatives[i][0], &derivatives[i][0]).sqrt();
             }
         }
