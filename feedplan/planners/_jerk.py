@@ -1,4 +1,4 @@
-"""Limits of jerk for the planners that keep them."""
+"""The limits of jerk of a problem, lowered where the interpolants of joints miss the joints' jerk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-//! When a speed profile is on which phase, on the clock of the setpoints.
+//! Finds the phase of a speed profile that a time of the setpoints falls into.
 //!
 //! The clock starts every run anew: setpoints may wait at a stop for their next period.
 
