@@ -207,6 +207,15 @@ def test_changed_setpoints_are_refused_in_one_sentence(
     assert_one_sentence(capsys.readouterr().err, words)
 
 
+def test_a_period_of_nothing_in_plan_json_is_refused(folder: Any, capsys: Any) -> None:
+    file = folder("bang-bang") / "plan.json"
+    summary = json.loads(file.read_text(encoding="utf-8"))
+    summary["setpoints"]["period"] = 0
+    file.write_text(json.dumps(summary), encoding="utf-8")
+    assert main(["check", str(file.parent)]) == 2
+    assert_one_sentence(capsys.readouterr().err, "period")
+
+
 def test_a_column_of_jerk_is_judged_where_the_method_limits_it(folder: Any, capsys: Any) -> None:
     out = folder("jerk-limited")
     change_setpoints(out, no_jerk)
