@@ -17,6 +17,7 @@ from feedplan.errors import InputError
 from feedplan.machine.axis import Axis
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
+from feedplan.planning import plan
 from feedplan.setpoints import SetpointChunk, Setpoints
 from tests.along import path_along
 from tests.audit.faults import broken, changed
@@ -386,3 +387,12 @@ def test_what_rotary_axes_do_is_told_in_degrees() -> None:
     assert result.check("velocity", "A").unit == "deg/s"
     assert result.check("velocity", "X").unit == "mm/s"
     assert "A velocity 50 deg/s, the limit is 40 deg/s" in result.failures[0]
+
+
+@pytest.mark.parametrize("method", ["jerk-limited", "s-curve", "ruckig"])
+def test_a_setpoint_beside_a_stop_where_the_path_turns_back_may_be_on_either_side(method: str) -> None:
+    # Within a nanometre of the stop the tool is for several periods, with accelerations that differ.
+    axes = [Axis(name, 0.018, 0.167, max_jerk=6.1) for name in "XYZ"]
+    there_and_back = "G21 G90\nG1 Y0.01 Z0.01 F0.46\nZ0\nZ-0.01\nM2\n"
+    made = plan(there_and_back, Machine("small", axes, period=0.001), method, tolerance=3.6e-5)
+    assert made.audit().ok, made.audit().failures

@@ -211,7 +211,7 @@ impl<'a, const M: usize> Reader<'a, M> {
     /// At most the way along the path between a place and the profile's own place at `time`, in mm, on the piece of the
     /// place or one beside it.
     fn way_from(&mut self, place: Place, time: f64) -> Option<f64> {
-        let (_, here, phase) = self.motion_at(time)?;
+        let (_, here, phase) = self.motion_at(self.run, time)?;
         let there = Place { piece: self.clock.phases.piece[phase] as usize, u: here.u };
         let (first, last) =
             if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
@@ -226,9 +226,9 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
     }
 
-    /// The motion on the phase that `time` falls into, in the reader's run, where on it the profile is then, and the phase.
-    fn motion_at(&mut self, time: f64) -> Option<(Motion<M>, Passage<M>, usize)> {
-        let (phase, since) = self.clock.phase_of(self.run, time)?;
+    /// The motion on the phase of a run that `time` falls into, where on it the profile is then, and the phase.
+    fn motion_at(&mut self, run: usize, time: f64) -> Option<(Motion<M>, Passage<M>, usize)> {
+        let (phase, since) = self.clock.phase_of(run, time)?;
         let (duration, ends) = (self.clock.phases.duration[phase], self.ends(phase));
         // Of a profile of rubbish nothing is known.
         if !(0.0 <= since && since <= duration && ends[0] < ends[1]) {
@@ -240,15 +240,15 @@ impl<'a, const M: usize> Reader<'a, M> {
         Some((motion, here, phase))
     }
 
-    /// The acceleration of each axis at `time`, in the reader's run: where the tool creeps back from a turn, the place of
-    /// a setpoint does not tell the ways to and from it apart.
-    fn acceleration_at(&mut self, time: f64) -> Option<[f64; M]> {
-        let (motion, here, _) = self.motion_at(time)?;
+    /// The acceleration of each axis at `time` in a run.
+    fn acceleration_at(&mut self, run: usize, time: f64) -> Option<[f64; M]> {
+        let (motion, here, _) = self.motion_at(run, time)?;
         Some(motion.acceleration(&here, &mut self.columns).value)
     }
 
     /// How far recorded accelerations are from those of the profile, at a place of the reader's phase or, where they are not
-    /// those, at the time.
+    /// those, at the time: where the tool creeps back from a turn, the place of a setpoint does not tell the ways to and from
+    /// it apart, which are in two runs if the tool stops there.
     pub fn acceleration_off(
         &mut self,
         here: &Passage<M>,
@@ -259,10 +259,15 @@ impl<'a, const M: usize> Reader<'a, M> {
         let range = self.accelerations(here, time, limits.period);
         let off: [f64; M] = vector_of(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));
         let is_off = (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration.least(k));
-        match if is_off { self.acceleration_at(time) } else { None } {
-            Some(then) => vector_of(|k| off[k].min((recorded[k] - then[k]).abs())),
-            None => off,
+        if !is_off {
+            return off;
         }
+        [self.run, self.clock.run_of(time)].into_iter().fold(off, |off, run| {
+            match self.acceleration_at(run, time) {
+                Some(then) => vector_of(|k| off[k].min((recorded[k] - then[k]).abs())),
+                None => off,
+            }
+        })
     }
 
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's phase.
