@@ -31,9 +31,9 @@ from feedplan.planners._jerk import jerk_limits
 
 Array = NDArray[np.float64]
 VELOCITY, ACCELERATION, JERK = 250.0, 3000.0, 50_000.0
-# Stations of copp, about uniform in length. Programs follow each other until one gains less than GAIN of the
-# time.
-STATIONS, GAIN, MOST_PROGRAMS = 4001, 1e-4, 10
+# Stations of copp, about uniform in length; with 4001 its second program for the butterfly fails. Programs
+# follow each other until one gains less than GAIN of the time.
+STATIONS, GAIN, MOST_PROGRAMS = 4201, 1e-4, 10
 PERIOD = 1e-3
 # That of a plan where nothing is said.
 ACCURACY = 1e-4
