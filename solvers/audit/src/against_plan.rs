@@ -28,7 +28,7 @@ pub struct Comparison<'a, const M: usize> {
     /// The programmed moves near `piece`.
     near: Neighbours<'a, M>,
     piece: Option<usize>,
-    /// Of joints, at the rows that are looked at at once.
+    /// The tool at the rows that are examined together, where the columns are joints.
     tool: Tool<M>,
 }
 

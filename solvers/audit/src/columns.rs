@@ -65,7 +65,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         self.curves.get(piece)
     }
 
-    /// The columns at several places at once of a piece that has no weights.
+    /// What computes the columns at several places of a piece at once; None for a piece with weights.
     pub fn together(&mut self, piece: usize) -> Option<Together<'a, M>> {
         let bend = self.bend(piece);
         let curve = self.curves.get(piece);
@@ -79,14 +79,14 @@ impl<'a, const M: usize> Columns<'a, M> {
         Some(Together { curve: curve.clone(), joints, scale, bend })
     }
 
-    /// Looks at once at places, no more than eight, which will be asked for where that saves time: where the columns are joints.
+    /// Computes up to eight places at once for later calls. Only joints are computed so: for axes it would save no time.
     pub fn look_ahead(&mut self, on: &Together<M>, places: &[f64], room: &mut [Lanes]) {
         if let (Some(joints), Some(piece)) = (&mut self.joints, &on.joints) {
             joints.look_ahead(piece, places, room);
         }
     }
 
-    /// Room for what joints are made of at several places at once.
+    /// Memory for the results of the joints' formula at several places at once.
     pub fn room(&self) -> Vec<Lanes> {
         self.joints.as_ref().map_or(Vec::new(), |joints| joints.of.room([0.0; 8]))
     }

@@ -298,7 +298,13 @@ impl<const M: usize> Curve<M> {
         by_width(self.hodographs.rates(t, rest), self.per_width)
     }
 
-    /// The same of a piece without weights, at one u or at several.
+    /// C and its first three derivatives at u.
+    pub fn jet(&self, u: f64) -> [[f64; M]; 4] {
+        let [first, second, third] = self.derivatives(u);
+        [self.at(u), first, second, third]
+    }
+
+    /// The first three derivatives on a piece without weights, at one u or at several.
     #[inline(always)]
     pub fn polynomial_derivatives<T: Number>(&self, u: T) -> [[T; M]; 3] {
         let (t, rest) = self.parts(u);

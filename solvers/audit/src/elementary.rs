@@ -1,7 +1,8 @@
-//! Sine, cosine and the angle of a vector, with the same bits alone and eight at once.
+//! Computes sine, cosine and the angle of a vector, for one number or for eight at once, with the same bits.
 //!
-//! Of sine and cosine whole quarter turns are taken off by parts of π/2 whose products with their number are exact (Cody and Waite 1980); the polynomials
-//! of what is left are those of fdlibm (Sun Microsystems 1993), off by less than a rounding.
+//! For sine and cosine the nearest whole number of quarter turns is subtracted from the angle. π/2 is split into parts, so that the
+//! product of each part with that number is exact (Cody and Waite 1980). Polynomials then give sine and cosine of the remainder
+//! (fdlibm, Sun Microsystems 1993), with an error below one rounding.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -57,10 +58,10 @@ impl<S: Simd> Elementary for f64x8<S> {
     }
 }
 
-/// Greatest angle in radians whose number of quarter turns is taken off exactly.
+/// The greatest angle [rad] from which quarter turns are subtracted exactly.
 const MOST: f64 = 524_288.0;
 
-/// π/2 in parts of 33 bits, and what is left of it.
+/// π/2 as a sum: three parts of 33 bits, and the remainder.
 const QUARTER: [f64; 4] = [
     1.570_796_326_734_125_6,
     6.077_100_506_303_966e-11,
@@ -92,7 +93,7 @@ const C: [f64; 6] = [
 #[inline(always)]
 fn wave<T: Number>(angle: T) -> [T; 2] {
     let turns = (angle * FRAC_2_PI).rounded();
-    // What is left, as a sum of two numbers.
+    // The remainder, as a sum of two numbers.
     let near = angle - turns * QUARTER[0];
     let taken = turns * QUARTER[1];
     let [rest, lost] = sum(near, taken * -1.0);
@@ -112,7 +113,7 @@ fn wave<T: Number>(angle: T) -> [T; 2] {
     [even * sine + odd * cosine, even * cosine - odd * sine]
 }
 
-/// The sum of two numbers, and what was rounded off it.
+/// The rounded sum of two numbers, and its rounding error.
 #[inline(always)]
 fn sum<T: Number>(a: T, b: T) -> [T; 2] {
     let sum = a + b;

@@ -1,13 +1,15 @@
 //! The independent audit: samples what a plan claims and measures every limit by differences of its own.
 //!
-//! Nothing here comes from a planner, a fit or a sampler: positions are evaluated from the control points, times
-//! follow from the law of each phase or are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
-//! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
+//! Nothing here comes from a planner, a fit or a sampler: positions are evaluated from the control points, times follow from
+//! the law of each phase or are integrated numerically, accelerations are difference quotients. By the mean value theorem a
+//! quotient exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 //!
-//! The path: `vectors`, `number`, `elementary`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`, `moves`, `neighbours`, `close_places`, `deviation`. What is
-//! limited along the path: `station`, `columns` (its axes), `joints` (joints, with a kinematics), `together` (at several places at once). The profile: `phases`, `phase_order`, `quadrature`,
-//! `phase_motion`, `speed_by_length`, `bulge`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`, `profile`. Setpoints: `rows`, `differences`,
-//! `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`, `against_plan`. Loops: `parallel`. Other crates call `kernels`.
+//! The path: `vectors`, `number`, `elementary`, `polygon`, `hodographs`, `curve`, `nearest`; the program: `arc_slope`,
+//! `moves`, `neighbours`, `close_places`, `deviation`. What is limited along the path: `station`, `columns` (its axes),
+//! `joints` (joints, with a kinematics), `together` (at several places at once). The profile: `phases`, `phase_order`,
+//! `quadrature`, `phase_motion`, `speed_by_length`, `bulge`, `phase_by_length`, `motion`, `phase_jerk`, `peak`, `chord`,
+//! `profile`. Setpoints: `rows`, `differences`, `setpoints`; with their plan `tracking`, `profile_clock`, `profile_reader`,
+//! `against_plan`. Loops: `parallel`. Other crates call `kernels`.
 
 mod against_plan;
 mod arc_slope;

@@ -17,12 +17,12 @@ pub trait Number:
     + Mul<f64, Output = Self>
     + Div<Output = Self>
 {
-    /// How it is kept in memory.
+    /// Its form in memory.
     type Kept: Copy;
     fn kept(self) -> Self::Kept;
-    /// What is kept, where `self` has its places.
+    /// The number that is kept. In this and the next function `self` tells only how many places it has.
     fn taken(self, kept: &Self::Kept) -> Self;
-    /// The same number in all places, where `self` has its places.
+    /// The value in all places.
     fn filled(self, value: f64) -> Self;
     fn smaller(self, other: Self) -> Self;
     fn greater(self, other: Self) -> Self;
@@ -30,7 +30,7 @@ pub trait Number:
     fn root(self) -> Self;
     /// The nearest integer.
     fn rounded(self) -> Self;
-    /// `other` where `of` is not finite.
+    /// The number itself where `of` is finite, else `other`.
     fn where_finite(self, of: Self, other: f64) -> Self;
 }
 

@@ -1,6 +1,8 @@
-//! The columns of a path at eight places of a piece at once, in the vectors of the processor: its axes, or joints by their formula.
+//! Computes the columns of a path, its axes or joints by their formula, at eight places of a piece at once, in the vectors of the
+//! processor.
 //!
-//! The numbers are those of one place after the other, bit for bit. Pieces with weights are not looked at so.
+//! The results equal those that are computed at one place after the other, bit for bit. Rational pieces are computed at one place after
+//! the other only.
 
 use std::rc::Rc;
 
@@ -10,18 +12,18 @@ use crate::joints::path::Piece;
 use crate::number::{Lanes, Number};
 use crate::station::{Roundings, Station, STILL};
 
-/// What is at some places of a piece; `room` has the results of a formula.
+/// A piece without weights, with what its columns are computed from. `room` of its functions is memory for the results of a formula.
 pub struct Together<'a, const M: usize> {
     pub curve: Rc<Curve<M>>,
     pub joints: Option<Rc<Piece<'a, M>>>,
-    /// What the axes count in the length of the path, where that is not 1.
+    /// The factor of each axis in the length of the path; None if all are 1.
     pub scale: Option<[f64; M]>,
-    /// The greatest second derivative of the columns by u, of joints about; infinite where it is not known.
+    /// A bound on the second derivative of the columns by u, for joints an estimate; infinite if it is not known.
     pub bend: f64,
 }
 
 impl<const M: usize> Together<'_, M> {
-    /// The ways to `q`, and the slopes.
+    /// The differences from the columns at u to `q`, and the slopes of the columns.
     #[inline(always)]
     pub fn toward<T: Argument<Kept = Lanes>>(&self, u: T, q: &[T; M], room: &mut [Lanes]) -> [[T; M]; 2] {
         let tip = self.curve.polynomial_place(u);
@@ -43,7 +45,7 @@ impl<const M: usize> Together<'_, M> {
         self.curve.polynomial_speed(u, self.scale.as_ref())
     }
 
-    /// Where the derivative of the length is not greater the piece has no direction; joints have rates everywhere.
+    /// The piece has no direction where the derivative of its length is at most this. The derivatives of joints are known everywhere.
     pub fn still(&self) -> f64 {
         match self.joints {
             Some(_) => f64::NEG_INFINITY,
@@ -51,7 +53,7 @@ impl<const M: usize> Together<'_, M> {
         }
     }
 
-    /// The stations, whether or not the piece has a direction there, and what of them may be rounding.
+    /// The stations, also where the piece has no direction, and bounds of their rounding errors.
     #[inline(always)]
     pub fn rounded_station<T: Argument<Kept = Lanes>>(
         &self,

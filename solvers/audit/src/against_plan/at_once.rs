@@ -13,8 +13,8 @@ use crate::setpoints::at_once::{fill, judge, ALL, BEFORE, COUNT};
 use crate::tracking::Plan;
 use crate::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
-/// The tool of joints at some rows: in the axes whose motion the feed limits on the piece of each, and that feed; it is not a number
-/// where the feed limits a turn.
+/// The tool at some rows, where the columns are joints: its position in the axes whose motion the feed limits there, and that feed, not a
+/// number where the feed limits a turn.
 #[derive(Default)]
 pub struct Tool<const M: usize> {
     pub tip: Vec<[f64; M]>,

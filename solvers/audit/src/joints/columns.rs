@@ -8,8 +8,8 @@ use crate::number::Lanes;
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{length, vector_of};
 
-/// How many times greater a second derivative by u may be than that by the length at another place of the piece: so close that
-/// a place is not found but for a hundredth of what is allowed it would have to be ten times more.
+/// The second derivative of joints by u is estimated as this many times that at the last station of the piece. Newton's method stops at
+/// a thousandth of the error that is allowed for a place: were the derivative ten times the estimate, the error would be a hundredth.
 const BEND_GROWS: f64 = 4.0;
 
 pub struct JointColumns<'a, const M: usize> {
@@ -20,7 +20,7 @@ pub struct JointColumns<'a, const M: usize> {
     /// The last place, the last station with its piece, and the last two whose rounding is known, the last one first.
     last: Option<Place<M>>,
     known: Option<(usize, Station<M>)>,
-    /// Places that come next.
+    /// Places ahead that have been computed at once.
     ahead: Vec<Place<M>>,
     rounded: [Option<(usize, Station<M>, Roundings<M>)>; 2],
 }
@@ -58,7 +58,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         place
     }
 
-    /// Looks at some places of a piece without weights at once, no more than eight, which will be asked for.
+    /// Computes up to eight places of a piece without weights at once, for later calls of `place`.
     pub fn look_ahead(&mut self, on: &Piece<M>, places: &[f64], room: &mut [Lanes]) {
         let Some(last) = places.len().checked_sub(1) else { return };
         let found = on.places(&std::array::from_fn(|lane| places[lane.min(last)]), room);
@@ -67,9 +67,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
     }
 
     pub fn station(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Station<M> {
-        let [slope, second, third] = curve.derivatives(u);
-        let station =
-            self.piece(piece, curve).station(u, &[curve.at(u), slope, second, third], &mut self.room);
+        let station = self.piece(piece, curve).station(u, &curve.jet(u), &mut self.room);
         self.known = Some((piece, station));
         station
     }

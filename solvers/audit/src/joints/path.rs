@@ -62,7 +62,7 @@ pub struct Piece<'a, const M: usize> {
     way_scale: [f64; M],
     xyz: [f64; M],
     ijk: [usize; 3],
-    /// What the rounding of the tip's coordinates and of their first three derivatives is relative to.
+    /// The magnitudes to which the roundings of the tip's coordinates and of their first three derivatives are relative.
     sizes: [[f64; M]; 4],
     start_size: f64,
 }
@@ -154,7 +154,7 @@ fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The vector by axis times what the axes count.
+/// The vector with each axis multiplied by its factor.
 #[inline(always)]
 fn counted<const M: usize, T: Number>(of: &[T; M], counts: &[f64; M]) -> [T; M] {
     let mut counted = *of;
@@ -235,8 +235,7 @@ impl<const M: usize> Piece<'_, M> {
         across.atan2((0..3).map(|k| first[k] * last[k]).sum()).to_degrees()
     }
 
-    /// Fills the table of results from the first derivatives of the tip, the position being the first one of them, which are rounded
-    /// by sizes like these.
+    /// Fills the table of results from the position of the tip and its first derivatives; their roundings are relative to `sizes`.
     #[inline(always)]
     fn fill<const N: usize, const E: usize, T: Argument>(
         &self,
@@ -300,7 +299,7 @@ impl<const M: usize> Piece<'_, M> {
         dispatch!(Level::new(), simd => self.look_at_each(f64x8::from_slice(simd, u), &tips, room))
     }
 
-    /// The same, the places of the tip being at hand on pieces with weights.
+    /// The same; on pieces with weights the positions of the tip are given.
     #[inline(always)]
     fn look_at_each<T: Argument<Kept = Lanes>>(
         &self,
@@ -320,7 +319,7 @@ impl<const M: usize> Piece<'_, M> {
         kept(self.joint_rows::<1, 0, T>(room, 0, u).value)
     }
 
-    /// Positions and slopes of the joints where those of the tip are at hand.
+    /// Positions and slopes of the joints, from those of the tip.
     #[inline(always)]
     pub fn position_and_slope<T: Argument>(&self, tip: &[[T; M]; 2], room: &mut [T::Kept]) -> [[T; M]; 2] {
         self.fill(room, tip, &[]);
@@ -353,7 +352,7 @@ impl<const M: usize> Piece<'_, M> {
         }
     }
 
-    /// The place, where the tip and its slope are at hand.
+    /// The place, from the position and the slope of the tip.
     #[inline(always)]
     fn place_by<T: Argument>(&self, u: T, tip: &[[T; M]; 2], room: &mut [T::Kept]) -> Place<M, T> {
         self.fill(room, tip, &[self.sizes[0], self.sizes[1]]);
@@ -373,7 +372,7 @@ impl<const M: usize> Piece<'_, M> {
         Place { piece: self.number, u, tip: *tip, position, slope, way_slope, tip_slope: feed_slope }
     }
 
-    /// The first three derivatives of the joints by the length of the way at u, where the tip and its own derivatives are at hand.
+    /// The first three derivatives of the joints by the length of the way at u, from the tip and its derivatives by u.
     #[inline(always)]
     pub fn station<T: Argument>(&self, u: T, tip: &[[T; M]; 4], room: &mut [T::Kept]) -> Station<M, T> {
         self.station_of(u, tip, &self.bends::<0, 0, T>(room, tip, &[]))
@@ -381,12 +380,11 @@ impl<const M: usize> Piece<'_, M> {
 
     /// The same with the place, and what of it may be rounding.
     pub fn rounded_station(&self, u: f64, room: &mut [f64]) -> (Place<M>, Station<M>, Roundings<M>) {
-        let [slope, second, third] = self.curve.derivatives(u);
-        let tip = [self.curve.at(u), slope, second, third];
+        let tip = self.curve.jet(u);
         let bends = self.bends::<4, 3, f64>(room, &tip, &self.sizes);
         let ([position, q1, ..], _) = &bends;
         (
-            self.place_of(u, &[tip[0], slope], [*position, *q1]),
+            self.place_of(u, &[tip[0], tip[1]], [*position, *q1]),
             self.station_of(u, &tip, &bends),
             Roundings::of_joints(&bends.0, &bends.1),
         )
