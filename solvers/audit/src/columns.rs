@@ -7,7 +7,7 @@ use super::curve::{Curve, Curves, Followed};
 use super::joints::columns::JointColumns;
 use super::joints::path::JointPath;
 use super::nearest;
-use super::number::Lanes;
+use super::number::{are_vectors_wide, Lanes};
 use super::station::{Place, Rounded, Roundings, Station};
 use super::together::Together;
 use super::vectors::{from_to, length, times, vector_of};
@@ -65,11 +65,11 @@ impl<'a, const M: usize> Columns<'a, M> {
         self.curves.get(piece)
     }
 
-    /// What computes the columns at several places of a piece at once; None for a piece with weights.
+    /// What computes the columns at several places of a piece at once; None for a piece with weights, and in narrow vectors.
     pub fn together(&mut self, piece: usize) -> Option<Together<'a, M>> {
         let bend = self.bend(piece);
         let curve = self.curves.get(piece);
-        if curve.polygon.is_rational() {
+        if curve.polygon.is_rational() || !are_vectors_wide() {
             return None;
         }
         let (scale, joints) = match &mut self.joints {

@@ -137,6 +137,37 @@ impl<S: Simd> Number for f64x8<S> {
     }
 }
 
+/// Whether places are computed at eight at once. In vectors of two numbers, which every x86-64 processor has, that takes as long as
+/// one place after the other, so it is compiled for wider ones only.
+pub fn are_vectors_wide() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    let are_wide = fearless_simd::Level::new().as_avx2().is_some();
+    #[cfg(not(target_arch = "x86_64"))]
+    let are_wide = true;
+    are_wide
+}
+
+/// Evaluates an expression in the vectors of a processor where `are_vectors_wide`.
+macro_rules! in_wide_vectors {
+    ($simd:ident => $of:expr) => {
+        match fearless_simd::Level::new() {
+            #[cfg(target_arch = "x86_64")]
+            fearless_simd::Level::Avx512(simd) => in_wide_vectors!(@at simd, $simd => $of),
+            #[cfg(target_arch = "x86_64")]
+            fearless_simd::Level::Avx2(simd) => in_wide_vectors!(@at simd, $simd => $of),
+            #[cfg(target_arch = "x86_64")]
+            level => unreachable!("vectors of {level:?} are narrow"),
+            #[cfg(not(target_arch = "x86_64"))]
+            level => fearless_simd::dispatch!(level, $simd => $of),
+        }
+    };
+    (@at $level:expr, $simd:ident => $of:expr) => {{
+        let $simd = $level;
+        fearless_simd::Simd::vectorize($simd, #[inline(always)] || $of)
+    }};
+}
+pub(crate) use in_wide_vectors;
+
 /// How a vector is kept in memory.
 #[inline(always)]
 pub fn kept<const M: usize, T: Number>(a: [T; M]) -> [T::Kept; M] {

@@ -6,7 +6,7 @@ use fearless_simd::{dispatch, f64x8, Level, SimdBase};
 
 use super::formula::{Argument, Formula, Jet, JET};
 use crate::curve::{Curve, Followed};
-use crate::number::{inner, kept, Lanes, Number};
+use crate::number::{in_wide_vectors, inner, kept, Lanes, Number};
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{curvature, length, times, vector_of};
 use crate::{EPS, ROUNDINGS};
@@ -334,7 +334,7 @@ impl<const M: usize> Piece<'_, M> {
 
     /// The places at each u of a piece without weights.
     pub fn places(&self, u: &Lanes, room: &mut [Lanes]) -> Place<M, Lanes> {
-        dispatch!(Level::new(), simd => self.look_at_places(f64x8::from_slice(simd, u), room))
+        in_wide_vectors!(simd => self.look_at_places(f64x8::from_slice(simd, u), room))
     }
 
     #[inline(always)]
@@ -484,6 +484,7 @@ impl<const M: usize> Piece<'_, M> {
 mod tests {
     use super::*;
     use crate::curve::Pieces;
+    use crate::number::are_vectors_wide;
     use proptest::prelude::*;
 
     proptest! {
@@ -501,7 +502,8 @@ mod tests {
             let (piece, u) = (joints.piece::<2>(0), shares.map(|share| 5.0 * share));
             let (mut room, mut lanes) = (joints.room(0.0), joints.room([0.0; 8]));
             let positions = piece.at_each(&u, &mut lanes);
-            let places = (!is_rational).then(|| piece.places(&u, &mut lanes));
+            let is_at_once = !is_rational && are_vectors_wide();
+            let places = is_at_once.then(|| piece.places(&u, &mut lanes));
             for (lane, &u) in u.iter().enumerate() {
                 let alone = piece.place(u, &mut room);
                 prop_assert_eq!(positions.map(|position| position[lane]), alone.position.value);

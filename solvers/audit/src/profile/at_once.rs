@@ -7,12 +7,12 @@
 //! `bulge` bounds what lies between two: where that is much above both, both halves are looked at instead. Where more of a limit is
 //! used, `by_length` looks.
 
-use fearless_simd::{dispatch, f64x8, mask64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{f64x8, mask64x8, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use crate::bulge::{bulge, Bulge, Known};
 use crate::chord::chord_error;
 use crate::columns::RATES;
-use crate::number::{inner, Lanes, Number};
+use crate::number::{in_wide_vectors, inner, Lanes, Number};
 use crate::speed_by_length::{cubic_bounds, is_same_speed, Pace, SpeedByLength};
 use crate::together::Together;
 use crate::{Check, Limits, Sided, Tally, FEEDS};
@@ -240,7 +240,7 @@ impl<const M: usize> Places<'_, '_, M> {
             if count == 0 {
                 return;
             }
-            let found = dispatch!(Level::new(), simd => self.look(simd, (&parts, &lanes), tally, room));
+            let found = in_wide_vectors!(simd => self.look(simd, (&parts, &lanes), tally, room));
             for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
                 let sum = times[part.number];
                 times[part.number] = if found.verdict[i] == NOTHING {
@@ -770,7 +770,7 @@ mod tests {
         tally.offer(Check::Chord, 0, worst(Check::Chord, 0) * farthest, farthest, 0.0, 1);
         let (feeds, feeds_along) = ([fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY], [true; FEEDS]);
         let mut columns = Columns::new(&path, &limits, joints);
-        let on = &columns.together(0).expect("a piece without weights");
+        let on = &columns.together(0).expect("a piece without weights, in wide vectors");
         let Columns { rates, per_least, .. } = &columns;
         let places = Places { on, rates, per_least, limits: &limits, feeds, feeds_along };
         // Beside other phases and alone it has the same answer; halves are added in another order.

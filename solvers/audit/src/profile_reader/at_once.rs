@@ -3,11 +3,11 @@
 //! On phases on which v² is a cubic of the length these are the numbers of `motion`, bit for bit: the same formulas in the same order.
 //! Where a rule of quadrature would halve its interval, and where the piece has no direction, a place is left to `motion`.
 
-use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat};
+use fearless_simd::{f64x8, Select, Simd, SimdBase, SimdFloat};
 
 use crate::motion::Passage;
 use crate::nearest::Place;
-use crate::number::Lanes;
+use crate::number::{in_wide_vectors, Lanes};
 use crate::phase_motion::ROUNDING;
 use crate::phases::Phases;
 use crate::quadrature::{by_gauss, by_rules, gauss_nodes, halves_by_rules, nodes, RULES_AGREE};
@@ -47,7 +47,7 @@ pub fn read<const M: usize>(
                 row[lane] = number;
             }
         }
-        let found = dispatch!(Level::new(), simd => look(simd, on, &numbers, room));
+        let found = in_wide_vectors!(simd => look(simd, on, &numbers, room));
         for (lane, (_, _, passage)) in part.iter_mut().enumerate() {
             let since = found.since[lane];
             passage.since = since;
@@ -157,7 +157,7 @@ mod tests {
         let at = |share: f64| Place { piece: 0, u: u[0] + share * (u[1] - u[0]) };
         let mut places: Vec<_> =
             shares.iter().map(|&share| (at(share), 0, Passage::unknown(at(share).u))).collect();
-        let on = columns.together(0).expect("a piece without weights");
+        let on = columns.together(0).expect("a piece without weights, in wide vectors");
         read(&on, &phases, &mut places, &mut columns.room());
         places.iter().map(|(place, _, found)| (*found, motion.passage(place.u, &mut columns))).collect()
     }

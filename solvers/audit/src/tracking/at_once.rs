@@ -1,10 +1,10 @@
 //! The places of several setpoints on one piece, eight at once, in the vectors of the processor, by Newton's method. Each is found as it
 //! would be alone.
 
-use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
+use fearless_simd::{f64x8, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use super::{beyond_last, MOST_GUESSES};
-use crate::number::{inner, Lanes};
+use crate::number::{in_wide_vectors, inner, Lanes};
 use crate::together::Together;
 
 /// Setpoints that are looked for at once.
@@ -19,7 +19,7 @@ pub struct Nearest {
 
 /// From these places of a piece, for setpoints at these positions.
 pub fn nearest<const M: usize>(on: &Together<M>, u: &Lanes, q: &[Lanes; M], room: &mut [Lanes]) -> Nearest {
-    dispatch!(Level::new(), simd => look(simd, on, (u, q), room))
+    in_wide_vectors!(simd => look(simd, on, (u, q), room))
 }
 
 #[inline(always)]
@@ -74,7 +74,7 @@ mod tests {
         let path = Followed::of_one(pieces);
         let joints = JointPath::of_one(path, &words, &[1.0]);
         let mut columns = Columns::new(&path, &limits, has_joints.then_some(&joints));
-        let on = columns.together(0).expect("a piece without weights");
+        let on = columns.together(0).expect("a piece without weights, in wide vectors");
         nearest(&on, u, q, &mut columns.room())
     }
 
