@@ -165,12 +165,12 @@ def _opened(file: FilePath) -> Iterator[IO[str]]:
 
 
 def _took(line: str, comments: list[str]) -> bool:
-    """Whether a line is a comment or continues one; then it is added to the comments."""
+    """Whether a line has no values: it is blank or a comment, which is added to the comments."""
     if line.startswith(_MORE) and comments:
         comments[-1] += line[len(_MORE) :].rstrip("\r\n")
     elif line.startswith("#"):
         comments.append(line.rstrip("\r\n"))
-    return line.startswith("#")
+    return line.startswith("#") or not line.strip()
 
 
 def _named(name: str, comments: list[str], file: FilePath) -> Iterator[Any]:

@@ -6,6 +6,8 @@
 - The token, if there is one, comes as `Authorization: Bearer TOKEN`, or as the password of Basic, which
   browsers ask their users for.
 - The body has at most `max_upload`, and arrives within `max_upload_time`.
+
+A request HEAD is answered as GET is, without the content.
 """
 
 from __future__ import annotations
@@ -54,15 +56,21 @@ class Guard:
             return
         if scope["type"] != "http":
             return  # the server refuses WebSocket connections
-        begun = False
+        begun = ended = False
+        is_head = scope["method"] == "HEAD"
 
         async def answer(message: Message) -> None:
-            nonlocal begun
+            nonlocal begun, ended
             if message["type"] == "http.response.start":
                 begun = True
                 present = {name for name, _ in message["headers"]}
                 own = [header for header in _HEADERS if header[0] not in present]
                 message["headers"] = [*message["headers"], *own]
+            elif is_head:
+                # The answer ends with its headers: a stream of events sees that its client is gone.
+                if ended:
+                    return
+                message, ended = {"type": "http.response.body"}, True
             await send(message)
 
         try:
@@ -70,7 +78,8 @@ class Guard:
             self._require_place(scope, headers)
             self._require_token(scope, headers)
             self._require_length(headers)
-            await self._app(scope, self._counted(receive), answer)
+            asked = scope | {"method": "GET"} if is_head else scope
+            await self._app(asked, self._counted(receive), answer)
         except Refusal as refusal:
             if not begun:
                 await _refuse(refusal, answer)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from feedplan import __version__
+from feedplan.arguments import shown
 from feedplan.errors import MachineError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.machine.axis import Axis
@@ -215,7 +217,18 @@ def _title(given: str) -> str:
 
 def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
     """A model from JSON, which is the member `within` of the request. Raises Refusal for the first member
-    that is wrong."""
+    that is wrong, and for a name that comes twice in an object, of which pydantic takes the last."""
+
+    def once(pairs: list[tuple[str, Any]]) -> None:
+        names = [name for name, _ in pairs]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            place = f"{'.'.join(within) or 'the request'}: {shown(twice)}"
+            raise Refusal(INPUT, f"{place} comes twice in one object: give it once")
+
+    # What is wrong with a text that is no JSON is told below.
+    with suppress(ValueError, RecursionError):
+        json.loads(text, object_pairs_hook=once)
     try:
         return model.model_validate_json(text)
     except ValidationError as error:

@@ -180,6 +180,14 @@ def test_csv_that_a_spreadsheet_has_stored_is_read(tmp_path: Path) -> None:
     assert same(load_setpoints(file), whole)
 
 
+@pytest.mark.parametrize("name", ["csv", "halstreamer"])
+def test_blank_lines_in_a_text_are_passed_over(name: str, tmp_path: Path) -> None:
+    file = written(name, tmp_path, chunk(20))
+    plain = load_setpoints(file)
+    file.write_text(f"\n{file.read_text()}\n  \n\n")
+    assert same(load_setpoints(file), plain)
+
+
 def test_csv_tells_angles_in_degrees(tmp_path: Path) -> None:
     first = written("csv", tmp_path, chunk(1, "XA")).read_text().splitlines()[1]
     assert first.startswith("t [s],position X [mm],position A [deg],velocity X [mm/s],velocity A [deg/s],")

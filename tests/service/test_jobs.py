@@ -170,6 +170,11 @@ def test_an_error_in_a_program_has_file_and_line(server: Server) -> None:
         ({"options": '{"tolerance": "1"}'}, "input", "options.tolerance: input should be a valid number: "),
         ({"options": '{"reading": {}}'}, "input", "options.reading: extra inputs are not permitted: "),
         ({"options": "{"}, "input", "options: invalid JSON: "),
+        (
+            {"options": '{"tolerance": 0.1, "tolerance": 0.01}'},
+            "input",
+            "options: 'tolerance' comes twice in one object: give it once",
+        ),
         ({"name": "x" * 121}, "input", "name: string should have at most 120 characters: "),
         ({"subprograms": "/etc"}, "input", "the form has 'subprograms' too often or wrongly: give program, "),
     ],
@@ -189,6 +194,9 @@ def test_other_bodies_are_refused(server: Server) -> None:
         return server.send("POST", "/v1/jobs", body, {"Content-Type": kind}).status
 
     assert sent("text/plain", PART) == 415
+    twice = b'{"program": "G1 X1 F9\\nM2\\n", "machine": "mill", "machine": "router"}'
+    said = server.send("POST", "/v1/jobs", twice, {"Content-Type": "application/json"}).detail
+    assert said == "the request: 'machine' comes twice in one object: give it once"
     assert sent("application/json", b"[]") == 422
     assert sent("application/json", b'{"program": "\\ud800"}') == 422
     assert sent("application/json", b"[" * 100_000) == 422
@@ -203,6 +211,21 @@ def test_other_bodies_are_refused(server: Server) -> None:
     assert server.submit(b"").detail == "the program is empty: give a part program"
     assert server.get("/v1/nothing").status == 404
     assert server.send("PUT", "/v1/jobs").status == 405
+
+
+def test_head_tells_what_get_has_without_the_content(server: Server) -> None:
+    links = server.planned()["links"]
+    for address in ("/", "/v1/health", links["self"], links["result"], links["report"], links["program"]):
+        get, head = server.get(address), server.send("HEAD", address)
+        assert (head.status, head.content) == (200, b"")
+        assert {**head.headers, "date": ""} == {**get.headers, "date": ""}
+    running = server.submit(long_part(7), **LONG).json["links"]
+    began = time.monotonic()
+    assert server.send("HEAD", running["events"]).status == 200
+    assert time.monotonic() - began < 2.0, "a stream without content has an end"
+    server.send("DELETE", running["self"])
+    assert server.send("HEAD", "/v1/jobs/none").status == 404
+    assert server.send("HEAD", f"{links['self']}/cancel").status == 405
 
 
 def test_a_sent_program_cannot_call_files_and_its_name_is_no_path(server: Server) -> None:

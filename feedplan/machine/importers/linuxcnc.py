@@ -12,9 +12,10 @@
 | [EMCMOT] SERVO_PERIOD | period |
 | [KINS] KINEMATICS | trivkins, with its coordinates, or corexykins; others have dimensions in HAL files |
 
-A value is the first of its name, up to the end of the line; lines that are no settings are passed over, and a
-backslash at its end joins a line to the next. `#INCLUDE file` stands at the start of a line. Limits of the
-tool's whole motion hold for each axis here: a diagonal move may be faster. DEFAULT_… are for jogging.
+A value is the first of its name, up to the end of the line, with a warning where a later one differs; lines
+that are no settings are passed over, and a backslash at its end joins a line to the next. `#INCLUDE file`
+stands at the start of a line. Limits of the tool's whole motion hold for each axis here: a diagonal move may
+be faster. DEFAULT_… are for jogging.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from feedplan.arguments import shown
@@ -68,14 +70,29 @@ class Ini:
 
     def __init__(self, path: Path, files: TextFiles) -> None:
         self._settings: dict[tuple[str, str], Setting] = {}
+        self._later: dict[tuple[str, str], Setting] = {}
+        self._overruled: dict[str, None] = {}
         self._files = files
         self._section = ""
         self._read(path, ())
 
     def get(self, section: str, *keys: str) -> Setting | None:
         """The setting of the first of these keys that exists."""
-        found = (self._settings.get((section, key)) for key in keys)
-        return next((each for each in found if each is not None and each.text), None)
+        for key in keys:
+            found = self._settings.get((section, key))
+            if found is not None and found.text:
+                later = self._later.get((section, key))
+                if later is not None:
+                    told = f"{later.place}: {shown(later.text)} of {later.label} is left out"
+                    first = f"the first counts, {shown(found.text)} of {found.place}"
+                    self._overruled[f"{told}: {first}"] = None
+                return found
+        return None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each setting that was asked for and that a later one contradicts."""
+        return tuple(self._overruled)
 
     def _read(self, path: Path, inside: tuple[Path, ...]) -> None:
         inside = (*inside, path)
@@ -98,8 +115,9 @@ class Ini:
             self._section = line[1:].split("]", 1)[0].strip()
         elif line[:1] not in ("#", ";") and "=" in line:
             key, _, text = (part.strip() for part in line.partition("="))
-            label = f"[{self._section}] {key}"
-            self._settings.setdefault((self._section, key), Setting(label, text, place))
+            own = Setting(f"[{self._section}] {key}", text, place)
+            if self._settings.setdefault((self._section, key), own).text != text:
+                self._later.setdefault((self._section, key), own)
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
@@ -116,18 +134,19 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
     else:
         axes = [reader.axis(letter, [letter], joints.get(letter, [])) for letter in letters]
     name = ini.get("EMC", "MACHINE")
-    return FoundMachine(
+    found = FoundMachine(
         name=name.text[:60] if name else path.stem,
         origin=f"{path.name} ({CONTROLLER})",
         axes=tuple(axes),
         period=_period(ini),
         kinematics=kinematics,
         remarks=tuple(_remarks(ini)),
-        warnings=tuple(warnings),
         # The model of LinuxCNC knows axes that are the program's.
         controller="linuxcnc" if kinematics == "cartesian" else "",
         parameters=_of_controller(ini, per_mm) if kinematics == "cartesian" else {},
     )
+    # When all settings have been asked for, it is known which of them a later one contradicts.
+    return replace(found, warnings=(*warnings, *ini.warnings))
 
 
 def _of_controller(ini: Ini, per_mm: float) -> dict[str, Found]:

@@ -69,6 +69,17 @@ def limits(machine: Machine) -> dict[str, tuple[object, ...]]:
     return {axis.name: (axis.max_velocity, axis.max_acceleration, axis.max_jerk) for axis in machine.axes}
 
 
+def test_a_setting_that_a_later_one_contradicts_is_told(tmp_path: Path) -> None:
+    """LinuxCNC takes the first as well, and people look at the last."""
+    again = "[JOINT_0]\nMAX_VELOCITY = 300.0\nMAX_LIMIT = 9.5\n[DISPLAY]\nCYCLE = 1\nCYCLE = 2\n"
+    found = find_machine(ini(MILL + again, tmp_path))
+    assert found.warnings == (
+        "mill.ini line 41: '300.0' of [JOINT_0] MAX_VELOCITY is left out: the first counts, "
+        "'3.0' of mill.ini line 21",
+    )
+    assert find_machine(ini(MILL, tmp_path)).warnings == ()
+
+
 def test_inches_and_the_least_of_axis_joints_and_path(tmp_path: Path) -> None:
     machine = import_machine(ini(MILL, tmp_path))
     assert machine.name == "Small Mill"
