@@ -8,8 +8,12 @@ import numpy as np
 
 from feedplan.arguments import number, positive
 from feedplan.arrays import Floats
+from feedplan.errors import InputError, at_line
 from feedplan.geometry.feed_groups import feed_groups, leading_feed, moving_axes
 from feedplan.geometry.path import Path
+
+# The least feed [mm/s, or the unit of the axes per second]: the times of slower plans lose their digits.
+LEAST_FEED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,18 @@ class FeedRequest:
 
 
 def feed_limit(path: Path, greatest: float, request: FeedRequest) -> Floats:
-    """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is the speed of rapids."""
-    return np.minimum(request.of(path.feed), greatest)
+    """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is the speed of rapids.
+
+    Raises InputError for a feed below `LEAST_FEED`.
+    """
+    limit = np.minimum(request.of(path.feed), greatest)
+    slow = int(limit.argmin())
+    if limit[slow] < LEAST_FEED:
+        line = int(path.line[slow])
+        raise InputError(
+            f"{at_line(line)}the feed is {limit[slow]:g} mm/s: give one from {LEAST_FEED:g} mm/s", line
+        )
+    return limit
 
 
 def feed_share(path: Path, greatest: float, request: FeedRequest) -> Floats | None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from feedplan.arrays import Flags, Floats, Integers
 from feedplan.constraints.problem import Problem
+from feedplan.errors import InputError
 from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_at
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
@@ -24,6 +25,8 @@ from feedplan.program.program import Program
 _LEAST_PERIODS = 10
 # Samples of the speed in a step.
 _WITHIN_STEP = 4
+# Most samples of a program: some 20 GB.
+_MOST_SAMPLES = 100_000_000
 # The least turn of a part of an arc [rad], which could be read as a full turn, and the greatest.
 _LEAST_TURN, _GREATEST_TURN = 1e-4, math.pi
 
@@ -49,7 +52,10 @@ def parts_of(
     candidates: Integers,
     step: float,
 ) -> dict[int, Parts]:
-    """The parts of those `candidates` (moves) whose planned speed varies by more than `step` [mm/s]."""
+    """The parts of those `candidates` (moves) whose planned speed varies by more than `step` [mm/s].
+
+    Raises InputError for a step that makes too many samples.
+    """
     moves = [
         m
         for m in candidates.tolist()
@@ -109,6 +115,13 @@ def _samples(
 ) -> list[tuple[Floats, Floats, Floats, Flags]]:
     """Samples of each move in order: points, speeds, times, and whether the path follows it alone there."""
     pieces, parameters, sizes = [], [], []
+    varied = sum(float(np.abs(np.diff(along.of(m))).sum()) for m in moves)
+    if _WITHIN_STEP * varied > _MOST_SAMPLES * step:
+        least = _WITHIN_STEP * varied / _MOST_SAMPLES
+        raise InputError(
+            f"feed_step is {step:g} mm/s, and the speeds of the program vary by {varied:.4g} mm/s in all: give "
+            f"one from {float(f'{1.05 * least:.1g}'):g} mm/s"
+        )
     for m in moves:
         places = slice(int(along.first[m]), int(along.last[m]) + 1)
         piece, u, speed = along.piece[places], along.u[places], along.of(m)

@@ -81,7 +81,7 @@ def numbers(summary: Mapping[str, Any], account: Account, audit: Audit) -> str:
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
         ("Gap to the bound", *distance),
-        ("Length", *length, turned or f"{summary['pieces']} pieces"),
+        ("Length", *length, turned or counted(summary["pieces"], "piece")),
         ("Mean speed", *mean, by_minute),
         ("Stops on the length", str(summary["stops"]), "", counted(summary["runs"], "run")),
         ("Setpoints", f"{summary['setpoints']['count']:,}".replace(",", " "), "", ""),

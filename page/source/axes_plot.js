@@ -28,6 +28,7 @@ export class AxesPlot {
         label: k === rows.length - 1 ? "time [s]" : undefined,
         onZoom: (range) => this.plots.forEach(({ plot: one }) => one.zoom(range)),
         onPoint: (time) => cursor.set(time, this),
+        mostBeside: MOST_BESIDE,
       });
       return { name, box, head, plot };
     });
@@ -50,7 +51,6 @@ export class AxesPlot {
     for (const row of this.plots) {
       const shownRow = row.name === "speed" ? this.#speed() : this.#quantity(row.name);
       row.head.replaceChildren(...shownRow.head);
-      row.box.classList.toggle("beside", shownRow.curves.length <= MOST_BESIDE);
       row.plot.show({ ...shownRow, ends: [0, this.data.duration || 1] });
     }
   }

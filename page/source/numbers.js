@@ -10,10 +10,10 @@ export function shown(value, digits = 4) {
   return rest ? `${apart}.${rest}` : apart;
 }
 
-/* A number beside a chart: as a power of ten where it has more than nine characters. */
+/* A number beside a chart: as a power of ten where it has more than eight characters without its sign. */
 export function tick(value) {
   const text = shown(value, 6);
-  return text.length <= 9 ? text : Number(value.toPrecision(6)).toExponential().replace(/^-/, "−").replace("+", "");
+  return text.replace("−", "").length <= 8 ? text : Number(value.toPrecision(6)).toExponential().replace(/^-/, "−").replace("+", "");
 }
 
 /* A time [s] as text with units. */

@@ -18,10 +18,10 @@ export class Plot {
   #isPointing = false;
 
   /* `onZoom(range)` is called with the new range, null for all; `onPoint(x)` with the x of the pointer. Touch calls
-     both too. */
-  constructor(container, { height, label, onZoom, onPoint }) {
+     both too. The legend is beside the heading where it has no more than `mostBeside` names. */
+  constructor(container, { height, label, onZoom, onPoint, mostBeside = 0 }) {
     this.container = container;
-    Object.assign(this, { height, label, onZoom, onPoint });
+    Object.assign(this, { height, label, onZoom, onPoint, mostBeside });
     this.hidden = new Set();
     new ResizeObserver(() => this.#hasNewWidth() && this.draw()).observe(container);
   }
@@ -56,6 +56,8 @@ export class Plot {
     const [from, to] = this.#range();
     const found = this.curves.map(({ curve, ...options }) => sampled(curve, from, to, this.#columns, { ...options, top: this.range[1] }));
     this.#bands = found;
+    // The name of a curve with a range is as long as two.
+    this.container.classList.toggle("beside", found.length + found.filter((one) => one.low).length <= this.mostBeside);
     const data = [grid(from, to, this.#columns), ...found.map((one) => one.y)];
     this.#plot = new uPlot(this.#options(width, from, to, found), data, this.container);
     if (this.#cursor !== null) this.point(this.#cursor);

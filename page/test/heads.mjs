@@ -1,5 +1,5 @@
 /* Opens a report and prints as JSON whether a tool path is drawn, the heading of the chart over the length, and for each
-   chart over time its heading and whether the legend covers the heading:
+   chart over time its heading, whether the legend covers the heading, and the names in the legend:
    node page/test/heads.mjs REPORT WIDTH */
 
 import { resolve } from "node:path";
@@ -17,7 +17,8 @@ const heads = await page.locator("#time .row").evaluateAll((rows) => rows.map((r
   const entries = [...row.querySelectorAll(".u-legend .u-series:not(:first-child)")].map((entry) => entry.getBoundingClientRect());
   const covered = [...words.getClientRects()].some((own) => entries.some((entry) =>
     own.left < entry.right && entry.left < own.right && own.top < entry.bottom && entry.top < own.bottom));
-  return { text: words.toString(), covered };
+  const names = [...row.querySelectorAll(".u-legend .u-series:not(:first-child) .u-label")].map((name) => name.textContent);
+  return { text: words.toString(), covered, names };
 }));
 const length = await page.locator("#length .row p").textContent();
 const drawn = await page.locator("#path").isVisible();

@@ -56,6 +56,17 @@ def assert_held(problem: Problem, method: str = "jerk-limited", **options: float
     return profile.time
 
 
+def test_nobody_changes_the_bound_of_a_plan() -> None:
+    text = "G21 G90 F600\nG1 X10\nG61.1 G1 Y10\nM2\n"
+    profile = plan_program(text, "mill", "jerk-limited").profile
+    assert len(profile.run_bounds) == 2
+    bound = profile.lower_bound
+    for own in (profile, replace(profile), profile.with_others(run_bounds=np.array([1.0, 1.0]))):
+        with pytest.raises(ValueError, match="read-only"):
+            own.run_bounds[:] = 0.0
+    assert replace(profile).lower_bound == bound
+
+
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve", "ruckig"])
 def test_a_square_with_stops_takes_as_long_as_by_hand(method: str) -> None:
     # A side: 0.21 s and 10.5 mm to 100 mm/s, 79 mm at it, 0.21 s down: 1.21 s.

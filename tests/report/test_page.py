@@ -164,6 +164,11 @@ def test_without_the_program_the_page_lacks_only_its_text(square: Any, tmp_path:
     assert "<th>Source</th>" not in page(square, tmp_path / "report.html", tmp_path / "gone.ngc")
 
 
+def test_one_piece_is_told_as_one(tmp_path: Path) -> None:
+    feedplan.write_plan(feedplan.plan("G21 F600\nG1 X10\nM2\n", "mill"), tmp_path, formats=[])
+    assert "1 piece<" in (tmp_path / "report.html").read_text("utf-8")
+
+
 def test_a_path_without_a_program_has_no_lines(tmp_path: Path) -> None:
     path = feedplan.Path.from_bezier([[0, 0], [10, 0], [10, 10]], axes=("X", "Y"))
     feedplan.write_plan(feedplan.plan(path, "mill"), tmp_path, formats=[])

@@ -219,7 +219,7 @@ def test_a_chart_shows_the_end_of_its_curve_and_numbers_of_its_width() -> None:
     assert told["drawn"][0] == told["drawn"][-1] == 0.0
     assert max(told["drawn"]) == 30.0
     plain = [text.replace("\u202f", " ").replace("\u2212", "-") for text in told["ticks"]]
-    assert plain == ["0", "-2 000", "3e7", "-3e7", "-5e6", "2.5e-7", "-1.234e-5"]
+    assert plain == ["0", "-2 000", "3e7", "-3e7", "-5e6", "1e6", "-1e6", "2.5e-7", "-1.234e-5"]
 
 
 def test_the_page_needs_no_token_and_allows_no_other_origin(tmp_path: Path) -> None:
@@ -265,6 +265,17 @@ def test_the_legend_of_a_report_leaves_the_limits_readable(
         # Both charts of the speed tell its unit, and that they are cut.
         assert re.fullmatch(r"speed \[mm/s\]  rapids up to \d+\.\d mm/s run out of the chart", seen["length"])
         assert seen["heads"][0]["text"] == seen["length"]
+
+
+@in_a_browser
+def test_the_legend_of_many_setpoints_leaves_the_limits_readable(tmp_path: Path) -> None:
+    """Curves of more setpoints than the chart has pixels are means with ranges, and the legend says so."""
+    steps = "\n".join(f"X{k % 2} Y{0.01 * k:.2f} Z{0.1 * (k % 3):.1f}" for k in range(3000))
+    program = f"G21 G90 G64 P0.05\nG1 F3000\n{steps}\nM2\n"
+    feedplan.write_plan(feedplan.plan(program, "mill"), tmp_path, formats=[])
+    seen = _seen(tmp_path / "report.html", 1200)
+    assert [head["text"] for head in seen["heads"] if head["covered"]] == []
+    assert seen["heads"][2]["names"] == [f"{axis}, mean and range" for axis in "XYZ"]
 
 
 @in_a_browser
