@@ -119,8 +119,8 @@ def _samples(
     if _WITHIN_STEP * varied > _MOST_SAMPLES * step:
         least = _WITHIN_STEP * varied / _MOST_SAMPLES
         raise InputError(
-            f"feed_step is {step:g} mm/s, and the speeds of the program vary by {varied:.4g} mm/s in all: give "
-            f"one from {float(f'{1.05 * least:.1g}'):g} mm/s"
+            f"feed_step is {step:g} mm/s, and the speeds of the program vary by {varied:.4g} mm/s in all: "
+            f"give one from {float(f'{1.05 * least:.1g}'):g} mm/s"
         )
     for m in moves:
         places = slice(int(along.first[m]), int(along.last[m]) + 1)

@@ -30,7 +30,7 @@ from feedplan.report.page import FILE as REPORT_FILE
 from feedplan.service import answers, events, exports, front, openapi, page, problems, uploads, views
 from feedplan.service.limits import Limits
 from feedplan.service.refusals import INPUT, UNKNOWN, Refusal
-from feedplan.service.requests import MachineRequest, machine_of, order_of
+from feedplan.service.requests import MachineRequest, machine_of, order_of, require_once
 from feedplan.service.runner import Runner
 from feedplan.service.store import ENDED, Store
 
@@ -63,6 +63,11 @@ def _known_query(request: Request) -> None:
             raise Refusal(INPUT, f"query.{name[:60]}: there is no such parameter: give {', '.join(known)}")
         if get_origin(known[name]) is not list and len(request.query_params.getlist(name)) > 1:
             raise Refusal(INPUT, f"query.{name}: it comes more than once: give it once")
+
+
+async def _once_in_body(request: Request) -> None:
+    """Raises Refusal for a name that comes twice in an object of the request."""
+    require_once(await request.body())
 
 
 QUERY = Depends(_known_query)
@@ -335,6 +340,7 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
         "/v1/machines",
         response_model=answers.MachineInfo,
         summary="Read a machine file, and change limits in it",
+        dependencies=[Depends(_once_in_body)],
         responses=openapi.problems(400, 422),
         openapi_extra=openapi.MACHINE,
     )

@@ -57,7 +57,7 @@ class Database:
                     db.executescript(f"BEGIN;{_TABLES}COMMIT;")
             said = "" if version in (0, VERSION) else f"is of another feedplan (version {version})"
         except sqlite3.DatabaseError as error:
-            said = f"is damaged ({error})"
+            said = f"cannot be used ({error})"
         if said:
             self.close()
             raise InputError(f"{file} {said}: choose another folder with --store")

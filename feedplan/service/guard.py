@@ -78,7 +78,7 @@ class Guard:
             self._require_place(scope, headers)
             self._require_token(scope, headers)
             self._require_length(headers)
-            asked = scope | {"method": "GET"} if is_head else scope
+            asked = {**scope, "method": "GET"} if is_head else scope
             await self._app(asked, self._counted(receive), answer)
         except Refusal as refusal:
             if not begun:

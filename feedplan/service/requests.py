@@ -215,9 +215,8 @@ def _title(given: str) -> str:
     return "".join(letter for letter in name if letter.isprintable()).strip()
 
 
-def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
-    """A model from JSON, which is the member `within` of the request. Raises Refusal for the first member
-    that is wrong, and for a name that comes twice in an object, of which pydantic takes the last."""
+def require_once(text: bytes | str, *within: str) -> None:
+    """Raises Refusal for a name that comes twice in an object of JSON, of which readers take the last."""
 
     def once(pairs: list[tuple[str, Any]]) -> None:
         names = [name for name, _ in pairs]
@@ -226,9 +225,15 @@ def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
             place = f"{'.'.join(within) or 'the request'}: {shown(twice)}"
             raise Refusal(INPUT, f"{place} comes twice in one object: give it once")
 
-    # What is wrong with a text that is no JSON is told below.
+    # What is wrong with a text that is no JSON is told by its reader.
     with suppress(ValueError, RecursionError):
         json.loads(text, object_pairs_hook=once)
+
+
+def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
+    """A model from JSON, which is the member `within` of the request. Raises Refusal for the first member
+    that is wrong."""
+    require_once(text, *within)
     try:
         return model.model_validate_json(text)
     except ValidationError as error:
@@ -242,4 +247,6 @@ def sentence_of(error: Any) -> str:
     parts = [str(part)[:60] for part in error["loc"] if part != "str" and "[" not in str(part)]
     member = ".".join(parts) or "the request"
     said = str(error["msg"])[:220]
-    return f"{member}: {said[:1].lower()}{said[1:]}: correct it as the documentation at /docs tells"
+    # A capital of a name, as in JSON, stays.
+    said = said if said[:2].isupper() else f"{said[:1].lower()}{said[1:]}"
+    return f"{member}: {said}: correct it as the documentation at /docs tells"

@@ -55,11 +55,11 @@ def test_feed_is_replaced_and_overridden_but_rapids_are_not() -> None:
 def test_a_feed_that_no_plan_can_time_is_refused() -> None:
     path = polyline([[0, 0], [10, 0], [10, 10]], 10.0)
     assert build_problem(path, machine(), feed=1e-6).feed[0] == 1e-6
-    said = "^line 10: the feed is 1e-08 mm/s: give one from 1e-06 mm/s$"
+    said = r"^line 10: the feed is 1e-08 mm/s: give one from 1e-06 mm/s$"
     with pytest.raises(InputError, match=said):
         build_problem(path, machine(), feed_override=1e-9)
     path.line[:], path.feed[1] = [7, 8], 1e-9
-    with pytest.raises(InputError, match="^line 8: the feed is 1e-09 mm/s") as caught:
+    with pytest.raises(InputError, match=r"^line 8: the feed is 1e-09 mm/s") as caught:
         build_problem(path, machine())
     assert caught.value.line == 8
 

@@ -43,7 +43,7 @@ def test_a_ramp_is_cut_where_the_speed_has_changed_by_a_step() -> None:
 
 def test_a_step_of_too_many_samples_is_refused() -> None:
     plan = planned("G21 G61\nG0 X0\nG1 X60 F60000\nM2\n")
-    said = "^feed_step is 1e-09 mm/s, and the speeds .* vary by .* mm/s in all: give one from 4e-05 mm/s$"
+    said = r"^feed_step is 1e-09 mm/s, and the speeds .* vary by .* mm/s in all: give one from 4e-05 mm/s$"
     with pytest.raises(feedplan.InputError, match=said):
         feedplan.planned_program(plan, feed_step=1e-9)
 

@@ -374,6 +374,13 @@ def test_a_machine_file_is_described_with_changed_limits(server: Server) -> None
         body = json.dumps({"machine": machine, "limits": limits}).encode()
         return server.send("POST", "/v1/machines", body, {"Content-Type": "application/json"})
 
+    twice = b'{"machine": "mill", "limits": {"X": {"max_jerk": 5e4, "max_jerk": 6e4}}}'
+    for body, sentence in (
+        (twice, "the request: 'max_jerk' comes twice in one object: give it once"),
+        (b"{", "body.1: JSON decode error: correct it as the documentation at /docs tells"),
+    ):
+        answer = server.send("POST", "/v1/machines", body, {"Content-Type": "application/json"})
+        assert (answer.status, answer.detail) == (422, sentence)
     own = replace(feedplan.Machine.load("tarus"), controller=Controller("grbl", {"junction_deviation": 0.02}))
     plain = told(own.to_toml()).json
     assert plain == {**server.get("/v1/machines/tarus").json, "file": own.to_toml()} | {

@@ -101,7 +101,7 @@ def test_a_store_has_one_server_and_one_version(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"is of another feedplan \(version 7\)"):
         Store(tmp_path, Limits())
     (tmp_path / "jobs.sqlite").write_bytes(b"damaged " * 1000)
-    with pytest.raises(InputError, match=r"jobs.sqlite is damaged \(.*\): choose another folder"):
+    with pytest.raises(InputError, match=r"jobs.sqlite cannot be used \(.*\): choose another folder"):
         Store(tmp_path, Limits())
 
 
