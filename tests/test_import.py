@@ -69,6 +69,18 @@ def test_the_package_imports_no_slow_package() -> None:
     assert done.stdout == "[]\n"
 
 
+def test_nothing_is_imported_before_a_name_is_used() -> None:
+    """So `main`, which ends Ctrl-C in a sentence, runs before anything slow is imported."""
+    code = """
+import sys, feedplan, feedplan.__main__
+print(sorted(name for name in sys.modules if name == "numpy" or name.startswith("feedplan.")))
+feedplan.Axis
+print("numpy" in sys.modules, "feedplan.planning" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "['feedplan.__main__']\nTrue False\n"
+
+
 def test_packages_of_the_service_stay_in_the_service() -> None:
     code = """
 import importlib, pkgutil, sys, feedplan
