@@ -107,6 +107,9 @@ def planned_feeds(
         blocks.per_minute[lines[fed]], speeds.feed[row[fed]] * SECONDS_PER_MINUTE / units, np.nan
     )
     programmed[fed] = np.where(np.isnan(programmed[fed]), from_feed, programmed[fed])
+    # Before its first F a program has none that could stay: the feed is the user's.
+    has_feed = np.cumsum(own_of[lines] & (exclusion != Exclusion.DELETED)) > 0
+    none = feeds & ~has_feed & ~blocks.calls_set_feed & ~np.isnan(programmed)
     unknown = feeds & np.isnan(programmed)
     ratio = np.ones(len(lines))
     ratio[fed] = speeds.ratio[row[fed]]
@@ -125,7 +128,9 @@ def planned_feeds(
         if counts[place] > 1:
             ratio[starts[place] : starts[place] + counts[place]] = parts[line]
     # The wanted F, and the F in force before the line; 0 means the program's own F.
-    other = feeds[of] & (np.abs(ratio - 1.0) > FEED_ROUNDING)
+    reached = np.abs(ratio - 1.0) <= FEED_ROUNDING
+    ratio[reached] = 1.0
+    other = feeds[of] & (~reached | none[of])
     wanted = np.where(other, rounded_down(np.where(other, programmed[of] * ratio, 1.0)), 0.0)
     # No new F is in force after a block of G93, and after a change of the meaning of F.
     before = np.append(0.0, np.where(blocks.inverse[lines[of]], 0.0, wanted)[:-1])

@@ -78,14 +78,16 @@ def inverse_feeds(
     motion_of = motions(program)
     rows: list[tuple[int, float, float]] = []
     sizes: dict[int, int] = {}
-    programmed = np.nan
+    given = np.flatnonzero((blocks.feed_at[:, 0] >= 0) & (exclusion != Exclusion.DELETED))
     for line, m in sorted(first.items()):
         motion = motion_of(m)
         cut = parts.get(m)
         shares = [0.0, 1.0] if cut is None else [0.0, *cut.shares]
         tops = [greatest[m]] if cut is None else cut.speed
         sizes[line] = len(shares) - 1
-        programmed = blocks.feed[line] if blocks.feed_at[line, 0] >= 0 else programmed
+        # The F of a line may stand on one before, which moves nothing.
+        last = int(np.searchsorted(given, line, side="right")) - 1
+        programmed = blocks.feed[given[last]] if last >= 0 else np.nan
         for begin, end, top in zip(shares[:-1], shares[1:], tops, strict=True):
             speed = float(top if top > 0.0 else program.feed[m])
             rows.append((line + 1, programmed, mm_per_min(speed) / feed_length(program, motion, begin, end)))

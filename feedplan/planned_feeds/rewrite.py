@@ -112,7 +112,8 @@ class PlannedProgram:
         for line, row in zip(lines[:shown].tolist(), first.tolist(), strict=False):
             after = self.changes.after[self.changes.line == line]
             text = " ".join(f"{feed:g}" for feed in after[:6]) + (" ..." if len(after) > 6 else "")
-            rows.append(f"  line {line}: F{self.changes.before[row]:g} -> F{text}")
+            before = self.changes.before[row]
+            rows.append(f"  line {line}: {'no F' if np.isnan(before) else f'F{before:g}'} -> F{text}")
         if len(lines) > shown:
             rows.append(f"  and {len(lines) - shown} more")
         reasons: dict[str, list[int]] = {}

@@ -253,3 +253,20 @@ def test_a_program_that_was_changed_since_is_refused(tmp_path: object) -> None:
     file.write_text(SQUARE + "\n")
     with pytest.raises(InputError, match=r"part\.ngc was changed since it was planned: plan it again"):
         feedplan.planned_program(plan)
+
+
+def test_a_program_without_a_feed_gets_that_of_the_user() -> None:
+    """A control refuses a feed move before the first F."""
+    text = "G21 G90\nG0 Y1\nG1 X10\nX20\nX30\nF1200 X40\nX50\nM2\n"
+    result = feedplan.planned_program(feedplan.plan(text, "mill", feed=10.0))
+    assert result.content.decode() == ("G21 G90\nG0 Y1\nG1 X10 F600\nX20\nX30\nF600 X40\nX50\nM2\n")
+    again = feedplan.plan(result.content, "mill")
+    assert again.time == feedplan.plan(text, "mill", feed=10.0).time
+    # As inverse time its F is told as none.
+    told = feedplan.planned_program(feedplan.plan("G1 X10\nM2\n", "mill", feed=10.0), inverse_time=True)
+    assert "line 1: no F -> F60" in told.summary()
+
+
+def test_the_feed_before_inverse_time_may_stand_in_a_line_of_its_own() -> None:
+    result = feedplan.planned_program(planned("G21\nF600\nG1 X10\n/F900\nX20\nM2\n"), inverse_time=True)
+    assert result.summary().splitlines()[1:] == ["  line 3: F600 -> F60", "  line 5: F600 -> F60"]
