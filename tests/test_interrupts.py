@@ -246,3 +246,20 @@ def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> No
     assert shown.rstrip().endswith("error: interrupted")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["results", "wave.ngc"]
     assert (tmp_path / "results").stat().st_size == 0
+
+
+def test_the_fork_server_leaves_ctrl_c_to_the_command() -> None:
+    """It imports feedplan when it starts, and would print a traceback where a terminal sends Ctrl-C to all."""
+    code = """
+import signal
+from multiprocessing import forkserver
+from pathlib import Path
+from feedplan.jobs.executor import JobLimits
+from feedplan.jobs.processes import Processes
+Processes(1, JobLimits(max_time=60.0, max_memory=4000.0))
+status = Path(f"/proc/{forkserver._forkserver._forkserver_pid}/status").read_text()
+blocked = int(next(line for line in status.splitlines() if line.startswith("SigBlk")).split()[1], 16)
+print(blocked >> (signal.SIGINT - 1) & 1, signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("1 set()\n", "")

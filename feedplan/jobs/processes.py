@@ -10,10 +10,11 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import signal
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path as FilePath
@@ -38,7 +39,7 @@ class Processes:
         self._count, self._limits, self._niceness, self._grace = count, limits, niceness, grace
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(list(work.LOADED))
-        forkserver.ensure_running()
+        _start_fork_server()
 
     def slots(self) -> int:
         """See `Executor`."""
@@ -117,11 +118,23 @@ class Processes:
                 return problem or Outcome("stopped"), False
 
 
+def _start_fork_server() -> None:
+    """Ctrl-C in a terminal reaches all processes there, and only the one of the command is to answer it: the fork
+    server and its children inherit the mask."""
+    # It would unblock the signal.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _ended(process: BaseProcess) -> Outcome:
     """The outcome of a job whose process ended without one."""
     how = process.exitcode
-    signal = f"by the signal {-how}" if how is not None and how < 0 else "without a word"
-    return Outcome.failed("worker", f"the process of the job was ended {signal}: send it again")
+    cause = f"by the signal {-how}" if how is not None and how < 0 else "without a word"
+    return Outcome.failed("worker", f"the process of the job was ended {cause}: send it again")
 
 
 def memory_of(process: int | None) -> int:
