@@ -249,7 +249,7 @@ def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> No
 
 
 def test_the_fork_server_leaves_ctrl_c_to_the_command() -> None:
-    """It imports feedplan when it starts, and would print a traceback where a terminal sends Ctrl-C to all."""
+    """It imports feedplan when it starts, and printed a traceback where a terminal sends Ctrl-C to all."""
     code = """
 import signal
 from multiprocessing import forkserver

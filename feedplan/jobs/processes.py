@@ -119,8 +119,8 @@ class Processes:
 
 
 def _start_fork_server() -> None:
-    """Ctrl-C in a terminal reaches all processes there, and only the one of the command is to answer it: the fork
-    server and its children inherit the mask."""
+    """Ctrl-C in a terminal reaches all processes there, and only that of the command is to answer it: the
+    fork server and its children inherit the mask."""
     # It would unblock the signal.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
