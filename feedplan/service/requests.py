@@ -219,11 +219,12 @@ def require_once(text: bytes | str, *within: str) -> None:
     """Raises Refusal for a name that comes twice in an object of JSON, of which readers take the last."""
 
     def once(pairs: list[tuple[str, Any]]) -> None:
-        names = [name for name, _ in pairs]
-        if len(set(names)) < len(names):
-            twice = next(name for name in names if names.count(name) > 1)
-            place = f"{'.'.join(within) or 'the request'}: {shown(twice)}"
-            raise Refusal(INPUT, f"{place} comes twice in one object: give it once")
+        known: set[str] = set()
+        for name, _ in pairs:
+            if name in known:
+                place = f"{'.'.join(within) or 'the request'}: {shown(name)}"
+                raise Refusal(INPUT, f"{place} comes twice in one object: give it once")
+            known.add(name)
 
     # What is wrong with a text that is no JSON is told by its reader.
     with suppress(ValueError, RecursionError):
