@@ -97,6 +97,9 @@ impl Interpreter<'_> {
                 let turns = speed / 60.0;
                 Ok(Feed { linear: feed.linear * turns, angular: feed.angular * turns })
             }
+            None if self.state.constant_surface_speed => fault!(
+                "the feed is per turn (G95), and with a constant surface speed (G96) the spindle speed is not known: use G97 and S, or G94"
+            ),
             None => fault!(
                 "the feed is per turn (G95) and the spindle speed is not known: give S and M3 before, or use G94"
             ),
