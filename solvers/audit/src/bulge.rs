@@ -43,19 +43,19 @@ pub struct Known<T> {
 
 /// Of the longest interval between places, on a piece with these bounds of the second to the fifth derivative.
 #[inline(always)]
-pub fn bulge<T: Number>([m2, m3, m4, m5]: [f64; 4], known: &Known<T>) -> Bulge<T> {
+pub fn bulge<T: Number>([m2, m3, m4, m5]: [T; 4], known: &Known<T>) -> Bulge<T> {
     let h = known.interval;
-    let slope = known.slopes[0] - h * (0.5 * m2);
-    let (nothing, one) = (h.filled(0.0), h.filled(1.0));
+    let slope = known.slopes[0] - h * (m2 * 0.5);
+    let one = h.filled(1.0);
     let per = one / slope;
     let t1 = per * m2;
-    let t2 = (t1 * (3.0 * m2) + m3) * per;
+    let t2 = (t1 * (m2 * 3.0) + m3) * per;
     let g2 = t1 * m2 + m3;
-    let t3 = (t2 * (4.0 * m2) + (g2 * 3.0 + 2.0 * m3) * t1 + m4) * per;
-    let g3 = t2 * m2 + t1 * (2.0 * m3) + m4;
-    let t4 = (t3 * (5.0 * m2) + (g2 * 6.0 + 3.0 * m3) * t2 + (g3 * 4.0 + 3.0 * m4) * t1 + m5) * per;
+    let t3 = (t2 * (m2 * 4.0) + (g2 * 3.0 + m3 * 2.0) * t1 + m4) * per;
+    let g3 = t2 * m2 + t1 * (m3 * 2.0) + m4;
+    let t4 = (t3 * (m2 * 5.0) + (g2 * 6.0 + m3 * 3.0) * t2 + (g3 * 4.0 + m4 * 3.0) * t1 + m5) * per;
     let r1 = t1 * per;
-    let r2 = (r1 * (2.0 * m2) + g2 * per) * per;
+    let r2 = (r1 * (m2 * 2.0) + g2 * per) * per;
     let r3 = ((r2 * m2 + g2 * r1) * 3.0 + g3 * per) * per;
     let (direction, inverse) = (Bounds([one, t1, t2]), Bounds([per, r1, r2]));
     let mut bend = Bounds([t1, t2, t3]).times(inverse);
@@ -65,9 +65,9 @@ pub fn bulge<T: Number>([m2, m3, m4, m5]: [f64; 4], known: &Known<T>) -> Bulge<T
     let curvature = eighth * bend.0[2];
     bend.0[0] = bend.0[0].smaller(known.second + curvature);
     change.0[0] = change.0[0].smaller(known.third + eighth * change.0[2]);
-    let steepest = known.slopes[1] + h * (0.5 * m2);
-    let ([v, a, j], bend_most) = (known.paces, nothing + m2);
-    let (v, a, j) = (v.at(steepest, bend_most), a.at(steepest, bend_most), j.at(steepest, bend_most));
+    let steepest = known.slopes[1] + h * (m2 * 0.5);
+    let [v, a, j] = known.paces;
+    let (v, a, j) = (v.at(steepest, m2), a.at(steepest, m2), j.at(steepest, m2));
     let square = v.times(v);
     let bulge = |of: Bounds<T>| eighth * of.0[2];
     Bulge {

@@ -86,6 +86,14 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
+    /// Computes stations and their rounding at once for later calls, each on its piece. Only those of joints are computed so.
+    pub fn look_ahead_on_each(&mut self, at: &[(usize, f64)], room: &mut [Lanes]) {
+        let Some(joints) = self.joints.as_mut().filter(|_| are_vectors_wide()) else { return };
+        let at: Vec<_> =
+            at.iter().map(|&(piece, u)| (joints.piece(piece, self.curves.get(piece)), u)).collect();
+        joints.look_ahead_on_each(&at, room);
+    }
+
     /// Memory for the results of the joints' formula at several places at once.
     pub fn room(&self) -> Vec<Lanes> {
         self.joints.as_ref().map_or(Vec::new(), |joints| joints.of.room([0.0; 8]))

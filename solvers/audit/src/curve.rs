@@ -160,27 +160,28 @@ impl Pieces<'_> {
     }
 }
 
-/// Pieces made ready one after the other: the last two are kept, with their numbers.
+/// So many consecutive pieces are kept.
+pub const KEPT: usize = 8;
+
+/// Pieces made ready one after the other: the last ones are kept, with their numbers.
 pub struct Curves<'a, const M: usize> {
     pub pieces: Pieces<'a>,
-    kept: [(usize, Rc<Curve<M>>); 2],
+    kept: [(usize, Rc<Curve<M>>); KEPT],
 }
 
 impl<'a, const M: usize> Curves<'a, M> {
     pub fn new(pieces: Pieces<'a>) -> Self {
-        Self { pieces, kept: [0, 1].map(|_| (usize::MAX, Rc::new(Curve::none()))) }
+        Self { pieces, kept: [0; KEPT].map(|_| (usize::MAX, Rc::new(Curve::none()))) }
     }
 
     pub fn get(&mut self, i: usize) -> &Rc<Curve<M>> {
-        let place = self.kept.iter().position(|(number, _)| *number == i).unwrap_or_else(|| {
-            self.kept.swap(0, 1);
-            let (number, curve) = &mut self.kept[0];
+        let (number, curve) = &mut self.kept[i % KEPT];
+        if *number != i {
             *number = i;
-            // In the memory of the piece before, unless somebody still has that.
+            // In the memory of another piece, unless somebody still has that.
             Rc::make_mut(curve).set(self.pieces.polygon(i), self.pieces.width[i]);
-            0
-        });
-        &self.kept[place].1
+        }
+        curve
     }
 }
 

@@ -83,13 +83,16 @@ impl Phases<'_> {
         self.piece.is_empty()
     }
 
-    /// Phases that follow each other on one piece, so many at most.
-    pub fn groups(&self, among: Range<usize>, most: usize) -> Vec<Range<usize>> {
-        let (mut groups, mut start) = (Vec::new(), among.start);
+    /// Phases that follow each other on one piece or several, so many of both at most.
+    pub fn groups(&self, among: Range<usize>, [most, most_pieces]: [usize; 2]) -> Vec<Range<usize>> {
+        let (mut groups, mut start, mut pieces) = (Vec::new(), among.start, 1);
         for i in among.start + 1..=among.end {
-            if i == among.end || i - start == most || self.piece[i] != self.piece[start] {
+            let is_next = i < among.end && self.piece[i] != self.piece[i - 1];
+            if i == among.end || i - start == most || (is_next && pieces == most_pieces) {
                 groups.push(start..i);
-                start = i;
+                (start, pieces) = (i, 1);
+            } else {
+                pieces += usize::from(is_next);
             }
         }
         groups
@@ -213,10 +216,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_group_has_phases_of_one_piece_and_no_more_than_so_many() {
+    fn a_group_has_no_more_phases_and_pieces_than_so_many() {
         let one = Phases::of_one(&[FEED], &[255], &[1.0], &[0.0, 1.0], &[1.0; 2]);
         let phases = Phases { piece: &[0, 0, 0, 1, 1, 1, 1, 1, 2], pieces: 3, ..one };
-        assert_eq!(phases.groups(1..9, 3), [1..3, 3..6, 6..8, 8..9]);
-        assert_eq!(phases.groups(2..4, 3), [2..3, 3..4]);
+        assert_eq!(phases.groups(1..9, [3, 1]), [1..3, 3..6, 6..8, 8..9]);
+        assert_eq!(phases.groups(2..4, [3, 1]), [2..3, 3..4]);
+        assert_eq!(phases.groups(0..9, [6, 2]), [0..6, 6..9]);
+        assert_eq!(phases.groups(0..9, [9, 2]), [0..8, 8..9]);
     }
 }

@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use super::chord::chord_error;
 use super::columns::{Columns, CHORD};
+use super::curve::KEPT;
 use super::parallel;
 use super::phase_jerk::Jerks;
 use super::phase_motion::{self, PhaseMotion, State};
@@ -20,7 +21,7 @@ use super::speed_by_length::is_same_speed;
 use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
-use at_once::{Looks, Places, PLACES};
+use at_once::{Looks, OnPiece, Places, PLACES};
 use by_length::{Look, Looker};
 
 /// Even intervals of a phase.
@@ -45,8 +46,8 @@ const MOST_HALVINGS: u32 = 200;
 /// Phases a thread takes at a time.
 const BLOCK: usize = 4096;
 
-/// Phases of a piece are looked at together, so many at most.
-const GROUP: usize = 32;
+/// Phases are looked at together, so many on so many pieces at most.
+const GROUP: [usize; 2] = [32, KEPT];
 
 /// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less.
 const FIRST: usize = 64;
@@ -206,26 +207,67 @@ impl<const M: usize> Audited<'_, M> {
 
     /// Finds the times of those phases of a group that cannot change the tally, where eight places of each and a bound of what lies
     /// between show that.
-    fn at_once(&self, group: &Range<usize>, columns: &mut Columns<M>, looks: &mut Looks, tally: &Tally<M>) {
-        let (phases, piece) = (self.phases, self.phases.piece[group.start] as usize);
+    fn at_once<'a>(
+        &self,
+        group: &Range<usize>,
+        columns: &mut Columns<'a, M>,
+        looks: &mut Looks<'a, M>,
+        tally: &Tally<M>,
+    ) {
+        let phases = self.phases;
+        looks.pieces.clear();
         looks.phases.clear();
-        looks.times.clear();
-        looks.times.resize(group.len(), None);
-        let Some(on) = (piece < phases.pieces).then(|| columns.together(piece)).flatten() else { return };
-        looks.phases.extend(group.clone().map(|i| {
+        let (mut last, mut is_known) = (None, false);
+        for i in group.clone() {
+            let piece = phases.piece[i] as usize;
+            if last != Some(piece) {
+                let on = (piece < phases.pieces).then(|| OnPiece::new(piece, columns)).flatten();
+                (last, is_known) = (Some(piece), on.is_some());
+                looks.pieces.extend(on);
+            }
+            let on = looks.pieces.last().filter(|_| is_known);
             let u = [phases.u0[i], phases.u1[i]];
             let is_cubic = phases.kind[i] != PATH_JERK && phases.is_by_length(i, columns);
-            let is_good = self.are_good[i] && is_order(u, on.curve.width());
-            (is_cubic && is_good).then(|| at_once::Phase {
+            let is_good = |on: &&OnPiece<M>| is_cubic && self.are_good[i] && is_order(u, on.width());
+            looks.phases.push(on.filter(is_good).map(|_| at_once::Phase {
+                piece: looks.pieces.len() - 1,
                 u,
                 p: [phases.p0[i], phases.p1[i]],
                 a: [phases.a0[i], phases.a1[i]],
                 held_sq: (phases.kind[i] == FEED).then(|| phases.value[i]),
-            })
-        }));
-        let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
+            }));
+        }
         let Columns { rates, per_least, .. } = &*columns;
-        Places { on: &on, rates, per_least, limits: self.limits, feeds, feeds_along }.look_at(looks, tally);
+        Places { rates, per_least, limits: self.limits }.look_at(looks, tally);
+        self.look_ahead(group, columns, looks);
+    }
+
+    /// Looks ahead at the ends of a group's phases that have to be looked at closer, and at those where two pieces meet.
+    fn look_ahead(&self, group: &Range<usize>, columns: &mut Columns<M>, looks: &mut Looks<M>) {
+        let phases = self.phases;
+        if columns.are_axes() {
+            return;
+        }
+        looks.ends.clear();
+        let meets_other = |i: usize| i > 0 && phases.piece[i - 1] != phases.piece[i];
+        let mut add = |i: usize, u: f64| {
+            if self.are_good[i] {
+                looks.ends.push((phases.piece[i] as usize, u));
+            }
+        };
+        for (i, time) in group.clone().zip(&looks.times) {
+            // The end of a piece is looked at together with the start of the next one.
+            if meets_other(i) {
+                add(i - 1, phases.u1[i - 1]);
+                add(i, phases.u0[i]);
+            }
+            if time.is_none() {
+                add(i, phases.u0[i]);
+                add(i, phases.u1[i]);
+            }
+        }
+        looks.ends.dedup();
+        columns.look_ahead_on_each(&looks.ends, &mut looks.room);
     }
 
     /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share

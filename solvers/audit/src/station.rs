@@ -37,6 +37,45 @@ pub struct Place<const M: usize, T = f64> {
     pub tip_slope: T,
 }
 
+impl<const M: usize, T: Number> Place<M, T> {
+    #[inline(always)]
+    pub fn kept(self) -> Place<M, T::Kept> {
+        Place {
+            piece: self.piece,
+            u: self.u.kept(),
+            tip: kept(self.tip),
+            position: self.position.kept(),
+            slope: self.slope.kept(),
+            way_slope: self.way_slope.kept(),
+            tip_slope: self.tip_slope.kept(),
+        }
+    }
+}
+
+impl<const M: usize> Station<M, Lanes> {
+    /// One of them.
+    pub fn of_lane(&self, lane: usize) -> Station<M> {
+        Station {
+            u: self.u[lane],
+            slope: self.slope[lane],
+            first: self.first.map(|of| of[lane]),
+            second: self.second.map(|of| of[lane]),
+            third: self.third.map(|of| of[lane]),
+            tip: self.tip[lane],
+            curvature: self.curvature[lane],
+        }
+    }
+}
+
+impl<const M: usize> Roundings<M, Lanes> {
+    /// One of them.
+    pub fn of_lane(&self, lane: usize) -> Roundings<M> {
+        let [first, second, third] =
+            [&self.first, &self.second, &self.third].map(|row| row.map(|of| of[lane]));
+        Roundings { first, second, third }
+    }
+}
+
 impl<const M: usize> Place<M, Lanes> {
     /// One of them.
     pub fn of_lane(&self, lane: usize) -> Place<M> {
@@ -156,6 +195,19 @@ impl<const M: usize, T: Number> Station<M, T> {
     }
 
     #[inline(always)]
+    pub fn kept(self) -> Station<M, T::Kept> {
+        Station {
+            u: self.u.kept(),
+            slope: self.slope.kept(),
+            first: kept(self.first),
+            second: kept(self.second),
+            third: kept(self.third),
+            tip: self.tip.kept(),
+            curvature: self.curvature.kept(),
+        }
+    }
+
+    #[inline(always)]
     pub fn velocity(&self, v: T) -> [T; M] {
         scaled(self.first, v)
     }
@@ -167,6 +219,11 @@ impl<const M: usize, T: Number> Station<M, T> {
 }
 
 impl<const M: usize, T: Number> Roundings<M, T> {
+    #[inline(always)]
+    pub fn kept(self) -> Roundings<M, T::Kept> {
+        Roundings { first: kept(self.first), second: kept(self.second), third: kept(self.third) }
+    }
+
     /// Of joints and their first three derivatives by u, and g with its first two, each with how wrong it may be. Where nothing is
     /// known of a derivative its rounding is as great as any number.
     #[inline(always)]

@@ -6,10 +6,12 @@
 
 use std::rc::Rc;
 
+use fearless_simd::{f64x8, SimdBase};
+
 use crate::curve::Curve;
 use crate::joints::formula::Argument;
 use crate::joints::path::Piece;
-use crate::number::{Lanes, Number};
+use crate::number::{in_wide_vectors, Lanes, Number};
 use crate::station::{Roundings, Station, STILL};
 
 /// A piece without weights, with what its columns are computed from. `room` of its functions is memory for the results of a formula.
@@ -39,6 +41,19 @@ impl<const M: usize> Together<'_, M> {
         [joints.way(&position, q), slope]
     }
 
+    /// The stations, also where the piece has no direction.
+    pub fn stations(&self, u: &Lanes, room: &mut [Lanes]) -> Station<M, Lanes> {
+        in_wide_vectors!(simd => self.station(f64x8::from_slice(simd, u), room).kept())
+    }
+
+    #[inline(always)]
+    fn station<T: Argument<Kept = Lanes>>(&self, u: T, room: &mut [Lanes]) -> Station<M, T> {
+        match &self.joints {
+            Some(joints) => joints.station(u, &self.curve.polynomial_jet(u), room),
+            None => Station::anywhere(u, &self.curve.polynomial_derivatives(u)),
+        }
+    }
+
     /// Derivative of the length of the path by u.
     #[inline(always)]
     pub fn speed<T: Number>(&self, u: T) -> T {
@@ -61,7 +76,7 @@ impl<const M: usize> Together<'_, M> {
         room: &mut [Lanes],
     ) -> (Station<M, T>, Roundings<M, T>) {
         if let Some(joints) = &self.joints {
-            return joints.rounded_stations(u, &self.curve.polynomial_jet(u), room);
+            return joints.rounded_stations(u, room);
         }
         let derivatives = self.curve.polynomial_derivatives(u);
         let station = Station::anywhere(u, &derivatives);

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::path::{JointPath, Piece};
-use crate::curve::{Curve, Curves};
+use crate::curve::{Curve, Curves, KEPT};
 use crate::number::Lanes;
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{length, vector_of};
@@ -12,17 +12,21 @@ use crate::vectors::{length, vector_of};
 /// a thousandth of the error that is allowed for a place: were the derivative ten times the estimate, the error would be a hundredth.
 const BEND_GROWS: f64 = 4.0;
 
+/// A station with its place and what of it may be rounding.
+type RoundedStation<const M: usize> = (Place<M>, Station<M>, Roundings<M>);
+
 pub struct JointColumns<'a, const M: usize> {
     pub of: &'a JointPath<'a>,
     room: Vec<f64>,
-    /// The last two pieces, the last one first.
-    pieces: [Option<Rc<Piece<'a, M>>>; 2],
-    /// The last place, the last station with its piece, and the last two whose rounding is known, the last one first.
+    /// The last pieces.
+    pieces: [Option<Rc<Piece<'a, M>>>; KEPT],
+    /// The last place, the last station with its piece, and the last two stations whose rounding is known, the last one first.
     last: Option<Place<M>>,
     known: Option<(usize, Station<M>)>,
-    /// Places ahead that have been computed at once.
+    rounded: [Option<RoundedStation<M>>; 2],
+    /// Places and stations ahead that have been computed at once.
     ahead: Vec<Place<M>>,
-    rounded: [Option<(usize, Station<M>, Roundings<M>)>; 2],
+    stations_ahead: Vec<RoundedStation<M>>,
 }
 
 impl<'a, const M: usize> JointColumns<'a, M> {
@@ -30,29 +34,26 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         Self {
             of,
             room: of.room(0.0),
-            pieces: [None, None],
+            pieces: [const { None }; KEPT],
             last: None,
             known: None,
-            ahead: vec![],
             rounded: [None, None],
+            ahead: vec![],
+            stations_ahead: vec![],
         }
     }
 
     /// A piece of the path, on its curve.
     pub fn piece(&mut self, number: usize, curve: &Rc<Curve<M>>) -> Rc<Piece<'a, M>> {
-        let is_here = |kept: &Option<Rc<Piece<M>>>| kept.as_ref().is_some_and(|piece| piece.number == number);
-        if !is_here(&self.pieces[0]) {
-            self.pieces.swap(0, 1);
-            if !is_here(&self.pieces[0]) {
-                self.pieces[0] = None;
-            }
-        }
-        self.pieces[0].get_or_insert_with(|| Rc::new(self.of.piece_on(number, curve.clone()))).clone()
+        let kept = &mut self.pieces[number % KEPT];
+        kept.take_if(|piece| piece.number != number);
+        kept.get_or_insert_with(|| Rc::new(self.of.piece_on(number, curve.clone()))).clone()
     }
 
     pub fn place(&mut self, curve: &Rc<Curve<M>>, piece: usize, u: f64) -> Place<M> {
         let is_here = |place: &&Place<M>| place.piece == piece && place.u == u;
-        let known = self.last.iter().find(is_here).or_else(|| self.ahead.iter().find(is_here)).copied();
+        let known = self.last.iter().chain(&self.ahead).find(is_here).copied();
+        let known = known.or_else(|| self.known_station(piece, u).map(|(place, ..)| place));
         let place = known.unwrap_or_else(|| self.piece(piece, curve).place(u, &mut self.room));
         self.last = Some(place);
         place
@@ -78,14 +79,34 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         piece: usize,
         u: f64,
     ) -> (Station<M>, Roundings<M>) {
-        let is_here = |(number, station, _): &&(usize, Station<M>, _)| *number == piece && station.u == u;
-        if let Some(&(_, station, roundings)) = self.rounded.iter().flatten().find(is_here) {
+        if let Some((_, station, roundings)) = self.known_station(piece, u) {
             return (station, roundings);
         }
-        let (place, station, roundings) = self.piece(piece, curve).rounded_station(u, &mut self.room);
+        let found = self.piece(piece, curve).rounded_station(u, &mut self.room);
+        let (place, station, roundings) = found;
         (self.last, self.known) = (Some(place), Some((piece, station)));
-        self.rounded = [Some((piece, station, roundings)), self.rounded[0]];
+        self.rounded = [Some(found), self.rounded[0]];
         (station, roundings)
+    }
+
+    fn known_station(&self, piece: usize, u: f64) -> Option<RoundedStation<M>> {
+        let is_here = |(place, ..): &&RoundedStation<M>| place.piece == piece && place.u == u;
+        self.rounded.iter().flatten().chain(&self.stations_ahead).find(is_here).copied()
+    }
+
+    /// Computes stations and their rounding, each on its piece, at once for later calls.
+    pub fn look_ahead_on_each(&mut self, at: &[(Rc<Piece<M>>, f64)], room: &mut [Lanes]) {
+        self.stations_ahead.clear();
+        for alike in at.chunk_by(|(a, _), (b, _)| a.is_like(b)) {
+            for part in alike.chunks(8) {
+                let lanes = std::array::from_fn(|lane| &part[lane.min(part.len() - 1)]);
+                let found = part[0].0.rounded_on_each(lanes.map(|(piece, u)| (&**piece, *u)), room);
+                self.stations_ahead.extend(part.iter().enumerate().map(|(lane, (piece, _))| {
+                    let place = Place { piece: piece.number, ..found.0.of_lane(lane) };
+                    (place, found.1.of_lane(lane), found.2.of_lane(lane))
+                }));
+            }
+        }
     }
 
     pub fn way(&mut self, curve: &Rc<Curve<M>>, from: &Place<M>, to: &Place<M>) -> Rounded<M> {

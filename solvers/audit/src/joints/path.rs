@@ -241,7 +241,7 @@ impl<const M: usize> Piece<'_, M> {
         &self,
         table: &mut [T::Kept],
         tip: &[[T; M]; N],
-        sizes: &[[f64; M]; E],
+        sizes: &[[T; M]; E],
     ) {
         let nothing = tip[0][0].filled(0.0);
         for (input, column) in self.words.column.iter().enumerate() {
@@ -251,7 +251,7 @@ impl<const M: usize> Piece<'_, M> {
                     jet.value[order] = tip[order][column];
                 }
                 for order in 0..E {
-                    jet.error[order] = nothing.filled(TIP_ROUNDINGS * sizes[order][column]);
+                    jet.error[order] = sizes[order][column] * TIP_ROUNDINGS;
                 }
             }
             jet.keep(table, input);
@@ -339,23 +339,14 @@ impl<const M: usize> Piece<'_, M> {
 
     #[inline(always)]
     fn look_at_places<T: Argument<Kept = Lanes>>(&self, u: T, room: &mut [Lanes]) -> Place<M, Lanes> {
-        let Place { piece, u, tip, position, slope, way_slope, tip_slope } =
-            self.place_by(u, &self.curve.polynomial_place(u), room);
-        Place {
-            piece,
-            u: u.kept(),
-            tip: kept(tip),
-            position: position.kept(),
-            slope: slope.kept(),
-            way_slope: way_slope.kept(),
-            tip_slope: tip_slope.kept(),
-        }
+        self.place_by(u, &self.curve.polynomial_place(u), room).kept()
     }
 
     /// The place, from the position and the slope of the tip.
     #[inline(always)]
     fn place_by<T: Argument>(&self, u: T, tip: &[[T; M]; 2], room: &mut [T::Kept]) -> Place<M, T> {
-        self.fill(room, tip, &[self.sizes[0], self.sizes[1]]);
+        let [point_sizes, slope_sizes, ..] = self.sizes_like(u);
+        self.fill(room, tip, &[point_sizes, slope_sizes]);
         let joints = [self.joint_rows::<2, 2, T>(room, 0, u), self.joint_rows::<2, 2, T>(room, 1, u)];
         self.place_of(u, tip, joints)
     }
@@ -380,26 +371,92 @@ impl<const M: usize> Piece<'_, M> {
 
     /// The same with the place, and what of it may be rounding.
     pub fn rounded_station(&self, u: f64, room: &mut [f64]) -> (Place<M>, Station<M>, Roundings<M>) {
-        let tip = self.curve.jet(u);
-        let bends = self.bends::<4, 3, f64>(room, &tip, &self.sizes);
-        let ([position, q1, ..], _) = &bends;
-        (
-            self.place_of(u, &[tip[0], tip[1]], [*position, *q1]),
-            self.station_of(u, &tip, &bends),
-            Roundings::of_joints(&bends.0, &bends.1),
-        )
+        self.rounded_by(u, &self.curve.jet(u), &self.sizes, room)
     }
 
     /// The same at places on a piece without weights.
     #[inline(always)]
-    pub fn rounded_stations<T: Argument>(
+    pub fn rounded_stations<T: Argument<Kept = Lanes>>(
+        &self,
+        u: T,
+        room: &mut [Lanes],
+    ) -> (Station<M, T>, Roundings<M, T>) {
+        let (_, station, roundings) =
+            self.rounded_by(u, &self.curve.polynomial_jet(u), &self.sizes_like(u), room);
+        (station, roundings)
+    }
+
+    /// The same at one place of this piece, or of another one that is like it, in each lane.
+    pub fn rounded_on_each(
+        &self,
+        on: [(&Self, f64); 8],
+        room: &mut [Lanes],
+    ) -> (Place<M, Lanes>, Station<M, Lanes>, Roundings<M, Lanes>) {
+        let (mut tip, mut sizes) = ([[[0.0; 8]; M]; 4], [[[0.0; 8]; M]; 4]);
+        for (lane, (piece, u)) in on.iter().enumerate() {
+            let jet = piece.curve.jet(*u);
+            for order in 0..4 {
+                for k in 0..M {
+                    tip[order][k][lane] = jet[order][k];
+                    sizes[order][k][lane] = piece.sizes[order][k];
+                }
+            }
+        }
+        let u = on.map(|(_, u)| u);
+        in_wide_vectors!(simd => self.look_on_each(f64x8::from_slice(simd, &u), &tip, &sizes, room))
+    }
+
+    #[inline(always)]
+    fn look_on_each<T: Argument<Kept = Lanes>>(
+        &self,
+        u: T,
+        tip: &[[Lanes; M]; 4],
+        sizes: &[[Lanes; M]; 4],
+        room: &mut [Lanes],
+    ) -> (Place<M, Lanes>, Station<M, Lanes>, Roundings<M, Lanes>) {
+        let (mut tips, mut of_tips) = ([[u; M]; 4], [[u; M]; 4]);
+        for order in 0..4 {
+            for k in 0..M {
+                tips[order][k] = u.taken(&tip[order][k]);
+                of_tips[order][k] = u.taken(&sizes[order][k]);
+            }
+        }
+        let (place, station, roundings) = self.rounded_by(u, &tips, &of_tips, room);
+        (place.kept(), station.kept(), roundings.kept())
+    }
+
+    /// Whether the joints and the feed are the same functions of the tool's path as on another piece.
+    pub fn is_like(&self, other: &Self) -> bool {
+        std::ptr::eq(self.words, other.words) && self.counts == other.counts && self.turns == other.turns
+    }
+
+    /// The magnitudes to which the roundings of the tip are relative; `like` has the places of their numbers.
+    #[inline(always)]
+    fn sizes_like<T: Number>(&self, like: T) -> [[T; M]; 4] {
+        let mut sizes = [[like; M]; 4];
+        for order in 0..4 {
+            for k in 0..M {
+                sizes[order][k] = like.filled(self.sizes[order][k]);
+            }
+        }
+        sizes
+    }
+
+    #[inline(always)]
+    fn rounded_by<T: Argument>(
         &self,
         u: T,
         tip: &[[T; M]; 4],
+        sizes: &[[T; M]; 4],
         room: &mut [T::Kept],
-    ) -> (Station<M, T>, Roundings<M, T>) {
-        let bends = self.bends::<4, 3, T>(room, tip, &self.sizes);
-        (self.station_of(u, tip, &bends), Roundings::of_joints(&bends.0, &bends.1))
+    ) -> (Place<M, T>, Station<M, T>, Roundings<M, T>) {
+        let bends = self.bends::<4, 3, T>(room, tip, sizes);
+        let ([position, q1, ..], way) = &bends;
+        (
+            self.place_of(u, &[tip[0], tip[1]], [*position, *q1]),
+            self.station_of(u, tip, &bends),
+            Roundings::of_joints(&bends.0, way),
+        )
     }
 
     #[inline(always)]
@@ -419,7 +476,7 @@ impl<const M: usize> Piece<'_, M> {
         &self,
         table: &mut [T::Kept],
         tip: &[[T; M]; 4],
-        sizes: &[[f64; M]; E],
+        sizes: &[[T; M]; E],
     ) -> Bends<M, W, T> {
         self.fill(table, tip, sizes);
         let like = tip[0][0];
@@ -435,7 +492,7 @@ impl<const M: usize> Piece<'_, M> {
                 axis.value[order] = tip[order + 1][k] * scale;
             }
             for order in 0..W {
-                axis.error[order] = like.filled(TIP_ROUNDINGS * scale * sizes[order + 1][k]);
+                axis.error[order] = sizes[order + 1][k] * (TIP_ROUNDINGS * scale);
             }
             let own = axis.times(&axis);
             for order in 0..3 {

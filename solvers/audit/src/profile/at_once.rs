@@ -1,6 +1,6 @@
-//! Tells which of some phases of a piece can change what was found: eight phases at once, in the vectors of the processor.
+//! Tells which of some phases can change what was found: eight phases at once, in the vectors of the processor.
 //!
-//! Each is looked at in eight places, the nodes of Lobatto's rule (Abramowitz and Stegun 25.4.32), both ends among them. |C'| there
+//! They may be on several pieces. Each is looked at in eight places, the nodes of Lobatto's rule (Abramowitz and Stegun 25.4.32), both ends among them. |C'| there
 //! gives the lengths up to all of them by the polynomial through them, v² by the length gives speed, acceleration and jerk along the
 //! path, the derivatives of C those of all axes. Where no place uses more of a limit than was found before, nor a parabola between two
 //! of them and the polynomial half-way, nothing needs to be looked at closer. As in `by_length`, of which these are fewer places,
@@ -11,9 +11,10 @@ use fearless_simd::{f64x8, mask64x8, Select, Simd, SimdBase, SimdFloat, SimdMask
 
 use crate::bulge::{bulge, Bulge, Known};
 use crate::chord::chord_error;
-use crate::columns::RATES;
-use crate::number::{in_wide_vectors, inner, Lanes, Number};
+use crate::columns::{Columns, RATES};
+use crate::number::{in_wide_vectors, Lanes, Number};
 use crate::speed_by_length::{cubic_bounds, is_same_speed, Pace, SpeedByLength};
+use crate::station::{Station, STILL};
 use crate::together::Together;
 use crate::{Check, Limits, Sided, Tally, FEEDS};
 
@@ -129,9 +130,6 @@ const LONGEST: f64 = SHARES[4] - SHARES[3];
 /// Next to rest, where v² at one end is below this part of that at the other one, the length leaves too few digits of it.
 const SLOW_SQ: f64 = 1e-4;
 
-/// Where |C'| is below this share of its size the piece has no direction to speak of.
-const STILL: f64 = 1e-6;
-
 /// A part of a phase of joints, of which nothing bounds what lies between the places, has no more than this part of its piece in degrees:
 /// as close to each other are the places that `by_length` looks at.
 const MOST_TURNED: f64 = 7.0 / 3.0;
@@ -143,6 +141,8 @@ const MOST_HALVINGS: u32 = 4;
 /// constant, its value, of which p is another record.
 #[derive(Clone, Copy)]
 pub struct Phase {
+    /// The number of its piece among those of the phases that are looked at.
+    pub piece: usize,
     pub u: [f64; 2],
     pub p: [f64; 2],
     pub a: [f64; 2],
@@ -176,82 +176,72 @@ struct Found {
     whole: Lanes,
 }
 
-/// Phases of a piece, those that can be looked at at once, and the times of those of them that change nothing.
-#[derive(Default)]
-pub struct Looks {
+/// A piece without weights, and what holds on it.
+pub struct OnPiece<'a, const M: usize> {
+    on: Together<'a, M>,
+    feeds: [f64; FEEDS],
+    feeds_along: [bool; FEEDS],
+    /// See `Curve`.
+    bounds: [f64; 4],
+    moves: [f64; M],
+}
+
+/// Consecutive phases, those that can be looked at at once, and the times of those of them that change nothing.
+pub struct Looks<'a, const M: usize> {
+    pub pieces: Vec<OnPiece<'a, M>>,
     pub phases: Vec<Option<Phase>>,
     pub times: Vec<Option<f64>>,
     /// Parts of them that have not been looked at.
     open: Vec<Part>,
+    /// Ends of them that are looked at closer, each with its piece.
+    pub ends: Vec<(usize, f64)>,
     /// See `Columns::room`.
-    room: Vec<Lanes>,
+    pub room: Vec<Lanes>,
 }
 
-impl Looks {
-    /// Without any phases.
-    pub fn new(room: Vec<Lanes>) -> Self {
-        Self { room, ..Self::default() }
-    }
-}
-
-/// What holds on the piece of the phases.
-pub struct Places<'a, 'b, const M: usize> {
-    pub on: &'a Together<'b, M>,
+/// The limits.
+pub struct Places<'a, const M: usize> {
     /// See `Columns`.
     pub rates: &'a [[Sided<M>; 2]; 3],
     pub per_least: &'a [[f64; M]; 3],
     pub limits: &'a Limits<M>,
-    pub feeds: [f64; FEEDS],
-    pub feeds_along: [bool; FEEDS],
 }
 
-impl<const M: usize> Places<'_, '_, M> {
-    /// Finds the times of those phases that cannot change the tally, by their laws.
-    pub fn look_at(&self, Looks { phases, times, open, room }: &mut Looks, tally: &Tally<M>) {
-        times.clear();
-        times.extend(phases.iter().map(|phase| phase.map(|_| 0.0)));
-        open.clear();
-        for (number, phase) in phases.iter().enumerate() {
-            let (ends, speed_sq, whole) = ([0.0, f64::NAN], [f64::NAN; 2], f64::NAN);
-            open.extend(phase.map(|Phase { u, .. }| Part {
-                number,
-                u,
-                ends,
-                speed_sq,
-                whole,
-                halvings: MOST_HALVINGS,
-            }));
+impl<'a, const M: usize> OnPiece<'a, M> {
+    /// None for a piece with weights, and in narrow vectors.
+    pub fn new(piece: usize, columns: &mut Columns<'a, M>) -> Option<Self> {
+        let on = columns.together(piece)?;
+        let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
+        let (bounds, moves) = (on.curve.bounds(), on.curve.derivative_size());
+        Some(Self { on, feeds, feeds_along, bounds, moves })
+    }
+
+    pub fn width(&self) -> f64 {
+        self.on.curve.width()
+    }
+
+    /// The widest part of a phase that is looked at, which of axes may be anything.
+    fn widest(&self) -> f64 {
+        match self.on.joints {
+            Some(_) => MOST_TURNED / self.on.curve.turns() as f64 * self.width(),
+            None => f64::INFINITY,
         }
-        let Some((&any, Some(phase))) = open.last().map(|part| (part, &phases[part.number])) else { return };
-        let (mut parts, mut lanes, widest) = ([any; PHASES], [phase; PHASES], self.widest());
-        loop {
-            // Halves of parts that were open, and other phases.
-            let mut count = 0;
-            while let Some(part) = if count < PHASES { open.pop() } else { None } {
-                if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
-                    if part.u[1] - part.u[0] > widest {
-                        let halves = self.halve((&part, phase), None, open);
-                        times[part.number] = times[part.number].filter(|_| halves.is_some());
-                        continue;
-                    }
-                    (parts[count], lanes[count], count) = (part, phase, count + 1);
-                }
-            }
-            if count == 0 {
-                return;
-            }
-            let found = in_wide_vectors!(simd => self.look(simd, (&parts, &lanes), tally, room));
-            for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
-                let sum = times[part.number];
-                times[part.number] = if found.verdict[i] == NOTHING {
-                    sum.zip(part.time(phase, &found, i)).map(|(sum, time)| sum + time)
-                } else if found.verdict[i] == OPEN {
-                    sum.filter(|_| self.halve((part, phase), Some((&found, i)), open).is_some())
-                } else {
-                    None
-                };
-            }
+    }
+
+    /// Derivatives of the length by u.
+    fn speeds<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
+        self.on.curve.speeds(u, &self.on.scale.unwrap_or([1.0; M]))
+    }
+
+    /// The length between two parameters.
+    fn length(&self, [from, to]: [f64; 2], halvings: u32) -> Option<f64> {
+        let width = to - from;
+        let (length, doubts) = integral(&self.speeds(SHARES.map(|share| from + share * width)));
+        if doubts.iter().all(|&doubt| doubt <= RULES_AGREE * length) {
+            return Some(length * width);
         }
+        let (middle, halvings) = (0.5 * (from + to), halvings.checked_sub(1)?);
+        Some(self.length([from, middle], halvings)? + self.length([middle, to], halvings)?)
     }
 
     /// Adds both halves of a part; what was found of it, if it has been looked at.
@@ -279,30 +269,67 @@ impl<const M: usize> Places<'_, '_, M> {
         open.push(half([part.u[0], middle], [start, f64::NAN]));
         Some(())
     }
+}
 
-    /// The widest part of a phase that is looked at, which of axes may be anything.
-    fn widest(&self) -> f64 {
-        let curve = &self.on.curve;
-        match self.on.joints {
-            Some(_) => MOST_TURNED / curve.turns() as f64 * curve.width(),
-            None => f64::INFINITY,
-        }
+impl<const M: usize> Looks<'_, M> {
+    /// Without any phases.
+    pub fn new(room: Vec<Lanes>) -> Self {
+        Self { pieces: vec![], phases: vec![], times: vec![], open: vec![], ends: vec![], room }
     }
+}
 
-    /// Derivatives of the length by u.
-    fn speeds<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
-        self.on.curve.speeds(u, &self.on.scale.unwrap_or([1.0; M]))
-    }
-
-    /// The length between two parameters.
-    fn length(&self, [from, to]: [f64; 2], halvings: u32) -> Option<f64> {
-        let width = to - from;
-        let (length, doubts) = integral(&self.speeds(SHARES.map(|share| from + share * width)));
-        if doubts.iter().all(|&doubt| doubt <= RULES_AGREE * length) {
-            return Some(length * width);
+impl<const M: usize> Places<'_, M> {
+    /// Finds the times of those phases that cannot change the tally, by their laws.
+    pub fn look_at(&self, looks: &mut Looks<M>, tally: &Tally<M>) {
+        let Looks { pieces, phases, times, open, room, .. } = looks;
+        times.clear();
+        times.extend(phases.iter().map(|phase| phase.map(|_| 0.0)));
+        open.clear();
+        for (number, phase) in phases.iter().enumerate() {
+            let (ends, speed_sq, whole) = ([0.0, f64::NAN], [f64::NAN; 2], f64::NAN);
+            open.extend(phase.map(|Phase { u, .. }| Part {
+                number,
+                u,
+                ends,
+                speed_sq,
+                whole,
+                halvings: MOST_HALVINGS,
+            }));
         }
-        let (middle, halvings) = (0.5 * (from + to), halvings.checked_sub(1)?);
-        Some(self.length([from, middle], halvings)? + self.length([middle, to], halvings)?)
+        let Some((&any, Some(phase))) = open.last().map(|part| (part, &phases[part.number])) else { return };
+        let (mut parts, mut lanes, mut on) = ([any; PHASES], [phase; PHASES], [&pieces[phase.piece]; PHASES]);
+        let mut stations = [on[0].on.stations(&[any.u[0]; PLACES], room); PHASES];
+        loop {
+            // Halves of parts that were open, and other phases.
+            let mut count = 0;
+            while let Some(part) = if count < PHASES { open.pop() } else { None } {
+                if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
+                    let piece = &pieces[phase.piece];
+                    if part.u[1] - part.u[0] > piece.widest() {
+                        let halves = piece.halve((&part, phase), None, open);
+                        times[part.number] = times[part.number].filter(|_| halves.is_some());
+                        continue;
+                    }
+                    let width = part.u[1] - part.u[0];
+                    stations[count] = piece.on.stations(&SHARES.map(|share| part.u[0] + width * share), room);
+                    (parts[count], lanes[count], on[count], count) = (part, phase, piece, count + 1);
+                }
+            }
+            if count == 0 {
+                return;
+            }
+            let found = in_wide_vectors!(simd => self.look(simd, (&parts, &lanes, &on), &stations, tally));
+            for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
+                let sum = times[part.number];
+                times[part.number] = if found.verdict[i] == NOTHING {
+                    sum.zip(part.time(phase, &found, i)).map(|(sum, time)| sum + time)
+                } else if found.verdict[i] == OPEN {
+                    sum.filter(|_| on[i].halve((part, phase), Some((&found, i)), open).is_some())
+                } else {
+                    None
+                };
+            }
+        }
     }
 
     /// Looks at parts of phases.
@@ -310,35 +337,21 @@ impl<const M: usize> Places<'_, '_, M> {
     fn look<S: Simd>(
         &self,
         simd: S,
-        (parts, phases): (&[Part; PHASES], &[&Phase; PHASES]),
+        (parts, phases, on): (&[Part; PHASES], &[&Phase; PHASES], &[&OnPiece<M>; PHASES]),
+        stations: &[Station<M, Lanes>; PHASES],
         tally: &Tally<M>,
-        room: &mut [Lanes],
     ) -> Found {
         let all = |x: f64| f64x8::splat(simd, x);
-        let nothing = all(0.0);
-        let from = of_each(simd, parts, |part| part.u[0]);
-        let width = of_each(simd, parts, |part| part.u[1]) - from;
-        // Whatever they are before: nothing would be written by a call.
-        let (mut derivatives, mut slope) = ([[[width; M]; 3]; PLACES], [width; PLACES]);
-        let (curve, mut tool) = (&self.on.curve, [[width; 2]; PLACES]);
-        if let Some(joints) = &self.on.joints {
-            for i in 0..PLACES {
-                let u = from + width * SHARES[i];
-                let station = joints.station(u, &curve.polynomial_jet(u), room);
-                derivatives[i] = [station.first, station.second, station.third];
-                (slope[i], tool[i]) = (station.slope, [station.tip, station.curvature]);
-            }
-        } else {
-            for i in 0..PLACES {
-                derivatives[i] = curve.polynomial_derivatives(from + width * SHARES[i]);
-                slope[i] = inner(&derivatives[i][0], &derivatives[i][0]).sqrt();
-            }
+        let (nothing, are_axes) = (all(0.0), on[0].on.joints.is_none());
+        let width = of_each(simd, parts, |part| part.u[1]) - of_each(simd, parts, |part| part.u[0]);
+        let mut slope = [width; PLACES];
+        for i in 0..PLACES {
+            slope[i] = of_each(simd, stations, |at| at.slope[i]);
         }
-        let are_axes = self.on.joints.is_none();
         let slopes = [joined(&slope, f64x8::min), joined(&slope, f64x8::max)];
         let (share, doubts) = integral(&slope);
         let is_good = agree(share, doubts);
-        let is_still = slopes[0].simd_le(all(STILL * curve.size_lengths()[0]));
+        let is_still = slopes[0].simd_le(of_each(simd, on, |piece| piece.on.curve.size_lengths()[0]) * STILL);
         let length = share * width;
         // The motion along the path.
         let ends: [Lanes; 2] = [(slope[0] * slope[0]).into(), (slope[PLACES - 1] * slope[PLACES - 1]).into()];
@@ -367,8 +380,8 @@ impl<const M: usize> Places<'_, '_, M> {
         let before = start.simd_eq(start).select(start, end - length);
         let per_whole = 1.0 / whole;
         let (per_slope, per_bend) = (per_whole * 0.5, per_whole * per_whole * 0.5);
-        // Speeds, squares of curvatures, and the rates of the axes.
-        let (mut v, mut slowness, mut second_sq, mut third_sq) = (slope, slope, slope, nothing);
+        // Speeds, curvatures, and the rates of the axes.
+        let (mut v, mut slowness, mut curvature, mut third_sq) = (slope, slope, slope, nothing);
         let mut rates = [[[width; PLACES]; M]; 3];
         let mut paces = [Pace { v: nothing, a: nothing, j: nothing }; PLACES];
         for i in 0..PLACES {
@@ -384,51 +397,40 @@ impl<const M: usize> Places<'_, '_, M> {
             let j = per_bend * v[i] * (c[2] * 2.0 + x * (c[3] * 6.0));
             paces[i] = Pace { v: v[i], a, j };
             slowness[i] = slope[i] / v[i];
-            // The derivatives by the length; see `Station`.
-            let ([c1, c2, c3], per) = (&derivatives[i], 1.0 / slope[i]);
-            let (per2, square, mixed) = (per * per, v[i] * v[i], v[i] * a * 3.0);
-            let (per3, cube) = (per2 * per, square * v[i]);
-            if !are_axes {
-                for k in 0..M {
-                    rates[0][k][i] = c1[k] * v[i];
-                    rates[1][k][i] = c1[k] * a + c2[k] * square;
-                    rates[2][k][i] = c1[k] * j + c2[k] * mixed + c3[k] * cube;
-                }
-                (v[i], second_sq[i]) = (v[i] * tool[i][0], tool[i][1] * tool[i][1]);
-                continue;
-            }
-            let mut first = [nothing; M];
+            let (square, mixed, mut sum) = (v[i] * v[i], v[i] * a * 3.0, nothing);
+            let cube = square * v[i];
             for k in 0..M {
-                first[k] = c1[k] * per;
+                let first = of_each(simd, stations, |at| at.first[k][i]);
+                let second = of_each(simd, stations, |at| at.second[k][i]);
+                let third = of_each(simd, stations, |at| at.third[k][i]);
+                sum += third * third;
+                rates[0][k][i] = first * v[i];
+                rates[1][k][i] = first * a + second * square;
+                rates[2][k][i] = first * j + second * mixed + third * cube;
             }
-            let (along2, along3) = (inner(&first, c2), inner(&first, c3));
-            let mut across = [nothing; M];
-            for k in 0..M {
-                across[k] = c2[k] - along2 * first[k];
-            }
-            let along = along3 + inner(&across, &across) * per;
-            let (bent, mut sums) = (along2 * per * 3.0, [nothing; 2]);
-            for k in 0..M {
-                let second = across[k] * per2;
-                let third = (c3[k] - bent * across[k] - along * first[k]) * per3;
-                sums[0] += second * second;
-                sums[1] += third * third;
-                rates[0][k][i] = first[k] * v[i];
-                rates[1][k][i] = first[k] * a + second * square;
-                rates[2][k][i] = first[k] * j + second * mixed + third * cube;
-            }
-            (second_sq[i], third_sq) = (sums[0], third_sq.max(sums[1]));
+            third_sq = third_sq.max(sum);
+            v[i] *= of_each(simd, stations, |at| at.tip[i]);
+            curvature[i] = of_each(simd, stations, |at| at.curvature[i]);
         }
         let (time, doubts) = integral(&slowness);
         let time = agree(time, doubts).select(time * width, all(f64::NAN));
-        let known = Known {
-            interval: width * LONGEST,
-            slopes,
-            second: joined(&second_sq, f64x8::max).sqrt(),
-            third: third_sq.sqrt(),
-            paces: cubic_bounds([&paces[0], &paces[PLACES - 1]], length),
+        let most_curved = joined(&curvature, f64x8::max);
+        let bulge = if are_axes {
+            let mut bounds = [nothing; 4];
+            for order in 0..4 {
+                bounds[order] = of_each(simd, on, |piece| piece.bounds[order]);
+            }
+            let known = Known {
+                interval: width * LONGEST,
+                slopes,
+                second: most_curved,
+                third: third_sq.sqrt(),
+                paces: cubic_bounds([&paces[0], &paces[PLACES - 1]], length),
+            };
+            bulge(bounds, &known)
+        } else {
+            Bulge::unknown(width)
         };
-        let bulge = if are_axes { bulge(curve.bounds(), &known) } else { Bulge::unknown(width) };
         let is_bounded = bulge.slope.simd_gt(nothing);
         let (nothing_more, open, more) = (all(NOTHING), all(OPEN), all(MORE));
         let is_refused = first.simd_ne(first);
@@ -439,58 +441,63 @@ impl<const M: usize> Places<'_, '_, M> {
         let mut find = |found: f64x8<S>| verdict = verdict.simd_eq(nothing).select(found, verdict);
         // How far what lies between two places may be off the straight line, in parts of a limit; where nothing bounds it, that is told
         // by the polynomial through the places.
-        let off = |rate: f64x8<S>, per: f64| are_axes.then(|| rate * per);
+        let off = |rate: f64x8<S>, per: f64x8<S>| are_axes.then(|| rate * per);
         // The limits of the axes.
-        let (moves, judged) = (curve.derivative_size(), if self.limits.judges_jerk { 3 } else { 2 });
+        let judged = if self.limits.judges_jerk { 3 } else { 2 };
         for row in (0..judged).rev() {
             let worst = tally.ratios(RATES[row]);
             let (per, per_least) = (&self.rates[row][1], &self.per_least[row]);
-            for k in (0..self.limits.axes).filter(|&k| moves[k] > 0.0 || !are_axes) {
+            for k in 0..self.limits.axes {
+                // What does not move on a piece stays on the straight line.
+                let moves = |piece: &&OnPiece<M>| !are_axes || piece.moves[k] > 0.0;
+                if !on.iter().any(moves) {
+                    continue;
+                }
+                let per_least = of_each(simd, on, |piece| if moves(piece) { per_least[k] } else { 0.0 });
                 // No axis is faster than the tool.
-                if row == 0 && are_all((bulge.most_speed * per_least[k]).simd_le(all(worst[k]))) {
+                if row == 0 && are_all((bulge.most_speed * per_least).simd_le(all(worst[k]))) {
                     continue;
                 }
                 let (positive, negative) = (all(per.positive[k]), all(per.negative[k]));
                 let use_of = |rate: f64x8<S>| rate * rate.simd_lt(nothing).select(negative, positive);
-                find(verdict_of(&rates[row][k], use_of, off(bulge.rates[row], per_least[k]), worst[k]));
+                find(verdict_of(&rates[row][k], use_of, off(bulge.rates[row], per_least), worst[k]));
             }
         }
         let worst = |check: Check| tally.get(check, 0).ratio;
-        for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-            let (per, worst) = (1.0 / limit, worst(Check::Feed));
+        for feed in (0..FEEDS).filter(|&feed| on.iter().any(|piece| piece.feeds[feed] != f64::INFINITY)) {
+            let (per, worst) = (1.0 / of_each(simd, on, |piece| piece.feeds[feed]), worst(Check::Feed));
             // No share of the speed along the path is greater than that speed.
             if are_all((bulge.most_speed * per).simd_le(all(worst))) {
                 continue;
             }
             let mut speed = v;
-            if !self.feeds_along[feed] {
-                for i in 0..PLACES {
-                    let mut square = nothing;
-                    for k in 0..M {
-                        let counted = rates[0][k][i] * self.limits.feed_axes[feed][k];
-                        square += counted * counted;
-                    }
-                    speed[i] = square.sqrt();
+            let is_across = of_each(simd, on, |piece| if piece.feeds_along[feed] { 0.0 } else { 1.0 });
+            let is_across = is_across.simd_gt(nothing);
+            for i in 0..if is_any(is_across) { PLACES } else { 0 } {
+                let mut square = nothing;
+                for k in 0..M {
+                    let counted = rates[0][k][i] * self.limits.feed_axes[feed][k];
+                    square += counted * counted;
                 }
+                speed[i] = is_across.select(square.sqrt(), v[i]);
             }
             find(verdict_of(&speed, |v| v * per, off(bulge.rates[0], per), worst));
         }
         if self.limits.chord_tolerance.is_finite() && !are_axes {
             let (mut error, per) = (v, 1.0 / self.limits.chord_tolerance);
             for i in 0..PLACES {
-                error[i] = chord_error(v[i] * self.limits.period, tool[i][1]);
+                error[i] = chord_error(v[i] * self.limits.period, curvature[i]);
             }
             find(verdict_of(&error, |error| error * per, None, worst(Check::Chord)));
         } else if self.limits.chord_tolerance.is_finite() {
             let (period, most) = (self.limits.period, all(worst(Check::Chord) * self.limits.chord_tolerance));
-            let mut are_low =
-                are_chords_low(bulge.most_speed, joined(&second_sq, f64x8::max), &bulge, period, most);
+            let mut are_low = are_chords_low(bulge.most_speed, most_curved, &bulge, period, most);
             if !are_all(are_low) {
                 // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
                 let mut are_steps_low = nothing.simd_eq(nothing);
                 for i in 0..PLACES - 1 {
-                    let (fastest, curvature_sq) = (v[i].max(v[i + 1]), second_sq[i].max(second_sq[i + 1]));
-                    are_steps_low &= are_chords_low(fastest, curvature_sq, &bulge, period, most);
+                    let (fastest, curved) = (v[i].max(v[i + 1]), curvature[i].max(curvature[i + 1]));
+                    are_steps_low &= are_chords_low(fastest, curved, &bulge, period, most);
                 }
                 are_low |= are_steps_low;
             }
@@ -601,17 +608,17 @@ fn verdict_of<S: Simd>(
     are_low.select(all(NOTHING), verdict)
 }
 
-/// Where chords at this speed and this square of the curvature, and at what lies between the places, are not above `most`.
+/// Where chords at this speed and this curvature, and at what lies between the places, are not above `most`.
 #[inline(always)]
 fn are_chords_low<S: Simd>(
     fastest: f64x8<S>,
-    curvature_sq: f64x8<S>,
+    curvature: f64x8<S>,
     between: &Bulge<f64x8<S>>,
     period: f64,
     most: f64x8<S>,
 ) -> mask64x8<S> {
     let fastest = (fastest + between.rates[0]).min(between.most_speed);
-    chord_error(fastest * period, curvature_sq.sqrt() + between.curvature).simd_le(most)
+    chord_error(fastest * period, curvature + between.curvature).simd_le(most)
 }
 
 /// The integral over the phase, its width being 1, and by how much each of three rules is in doubt of it.
@@ -730,11 +737,14 @@ mod tests {
         has_joints: bool,
     ) -> (Option<f64>, f64, [[f64; 2]; 3]) {
         let degree = control.len() / 2 - 1;
-        let (offsets, width) = ([0, degree + 1], [degree as f64]);
+        // The second piece is a line.
+        let control = &[control, &[-5.0, 2.0, -4.0, 2.0]].concat();
+        let (offsets, width) = ([0, degree + 1, degree + 3], [degree as f64, 1.0]);
         let pieces = Pieces { axes: 2, stride: 2, control, weights: &[], offsets: &offsets, width: &width };
-        let (path, free) = (Followed::of_one(pieces), Limits::none());
+        let feed = &[f64::INFINITY; 2 * FEEDS];
+        let (path, free) = (Followed { feed, runs: &[0, 2], ..Followed::of_one(pieces) }, Limits::none());
         let words = Words::polar();
-        let joints = JointPath::of_one(path, &words, &[1.0]);
+        let joints = JointPath::of_one(path, &words, &[1.0; 2]);
         let joints = has_joints.then_some(&joints);
         let mut columns = Columns::new(&path, &free, joints);
         let p = [0, 1].map(|i| (speeds[i] / columns.station(0, u[i]).unwrap().slope).powi(2));
@@ -768,15 +778,18 @@ mod tests {
         }
         tally.offer(Check::Feed, 0, worst(Check::Feed, 0), 1.0, 0.0, 1);
         tally.offer(Check::Chord, 0, worst(Check::Chord, 0) * farthest, farthest, 0.0, 1);
-        let (feeds, feeds_along) = ([fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY], [true; FEEDS]);
+        let feeds = [fastest, f64::INFINITY, f64::INFINITY, f64::INFINITY];
         let mut columns = Columns::new(&path, &limits, joints);
-        let on = &columns.together(0).expect("a piece without weights, in wide vectors");
-        let Columns { rates, per_least, .. } = &columns;
-        let places = Places { on, rates, per_least, limits: &limits, feeds, feeds_along };
-        // Beside other phases and alone it has the same answer; halves are added in another order.
-        let phase = Some(Phase { u, p, a, held_sq: None });
-        let gentle = Some(Phase { u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
         let mut looks = Looks::new(columns.room());
+        for piece in 0..2 {
+            let on = OnPiece::new(piece, &mut columns).expect("a piece without weights, in wide vectors");
+            looks.pieces.push(OnPiece { feeds, ..on });
+        }
+        let Columns { rates, per_least, .. } = &columns;
+        let places = Places { rates, per_least, limits: &limits };
+        // Beside other phases and alone it has the same answer; halves are added in another order.
+        let phase = Some(Phase { piece: 0, u, p, a, held_sq: None });
+        let gentle = Some(Phase { piece: 1, u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
         let mut found_of = |phases: &[Option<Phase>]| {
             looks.phases = phases.to_vec();
             places.look_at(&mut looks, &tally);
@@ -821,7 +834,7 @@ mod tests {
 
     #[test]
     fn a_speed_that_is_held_has_both_records_of_it() {
-        let phase = |p: f64| Phase { u: [0.0, 1.0], p: [4.0, p], a: [0.0; 2], held_sq: Some(16.0) };
+        let phase = |p: f64| Phase { piece: 0, u: [0.0, 1.0], p: [4.0, p], a: [0.0; 2], held_sq: Some(16.0) };
         assert_eq!(phase(1.0).speed_sq([4.0, 16.0]), Some([16.0; 2]));
         assert_eq!(phase(1.0 + 1e-13).speed_sq([4.0, 16.0]), None);
     }
