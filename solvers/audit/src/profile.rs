@@ -47,10 +47,11 @@ const MOST_HALVINGS: u32 = 200;
 const BLOCK: usize = 4096;
 
 /// Phases are looked at together, so many on so many pieces at most.
-const GROUP: [usize; 2] = [32, KEPT];
+const GROUP: [usize; 2] = [16, KEPT];
 
-/// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less.
-const FIRST: usize = 64;
+/// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less. Where the use of
+/// a limit grows from phase to phase, each phase uses more than was found before: of fewer groups less would be known.
+const FIRST: usize = 8;
 
 /// What is measured on which path.
 pub struct Audited<'a, const M: usize> {
@@ -71,25 +72,34 @@ pub fn audit_profile<'a, const M: usize>(
     seen: Seen,
 ) -> Tally<M> {
     let phases = of.phases;
-    let inside = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
+    let known = parallel::tally(&Tally::default(), phases.len(), BLOCK, &|block, tally| {
         let mut columns = columns();
         let mut looks = Looks::new(columns.room());
-        let first = block.start;
-        let groups = phases.groups(block, GROUP);
-        for group in groups.iter().step_by(FIRST) {
+        for group in phases.groups(block, GROUP).iter().step_by(FIRST) {
             of.at_once(group, &mut columns, &mut looks, tally);
+            of.look_ahead(group, &mut columns, &mut looks);
             for (i, time) in group.clone().zip(&looks.times) {
                 of.phase((i, *time), &mut columns, &mut None, tally);
             }
         }
+    });
+    let inside = parallel::tally(&known, phases.len(), BLOCK, &|block, tally| {
+        let mut columns = columns();
+        let mut looks = Looks::new(columns.room());
+        let first = block.start;
+        let groups = phases.groups(block, GROUP);
         let (mut is_good, mut last) = (first > 0 && of.are_good[first - 1], None);
         let begun = phases.runs.partition_point(|&begin| begin < first as i64);
         let mut runs = phases.runs[begun..].iter().peekable();
         for (number, group) in groups.into_iter().enumerate() {
             let is_known = number.is_multiple_of(FIRST);
-            if !is_known {
+            if is_known {
+                looks.times.clear();
+                looks.times.resize(group.len(), Some(0.0));
+            } else {
                 of.at_once(&group, &mut columns, &mut looks, tally);
             }
+            of.look_ahead(&group, &mut columns, &mut looks);
             for (member, i) in group.enumerate() {
                 tell(seen, i);
                 let found = match is_known {
@@ -111,7 +121,7 @@ pub fn audit_profile<'a, const M: usize>(
     });
     let mut order = Tally::default();
     of.order(&mut columns(), &mut order);
-    inside.merge(order)
+    known.merge(inside).merge(order)
 }
 
 impl<const M: usize> Audited<'_, M> {
@@ -239,7 +249,6 @@ impl<const M: usize> Audited<'_, M> {
         }
         let Columns { rates, per_least, .. } = &*columns;
         Places { rates, per_least, limits: self.limits }.look_at(looks, tally);
-        self.look_ahead(group, columns, looks);
     }
 
     /// Looks ahead at the ends of a group's phases that have to be looked at closer, and at those where two pieces meet.

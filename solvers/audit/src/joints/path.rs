@@ -546,6 +546,39 @@ mod tests {
 
     proptest! {
         #[test]
+        fn stations_on_several_pieces_at_once_have_the_same_numbers_as_alone(
+            bends in prop::array::uniform6(-1.0..1.0_f64),
+            shares in prop::array::uniform8(0.0..1.0_f64),
+            is_rational: bool,
+        ) {
+            let control: Vec<f64> = (0..6).flat_map(|i| [-2.5 + f64::from(i), 2.0 + bends[i as usize]]).collect();
+            let weights: &[f64] = if is_rational { &[1.0, 2.0, 1.5, 1.0, 0.7, 1.0] } else { &[] };
+            let (offsets, width) = (&[0, 2, 6], &[1.0, 3.0]);
+            let pieces = Pieces { axes: 2, stride: 2, control: &control, weights, offsets, width };
+            let words = Words::polar();
+            let path = Followed { runs: &[0, 2], ..Followed::of_one(pieces) };
+            let joints = JointPath::of_one(path, &words, &[1.0; 2]);
+            let (first, second) = (joints.piece::<2>(0), joints.piece::<2>(1));
+            let (mut room, mut lanes) = (joints.room(0.0), joints.room([0.0; 8]));
+            let mut on = shares.map(|share| (&second, 3.0 * share));
+            (on[0], on[3]) = ((&first, shares[0]), (&first, shares[3]));
+            prop_assert!(first.is_like(&second));
+            if !are_vectors_wide() {
+                return Ok(());
+            }
+            let (place, station, roundings) = first.rounded_on_each(on, &mut lanes);
+            for (lane, (piece, u)) in on.into_iter().enumerate() {
+                let alone = piece.rounded_station(u, &mut room);
+                let place = Place { piece: piece.number, ..place.of_lane(lane) };
+                let found = (place, station.of_lane(lane), roundings.of_lane(lane));
+                // All digits, of numbers and of the bounds of their errors.
+                prop_assert_eq!(format!("{found:?}"), format!("{alone:?}"));
+                // A place that is asked for alone has the same numbers.
+                prop_assert_eq!(format!("{:?}", piece.place(u, &mut room)), format!("{:?}", alone.0));
+            }
+        }
+
+        #[test]
         fn places_that_are_looked_at_at_once_have_the_same_numbers_as_alone(
             bends in prop::array::uniform6(-1.0..1.0_f64),
             shares in prop::array::uniform8(0.0..1.0_f64),

@@ -53,8 +53,12 @@ pub fn audit_travel<const M: usize>(
                 }
             };
             for k in 0..of.joints {
-                if !piece.turning(k) && turns[k].is_nan() {
+                if turns[k].is_nan() && !piece.turning(k) {
                     turns[k] = TURN * ((position[k] - reached[k]) / TURN).round();
+                }
+                // Most places are between those that were found.
+                if spans[k][0].0 <= reached[k] && reached[k] <= spans[k][1].0 {
+                    continue;
                 }
                 for (end, sign) in [(0, -1.0), (1, 1.0)] {
                     let is_no_farther = sign * reached[k] <= sign * spans[k][end].0;
