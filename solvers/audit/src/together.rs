@@ -41,9 +41,9 @@ impl<const M: usize> Together<'_, M> {
         [joints.way(&position, q), slope]
     }
 
-    /// The stations, also where the piece has no direction.
-    pub fn stations(&self, u: &Lanes, room: &mut [Lanes]) -> Station<M, Lanes> {
-        in_wide_vectors!(simd => self.station(f64x8::from_slice(simd, u), room).kept())
+    /// Fills in the stations, also where the piece has no direction.
+    pub fn stations(&self, u: &Lanes, room: &mut [Lanes], found: &mut Station<M, Lanes>) {
+        in_wide_vectors!(simd => *found = self.station(f64x8::from_slice(simd, u), room).kept());
     }
 
     #[inline(always)]

@@ -193,6 +193,8 @@ pub struct Looks<'a, const M: usize> {
     pub times: Vec<Option<f64>>,
     /// Parts of them that have not been looked at.
     open: Vec<Part>,
+    /// The places of eight of these; those of fewer are beside others that nothing is asked of.
+    stations: Box<[Station<M, Lanes>; PHASES]>,
     /// Ends of them that are looked at closer, each with its piece.
     pub ends: Vec<(usize, f64)>,
     /// See `Columns::room`.
@@ -274,14 +276,18 @@ impl<'a, const M: usize> OnPiece<'a, M> {
 impl<const M: usize> Looks<'_, M> {
     /// Without any phases.
     pub fn new(room: Vec<Lanes>) -> Self {
-        Self { pieces: vec![], phases: vec![], times: vec![], open: vec![], ends: vec![], room }
+        let (number, vector) = ([f64::NAN; PLACES], [[f64::NAN; PLACES]; M]);
+        let [u, slope, tip, curvature] = [number; 4];
+        let none = Station { u, slope, first: vector, second: vector, third: vector, tip, curvature };
+        let stations = Box::new([none; PHASES]);
+        Self { pieces: vec![], phases: vec![], times: vec![], open: vec![], stations, ends: vec![], room }
     }
 }
 
 impl<const M: usize> Places<'_, M> {
     /// Finds the times of those phases that cannot change the tally, by their laws.
     pub fn look_at(&self, looks: &mut Looks<M>, tally: &Tally<M>) {
-        let Looks { pieces, phases, times, open, room, .. } = looks;
+        let Looks { pieces, phases, times, open, stations, room, .. } = looks;
         times.clear();
         times.extend(phases.iter().map(|phase| phase.map(|_| 0.0)));
         open.clear();
@@ -298,7 +304,6 @@ impl<const M: usize> Places<'_, M> {
         }
         let Some((&any, Some(phase))) = open.last().map(|part| (part, &phases[part.number])) else { return };
         let (mut parts, mut lanes, mut on) = ([any; PHASES], [phase; PHASES], [&pieces[phase.piece]; PHASES]);
-        let mut stations = [on[0].on.stations(&[any.u[0]; PLACES], room); PHASES];
         loop {
             // Halves of parts that were open, and other phases.
             let mut count = 0;
@@ -311,14 +316,15 @@ impl<const M: usize> Places<'_, M> {
                         continue;
                     }
                     let width = part.u[1] - part.u[0];
-                    stations[count] = piece.on.stations(&SHARES.map(|share| part.u[0] + width * share), room);
+                    let u = SHARES.map(|share| part.u[0] + width * share);
+                    piece.on.stations(&u, room, &mut stations[count]);
                     (parts[count], lanes[count], on[count], count) = (part, phase, piece, count + 1);
                 }
             }
             if count == 0 {
                 return;
             }
-            let found = in_wide_vectors!(simd => self.look(simd, (&parts, &lanes, &on), &stations, tally));
+            let found = in_wide_vectors!(simd => self.look(simd, (&parts, &lanes, &on), stations, tally));
             for (i, (part, phase)) in parts.iter().zip(lanes).enumerate().take(count) {
                 let sum = times[part.number];
                 times[part.number] = if found.verdict[i] == NOTHING {
