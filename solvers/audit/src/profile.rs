@@ -49,8 +49,9 @@ const BLOCK: usize = 4096;
 /// Phases are looked at together, so many on so many pieces at most.
 const GROUP: [usize; 2] = [16, KEPT];
 
-/// One of so many groups of phases is looked at before all others: of what they use of the limits most phases use less. Where the use of
-/// a limit grows from phase to phase, each phase uses more than was found before: of fewer groups less would be known.
+/// One of so many groups of phases, in all of the profile, is looked at before all others: most phases use less of the limits than the
+/// most that is found there, and need no closer look. In groups farther apart that is less: where the use of a limit grows from phase to
+/// phase, every phase uses more than was found before.
 const FIRST: usize = 8;
 
 /// What is measured on which path.
