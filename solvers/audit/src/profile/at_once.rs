@@ -1,11 +1,11 @@
 //! Tells which of some phases can change what was found: eight phases at once, in the vectors of the processor.
 //!
-//! They may be on several pieces. Each is looked at in eight places, the nodes of Lobatto's rule (Abramowitz and Stegun 25.4.32), both ends among them. |C'| there
-//! gives the lengths up to all of them by the polynomial through them, v² by the length gives speed, acceleration and jerk along the
-//! path, the derivatives of C those of all axes. Where no place uses more of a limit than was found before, nor a parabola between two
-//! of them and the polynomial half-way, nothing needs to be looked at closer. As in `by_length`, of which these are fewer places,
-//! `bulge` bounds what lies between two: where that is much above both, both halves are looked at instead. Where more of a limit is
-//! used, `by_length` looks.
+//! The phases may be on several pieces. Each is looked at in eight places, the nodes of Lobatto's rule (Abramowitz and Stegun
+//! 25.4.32), both ends among them. |C'| there gives the lengths up to all of them by the polynomial through them, v² by the length
+//! gives speed, acceleration and jerk along the path, and the derivatives of C give those of all axes. A phase needs no closer look
+//! where no place uses more of a limit than was found before, nor does a parabola between two places, nor the polynomial half-way.
+//! As in `by_length`, which looks at more places, `bulge` bounds what lies between two: where that is much above both, both halves
+//! are looked at instead. Where more of a limit is used, `by_length` looks.
 
 use fearless_simd::{f64x8, mask64x8, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
