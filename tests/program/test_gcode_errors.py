@@ -108,7 +108,7 @@ def test_the_sentence_names_file_line_and_word() -> None:
         ("F60 G93\nG94 G1 X1", "a feed move has no feed"),
         ("G95 F1 G1 X1", "the spindle speed is not known"),
         ("G95 F1 S100\nG1 X1", "the spindle speed is not known"),
-        ("G95 F1 G96 S100 M3\nG1 X1", "a constant surface speed (G96) the spindle speed is not known: use G97"),
+        ("G95 F1 G96 S100 M3\nG1 X1", "(G96) the spindle speed is not known: use G97"),
         # Arcs.
         ("G3 X2 F60", "an arc in the plane G17 has no centre: give I and J, or R"),
         ("G3 F60", "an arc in the plane G17 has no centre"),
