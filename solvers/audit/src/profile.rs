@@ -21,7 +21,7 @@ use super::speed_by_length::is_same_speed;
 use super::station::{Place, Station};
 use super::vectors::vector_of;
 use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
-use at_once::{Looks, OnPiece, Places, PLACES};
+use at_once::{Judge, Looks, OnPiece, PLACES};
 use by_length::{Look, Looker};
 
 /// Even intervals of a phase.
@@ -249,7 +249,7 @@ impl<const M: usize> Audited<'_, M> {
             }));
         }
         let Columns { rates, per_least, .. } = &*columns;
-        Places { rates, per_least, limits: self.limits }.look_at(looks, tally);
+        Judge { rates, per_least, limits: self.limits }.look_at(looks, tally);
     }
 
     /// Looks ahead at the ends of a group's phases that have to be looked at closer, and at those where two pieces meet.

@@ -201,8 +201,8 @@ pub struct Looks<'a, const M: usize> {
     pub room: Vec<Lanes>,
 }
 
-/// The limits.
-pub struct Places<'a, const M: usize> {
+/// Judges phases by the limits.
+pub struct Judge<'a, const M: usize> {
     /// See `Columns`.
     pub rates: &'a [[Sided<M>; 2]; 3],
     pub per_least: &'a [[f64; M]; 3],
@@ -284,7 +284,7 @@ impl<const M: usize> Looks<'_, M> {
     }
 }
 
-impl<const M: usize> Places<'_, M> {
+impl<const M: usize> Judge<'_, M> {
     /// Finds the times of those phases that cannot change the tally, by their laws.
     pub fn look_at(&self, looks: &mut Looks<M>, tally: &Tally<M>) {
         let Looks { pieces, phases, times, open, stations, room, .. } = looks;
@@ -792,13 +792,13 @@ mod tests {
             looks.pieces.push(OnPiece { feeds, ..on });
         }
         let Columns { rates, per_least, .. } = &columns;
-        let places = Places { rates, per_least, limits: &limits };
+        let judge = Judge { rates, per_least, limits: &limits };
         // Beside other phases and alone it has the same answer; halves are added in another order.
         let phase = Some(Phase { piece: 0, u, p, a, held_sq: None });
         let gentle = Some(Phase { piece: 1, u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
         let mut found_of = |phases: &[Option<Phase>]| {
             looks.phases = phases.to_vec();
-            places.look_at(&mut looks, &tally);
+            judge.look_at(&mut looks, &tally);
             looks.times.clone()
         };
         let found = found_of(&[phase])[0];
