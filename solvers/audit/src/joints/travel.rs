@@ -56,15 +56,14 @@ pub fn audit_travel<const M: usize>(
                 if turns[k].is_nan() && !piece.turning(k) {
                     turns[k] = TURN * ((position[k] - reached[k]) / TURN).round();
                 }
-                // Most places are between those that were found.
-                if spans[k][0].0 <= reached[k] && reached[k] <= spans[k][1].0 {
-                    continue;
+                let [least, most] = &mut spans[k];
+                let (is_above, is_below) = (least.0 <= reached[k], reached[k] <= most.0);
+                let here = (reached[k], Place { piece: number, u });
+                if !is_above && !reached[k].is_nan() {
+                    *least = here;
                 }
-                for (end, sign) in [(0, -1.0), (1, 1.0)] {
-                    let is_no_farther = sign * reached[k] <= sign * spans[k][end].0;
-                    if !is_no_farther && !reached[k].is_nan() {
-                        spans[k][end] = (reached[k], Place { piece: number, u });
-                    }
+                if !is_below && !reached[k].is_nan() {
+                    *most = here;
                 }
             }
             last = Some((piece.clone(), position, reached));
