@@ -65,7 +65,7 @@ class _Batch:
             while len(rows) < self._count:
                 if time.monotonic() - asked > EVERY:
                     asked = time.monotonic()
-                    self._slots = self._executor.slots()
+                    self._slots = max(self._executor.slots(), 1)  # a job reports that the cluster is lost
                     threads = [thread for thread in threads if thread.is_alive()]
                     while len(threads) < min(self._slots * self._executor.depth, self._left):
                         threads.append(threading.Thread(target=self._work, daemon=True))

@@ -45,7 +45,8 @@ class Cluster:
         self._address, self._limits = address, (limits.max_time, limits.max_memory)
         self._lock = threading.Lock()
         self._heard: dict[str, _Heard] = {}
-        self._counted = (0, 0.0)
+        # The number of threads, None if the scheduler could not be reached, and when it was counted [s].
+        self._counted: tuple[int | None, float] = (None, -COUNTED)
         self._closed = False
         self._client: Client = self._new_client()
         try:
@@ -54,20 +55,21 @@ class Cluster:
             self.close()
             raise
 
-    def threads(self) -> int:
-        """The number of threads that the workers have now."""
+    def threads(self) -> int | None:
+        """The number of threads that the workers have now; None while the scheduler cannot be reached."""
         count, last = self._counted
         if time.monotonic() - last > COUNTED:
-            count = 0
+            count = None
             with suppress(OSError, RuntimeError):  # the scheduler is lost
                 client = self._connected()
-                count = 0 if client is None else sum(client.nthreads().values())
+                count = None if client is None else sum(client.nthreads().values())
             self._counted = (count, time.monotonic())
         return count
 
     def slots(self) -> int:
         """See `Executor`; 1 without workers, for clusters that start workers when there is work."""
-        return max(self.threads(), 1)
+        threads = self.threads()
+        return 0 if threads is None else max(threads, 1)
 
     def close(self) -> None:
         """See `Executor`."""

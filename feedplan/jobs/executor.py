@@ -47,7 +47,8 @@ class Executor(Protocol):
     depth: int
 
     def slots(self) -> int:
-        """The number of sequences of jobs that can run at the same time; it may change."""
+        """The number of sequences of jobs that can run at the same time; it may change. 0 while what runs
+        them cannot be reached."""
 
     def run(self, jobs: Sequence[Job], report: JobListener, stop: Event) -> list[Outcome]:
         """Runs these jobs in order, waits for them and returns their outcomes.

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from feedplan.service.runner import AWAY
 from tests.batch.batches import content, wait_for
 from tests.clusters import DEADLY, HELD, LocalCluster
 from tests.clusters import running as cluster_running
@@ -91,6 +93,7 @@ def test_a_job_outlives_its_worker_and_a_server_its_end(
     cluster.kill_scheduler()
     for job in (first, second):
         wait_for(lambda job=job: own.get(f"/v1/jobs/{job}").json["state"] == "queued")
+    time.sleep(AWAY + 0.5)  # no job is started while the cluster is away
     cluster.start_scheduler()
     for _ in range(2):  # the workers have ended with the scheduler
         cluster.start_worker()
