@@ -75,8 +75,7 @@ fn on_coarse_grid(rows: &Constraints, far: &[f64], x: &[f64]) -> Constraints {
 
 /// Long intervals, each in place of short ones.
 fn joined(rows: &Constraints) -> Constraints {
-    let mut coarse = rows.clone();
-    coarse.clear();
+    let mut coarse = rows.emptied(rows.count().div_ceil(GROUP));
     for first in (0..rows.count()).step_by(GROUP) {
         let short = first..rows.count().min(first + GROUP);
         let h: f64 = short.clone().map(|n| rows.h(n)).sum();

@@ -33,11 +33,6 @@ impl Columns {
         self.slope[intervals + 1..].fill(0.0);
     }
 
-    pub fn fill(&mut self, value: f64) {
-        self.w.fill(value);
-        self.slope.fill(value);
-    }
-
     pub fn take(&mut self, x: &[f64]) {
         for ((w, slope), x) in self.w.iter_mut().zip(&mut self.slope).zip(x.chunks_exact(2)) {
             (*w, *slope) = (x[0], x[1]);
@@ -94,13 +89,24 @@ impl Terms {
         store(&mut self.end.slope, at + 1, d1 * h);
     }
 
+    /// Sets the sums of the terms of each station, times a factor.
+    pub fn give(&self, out: &mut Columns, factor: f64) {
+        self.at_each(out, |out, sum| *out = factor * sum);
+    }
+
     /// Adds a part of the terms of each station.
     pub fn add_to(&self, out: &mut Columns, part: f64) {
+        self.at_each(out, |out, sum| *out += part * sum);
+    }
+
+    /// f(number of `out`, sum of the terms) at each station.
+    #[inline(always)]
+    fn at_each(&self, out: &mut Columns, f: impl Fn(&mut f64, f64)) {
         let Self { start, end } = self;
         let columns = [(&mut out.w, &start.w, &end.w), (&mut out.slope, &start.slope, &end.slope)];
         for (out, start, end) in columns {
             for ((out, start), end) in out.iter_mut().zip(start).zip(end) {
-                *out += part * (start + end);
+                f(out, start + end);
             }
         }
     }
@@ -159,7 +165,8 @@ mod tests {
         assert_eq!(at(2), [[0.0, 0.0], [3.0, 8.0]]);
         let mut sums = Columns::default();
         sums.resize(2, 0.0);
-        terms.add_to(&mut sums, -2.0);
+        terms.give(&mut sums, 1.0);
+        terms.add_to(&mut sums, -3.0);
         assert_eq!([sums.at(0), sums.at(1), sums.at(2)], [[-2.0, -8.0], [-8.0, -24.0], [-6.0, -16.0]]);
     }
 }

@@ -229,10 +229,22 @@ impl Constraints {
         }
     }
 
-    pub fn clear(&mut self) {
+    /// Takes away all intervals, and makes room for so many.
+    pub fn clear(&mut self, room: usize) {
+        let blocks = room.div_ceil(LANES);
         self.count = 0;
         self.blocks.clear();
+        self.blocks.reserve(blocks);
         self.q.clear();
+        self.q.reserve(blocks * COUNT * self.axes());
+    }
+
+    /// The same limits of the axes, without intervals, but with room for so many.
+    pub fn emptied(&self, room: usize) -> Self {
+        let (acceleration, per_jerk) = (self.acceleration.clone(), self.per_jerk.clone());
+        let mut empty = Self { blocks: vec![], q: vec![], acceleration, per_jerk, ..*self };
+        empty.clear(room);
+        empty
     }
 
     /// Appends an interval of a length in mm, with a factor of its jerk limit and without other limits.
@@ -293,7 +305,7 @@ impl Constraints {
         jerk_factor: &[f64],
         station_cap: impl Fn(usize) -> f64,
     ) {
-        self.clear();
+        self.clear(pieces.len());
         self.accelerates = true;
         for (n, &piece) in pieces.iter().enumerate() {
             let (start, end) = (stations[n], stations[n + 1]);
@@ -320,7 +332,7 @@ impl Constraints {
         // Blocks that are the same in both are copied whole.
         let whole = if range.start.is_multiple_of(LANES) { range.len() / LANES } else { 0 };
         let (first, q) = (range.start / LANES, COUNT * self.axes());
-        self.clear();
+        self.clear(range.len());
         self.accelerates = others.accelerates;
         self.blocks.extend_from_slice(&others.blocks[first..][..whole]);
         self.q.extend_from_slice(&others.q[first * q..][..whole * q]);

@@ -19,6 +19,9 @@ const NEAR: f64 = 0.97;
 /// The error of an interval's length where a plan is stored as phases, in units of the rounding of the path's length.
 const ROUNDINGS: f64 = 4.0;
 
+/// w, w'/2, w''/2 and √w at each sample of a block.
+type Motions<S> = [[Register<S>; 4]; SAMPLES];
+
 /// The basis and its first two derivatives at each sample.
 const BASES: [[Basis; 3]; SAMPLES] = bases();
 
@@ -90,7 +93,9 @@ impl IntersampleCheck {
         rows: &Constraints,
     ) {
         self.blocks.clear();
-        self.q.clear();
+        self.blocks.reserve(rows.blocks.len());
+        // All lanes of all blocks but the last one are set below.
+        self.q.truncate(rows.blocks.len().saturating_sub(1) * M);
         self.q.resize(rows.blocks.len() * M, [[Lanes::ZERO; 3]; SAMPLES]);
         let knots = geometry.knots();
         let error = ROUNDINGS * f64::EPSILON * (knots[knots.len() - 1] - knots[0]);
@@ -140,11 +145,12 @@ impl IntersampleCheck {
         let x = Columns::new(x);
         let mut out = vec![[0.0; 3]; rows.count()];
         let zero = Register::all(simd, 0.0);
+        // Room for one block, which is not cleared for the next.
+        let (mut motion, mut uses) = ([[zero; 4]; SAMPLES], [zero; SAMPLES]);
         for (b, (block, out)) in self.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
             let h = rows.blocks[b].h.load(simd);
             let (u, per_h) = (x.local(b, h, rows.blocks[b].live), h.inverse());
-            let motion = motions(&u, per_h);
-            let mut uses = [zero; SAMPLES];
+            set_motion(&mut motion, &u, per_h);
             for (uses, (motion, cap)) in uses.iter_mut().zip(motion.iter().zip(&block.caps)) {
                 *uses = motion[0] * *cap;
             }
@@ -202,11 +208,12 @@ impl IntersampleCheck {
         let (x, layout) = (Columns::new(x), rows.layout());
         let zero = Register::all(simd, 0.0);
         let mut multipliers = vec![zero; layout.count()];
+        let mut motion = [[zero; 4]; SAMPLES];
         let mut out = Vec::with_capacity(rows.blocks.len() * LANES);
         for (b, (block, used)) in self.blocks.iter().zip(used.chunks(LANES)).enumerate() {
             let h = rows.blocks[b].h.load(simd);
             let (u, per_h) = (x.local(b, h, rows.blocks[b].live), h.inverse());
-            let motion = motions(&u, per_h);
+            set_motion(&mut motion, &u, per_h);
             let greatest = |limit: usize| {
                 Lanes::new(std::array::from_fn(|lane| {
                     used.get(lane).map_or(1.0, |used| used[limit].max(1.0))
@@ -263,18 +270,16 @@ impl IntersampleCheck {
     }
 }
 
-/// w, w'/2, w''/2 and √w at each sample.
+/// Sets the motion by the local coefficients u on intervals of length 1/`per_h`.
 #[inline(always)]
-fn motions<S: Simd>(u: &[Register<S>; 4], per_h: Register<S>) -> [[Register<S>; 4]; SAMPLES] {
+fn set_motion<S: Simd>(motions: &mut Motions<S>, u: &[Register<S>; 4], per_h: Register<S>) {
     let zero = Register::all(per_h.simd(), 0.0);
-    let mut out = [[zero; 4]; SAMPLES];
-    for (motion, basis) in out.iter_mut().zip(&BASES) {
+    for (motion, basis) in motions.iter_mut().zip(&BASES) {
         let w = combine(&basis[0], u);
         let half = combine(&basis[1], u) * per_h * 0.5;
         let bend = combine(&basis[2], u) * (per_h * per_h) * 0.5;
         *motion = [w, half, bend, w.max(zero).sqrt()];
     }
-    out
 }
 
 /// Number of samples in each polynomial that interpolates half-way between samples.
@@ -318,24 +323,29 @@ fn peak<S: Simd>(f: &[Register<S>; SAMPLES], [per_high, per_low]: [f64; 2]) -> R
     if worst.greatest() <= NEAR {
         return worst;
     }
-    let mut fine = [zero; 2 * SAMPLES - 1];
-    for i in 0..SAMPLES {
-        fine[2 * i] = f[i];
-    }
+    let mut last = zero;
     for (i, (weights, first)) in HALFWAY.iter().enumerate() {
+        let mut middle = zero;
         for (weight, value) in weights.iter().zip(&f[*first..]) {
-            fine[2 * i + 1] += *value * *weight;
+            middle += *value * *weight;
         }
-    }
-    let least = Register::all(f[0].simd(), f64::MIN_POSITIVE);
-    for i in 1..fine.len() - 1 {
-        let bend = fine[i] + fine[i] - fine[i - 1] - fine[i + 1];
-        // A parabola whose peak is beyond its neighbours has less than one of them after this.
-        let rise = (fine[i + 1] - fine[i - 1]).abs().min(bend.abs() * 2.0);
-        let top = fine[i] + rise * rise * ((bend + least) * 8.0).inverse();
+        if i > 0 {
+            let top = top([last, f[i], middle]);
+            worst = (top * per_high).max(-top * per_low).max(worst);
+        }
+        let top = top([f[i], middle, f[i + 1]]);
         worst = (top * per_high).max(-top * per_low).max(worst);
+        last = middle;
     }
     worst
+}
+
+/// The peak of the parabola through three values at equal distances; less than one of them where it is beyond them.
+#[inline(always)]
+fn top<S: Simd>([before, here, after]: [Register<S>; 3]) -> Register<S> {
+    let bend = here + here - before - after;
+    let rise = (after - before).abs().min(bend.abs() * 2.0);
+    here + rise * rise * ((bend + Register::all(here.simd(), f64::MIN_POSITIVE)) * 8.0).inverse()
 }
 
 #[cfg(test)]

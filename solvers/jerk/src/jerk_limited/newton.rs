@@ -134,8 +134,7 @@ impl<X: Model> InteriorPoint<X> {
 
     /// The predictor's right-hand side.
     pub(super) fn descend(&mut self) {
-        self.rhs.fill(0.0);
-        self.gradient.add_to(&mut self.rhs, -1.0);
+        self.gradient.give(&mut self.rhs, -1.0);
     }
 
     /// The corrector's right-hand side: λ s of every row to `target`, and `second` times the predictor's products.
