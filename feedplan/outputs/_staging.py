@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -28,9 +27,10 @@ def require_folder(folder: FilePath) -> None:
 def staged(folder: FilePath, last: str) -> Iterator[FilePath]:
     """A temporary folder to write into; its files move to `folder` when the block ends without an error.
 
-    A new `folder` appears by one rename. In a folder that exists each file replaces the one of the same name,
-    the file `last` after the others: if it is new, all are; other files stay. After an error no temporary
-    file is left. Raises InputError if the file system refuses.
+    A new `folder` appears by one rename. In a folder that exists each file replaces the one of the same name.
+    The old file `last` goes before the others, the new one comes after them: while it is there, all files are
+    of one plan. Other files stay. After an error no temporary file is left. Raises InputError if the file
+    system refuses.
     """
     require_folder(folder)
     # In the folder or in its nearest parent that exists, so that both are on the same file system.
@@ -53,8 +53,17 @@ def _move(stage: FilePath, folder: FilePath, last: str) -> None:
         folder.parent.mkdir(parents=True, exist_ok=True)
         stage.rename(folder)
         return
-    for file in sorted(stage.iterdir(), key=lambda file: (file.name == last, file.name)):
-        os.replace(file, folder / file.name)
+    others = sorted(file.name for file in stage.iterdir() if file.name != last)
+    for name in (*others, last):
+        if (folder / name).is_dir():
+            raise IsADirectoryError(errno.EISDIR, f"{name} is a folder")
+    if others:
+        (folder / last).unlink(missing_ok=True)
+    for name in others:
+        # Where one file replaces another, some file systems wait until the new one is on the disk.
+        (folder / name).unlink(missing_ok=True)
+        (stage / name).rename(folder / name)
+    (stage / last).replace(folder / last)
 
 
 def _sentence(folder: FilePath, error: OSError | ValueError) -> str:

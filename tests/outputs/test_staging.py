@@ -18,6 +18,13 @@ def fail_in(folder: Path) -> None:
         raise KeyError
 
 
+def write_new(folder: Path, names: str) -> None:
+    """Writes files of these names, the last of them last."""
+    with staged(folder, last=names[-1]) as stage:
+        for name in names:
+            (stage / name).write_text("new")
+
+
 def test_a_new_folder_appears_at_the_end_with_its_parents(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
     with staged(folder, last="z") as stage:
@@ -46,11 +53,20 @@ def test_an_existing_folder_keeps_its_other_files_and_gets_the_last_file_last(
     (tmp_path / "mine").write_text("keep")
     (tmp_path / "b").write_text("old")
     moved = []
-    replace = os.replace
-    monkeypatch.setattr(os, "replace", lambda a, b: (moved.append(Path(b).name), replace(a, b)))
-    with staged(tmp_path, last="b") as stage:
-        for name in "abc":
-            (stage / name).write_text("new")
+
+    def record(move: str) -> None:
+        own = getattr(Path, move)
+
+        def recorded(source: Path, target: Path) -> None:
+            moved.append(target.name)
+            own(source, target)
+            assert target.name == "b" or not (tmp_path / "b").exists(), "the old one goes first"
+
+        monkeypatch.setattr(Path, move, recorded)
+
+    record("rename")
+    record("replace")
+    write_new(tmp_path, "cab")
     assert moved == ["a", "c", "b"]
     assert {entry.name: entry.read_text() for entry in tmp_path.iterdir()} == {
         "mine": "keep",
@@ -58,6 +74,15 @@ def test_an_existing_folder_keeps_its_other_files_and_gets_the_last_file_last(
         "b": "new",
         "c": "new",
     }
+
+
+def test_a_folder_in_the_way_of_a_file_leaves_the_earlier_files_alone(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "z").write_text("old")
+    with pytest.raises(InputError, match=r"cannot be written \(a is a folder\): choose another"):
+        write_new(tmp_path, "az")
+    assert (tmp_path / "z").read_text() == "old"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a", "z"]
 
 
 def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
