@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from typing import Any, Generic, Protocol, TypeVar
 
-import numpy as np
+from feedplan.arrays import lock_arrays
 
 Record = TypeVar("Record", bound="OfNative[Any]")
 
@@ -45,20 +45,12 @@ class OfNative(Generic[Native]):
         """The same record with other values of fields that the native object lacks."""
         record = object.__new__(type(self))
         vars(record).update(vars(self), **others)
-        record._lock()
+        lock_arrays(record)
         return record
 
     def _hold(self, native: Native) -> None:
         vars(self).update(native.fields(), native=native)
-        self._lock()
-
-    def _lock(self) -> None:
-        """Makes arrays that are not the native object's read-only too."""
-        for name, value in vars(self).items():
-            if isinstance(value, np.ndarray) and value.flags.writeable:
-                view = value.view()
-                view.flags.writeable = False
-                vars(self)[name] = view
+        lock_arrays(self)  # those that are not the native object's
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]

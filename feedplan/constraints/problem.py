@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import Problem as NativeProblem
 from feedplan.arguments import not_negative, number
-from feedplan.arrays import Floats, Integers
+from feedplan.arrays import Floats, Integers, lock_arrays
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.constraints.tool_motion import ToolMotion, linear_motion
@@ -95,6 +95,7 @@ class Problem:
             object.__setattr__(self, name, column)
         if self.feed_share is not None:
             object.__setattr__(self, "feed_share", np.ascontiguousarray(self.feed_share, dtype=np.float64))
+        lock_arrays(self)
 
     def __repr__(self) -> str:
         return f"<Problem of the joints {' '.join(self.axes)} on {self.path!r}>"

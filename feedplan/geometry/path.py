@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedplan._solvers import build_path
 from feedplan.arguments import instance, is_whole, list_of_names, number, refuse, shown
 from feedplan.array_arguments import point_array, refuse_where, within
-from feedplan.arrays import Flags, Floats, Integers
+from feedplan.arrays import Flags, Floats, Integers, lock_arrays
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError
@@ -120,7 +120,7 @@ class Path:
       other words, so the path may jump there.
 
     `fit` says what fitting did, `corners` what became of the program's corners, and `warnings` are sentences
-    for the user.
+    for the user. Arrays are read-only: `dataclasses.replace` makes a path with others.
     """
 
     axes: tuple[str, ...]
@@ -146,6 +146,7 @@ class Path:
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=dtype))
         if len(self.new_words) == 0:
             object.__setattr__(self, "new_words", np.zeros(len(self.runs) - 1, dtype=bool))
+        lock_arrays(self)
 
     @classmethod
     def from_curve(

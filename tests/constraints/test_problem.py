@@ -1,5 +1,7 @@
 """The problem: feeds, overrides and junction speeds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,8 +46,7 @@ def test_run_ends_stop() -> None:
 
 
 def test_feed_is_replaced_and_overridden_but_rapids_are_not() -> None:
-    path = polyline([[0, 0], [5, 0], [9, 0]])
-    path.feed[1] = np.inf
+    path = replace(polyline([[0, 0], [5, 0], [9, 0]]), feed=[10.0, np.inf])
     assert build_problem(path, machine(), feed_override=0.5).feed[0] == 5.0
     changed = build_problem(path, machine(), feed=20.0, feed_override=0.5).feed
     assert changed[0] == 10.0
@@ -58,10 +59,17 @@ def test_a_feed_that_no_plan_can_time_is_refused() -> None:
     said = r"^line 10: the feed is 1e-08 mm/s: give one from 1e-06 mm/s$"
     with pytest.raises(InputError, match=said):
         build_problem(path, machine(), feed_override=1e-9)
-    path.line[:], path.feed[1] = [7, 8], 1e-9
+    path = replace(path, line=[7, 8], feed=[10.0, 1e-9])
     with pytest.raises(InputError, match=r"^line 8: the feed is 1e-09 mm/s") as caught:
         build_problem(path, machine())
     assert caught.value.line == 8
+
+
+def test_nobody_writes_into_a_path_or_a_problem() -> None:
+    problem = build_problem(polyline([[0, 0], [5, 0], [9, 0]]), machine())
+    for column in (problem.path.feed, problem.path.new_words, problem.feed, problem.max_jerk):
+        with pytest.raises(ValueError, match="read-only"):
+            column[0] = 0
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf")])
