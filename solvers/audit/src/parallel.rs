@@ -1,4 +1,5 @@
-//! Work on blocks in parallel. The loop itself is compiled once, not for each kind of work and each number of axes.
+//! Loops over blocks on all cores, and what is told of their progress. The loop itself is compiled once, not for each kind of
+//! work and each number of axes.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -6,6 +7,19 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use super::Tally;
+
+/// Told of how many more phases, pieces or moves have been looked at; it may end the audit by unwinding.
+pub type Seen<'a> = &'a (dyn Fn(usize) + Sync);
+
+/// It is told of so many at a time.
+const TOLD: usize = 64;
+
+/// Tells of number `i` of a loop.
+pub fn tell(seen: Seen, i: usize) {
+    if i.is_multiple_of(TOLD) {
+        seen(TOLD);
+    }
+}
 
 /// Threads that work on a loop.
 pub fn threads() -> usize {

@@ -1,0 +1,128 @@
+//! The limits of a machine that hold everywhere on a path.
+
+use super::{vectors, PASS_EXCESS};
+
+/// Speeds that feeds are about: along X, Y, Z, along U, V, W, of all other axes, and of all together.
+pub const FEEDS: usize = 4;
+
+/// A limit of each axis in both directions, as sizes: of what is positive, of what is negative.
+#[derive(Clone, Copy, Debug)]
+pub struct Sided<const M: usize> {
+    pub positive: [f64; M],
+    pub negative: [f64; M],
+}
+
+impl<const M: usize> Sided<M> {
+    /// The limit that holds for a value, by its sign.
+    #[inline(always)]
+    pub fn of(&self, axis: usize, value: f64) -> f64 {
+        // Both are read, so that no branch follows a sign that changes often.
+        let (positive, negative) = (self.positive[axis], self.negative[axis]);
+        if value < 0.0 {
+            negative
+        } else {
+            positive
+        }
+    }
+
+    /// The limits that hold for a value of each axis.
+    #[inline(always)]
+    pub fn of_each(&self, values: &[f64; M]) -> [f64; M] {
+        vectors::vector_of(|k| self.of(k, values[k]))
+    }
+
+    /// What a value is to be multiplied by for the share of its limit; a limit of 0 stays out of reach of 0 alone.
+    pub fn inverse(&self) -> Self {
+        let inverse = |limits: [f64; M]| limits.map(|limit| (1.0 / limit).min(f64::MAX));
+        Self { positive: inverse(self.positive), negative: inverse(self.negative) }
+    }
+
+    /// The smaller limit.
+    #[inline]
+    pub fn least(&self, axis: usize) -> f64 {
+        self.positive[axis].min(self.negative[axis])
+    }
+
+    /// The greater limit.
+    #[inline]
+    pub fn greatest(&self, axis: usize) -> f64 {
+        self.positive[axis].max(self.negative[axis])
+    }
+
+    /// The greater limit of each axis.
+    pub fn greater(&self) -> [f64; M] {
+        std::array::from_fn(|k| self.greatest(k))
+    }
+}
+
+/// The limits that hold everywhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<const M: usize> {
+    /// Those beyond are 0, and their travel is not limited.
+    pub axes: usize,
+    /// In mm/s, mm/s² and mm/s³.
+    pub velocity: Sided<M>,
+    pub acceleration: Sided<M>,
+    pub jerk: [f64; M],
+    /// Whether jerk is judged; else it is only measured where that costs nothing.
+    pub judges_jerk: bool,
+    /// Jump of each axis velocity that is allowed at a corner, in mm/s.
+    pub jump: [f64; M],
+    /// What of it may show in differences of setpoints as an acceleration above the limit: nothing of a jump that is
+    /// no more than the limit over a period.
+    pub jump_beyond: [f64; M],
+    /// Least and greatest position, in mm.
+    pub travel: [[f64; 2]; M],
+    /// What the velocity of each axis counts in each speed that a feed is about, 0 or 1.
+    pub feed_axes: [[f64; M]; FEEDS],
+    /// In mm; infinite: not limited.
+    pub chord_tolerance: f64,
+    /// Servo period in s.
+    pub period: f64,
+    /// Speeds at the two ends of the path, in mm/s.
+    pub end_speeds: [f64; 2],
+}
+
+impl<const M: usize> Limits<M> {
+    /// What of a velocity or a way counts in a speed that a feed is about.
+    #[inline]
+    pub fn counted(&self, feed: usize, of: &[f64; M]) -> [f64; M] {
+        std::array::from_fn(|k| self.feed_axes[feed][k] * of[k])
+    }
+
+    /// How far the mean of the recorded velocities of one axis at both ends of a step may be from the mean velocity: an eighth of the
+    /// way from the least acceleration to the greatest, and half of a jump.
+    #[inline(always)]
+    pub fn mean_velocity_off(&self, axis: usize, step: f64) -> f64 {
+        let span = self.acceleration.positive[axis] + self.acceleration.negative[axis];
+        0.125 * span * step + 0.5 * self.jump[axis]
+    }
+
+    /// The jump of one axis velocity that means nothing: over this time it adds no more than the pass mark to the acceleration.
+    #[inline]
+    pub fn negligible_jump(&self, axis: usize, time: f64) -> f64 {
+        PASS_EXCESS * self.acceleration.least(axis) * time
+    }
+}
+
+#[cfg(test)]
+impl<const M: usize> Limits<M> {
+    /// Nothing is limited.
+    pub fn none() -> Self {
+        let anything = Sided { positive: [f64::INFINITY; M], negative: [f64::INFINITY; M] };
+        Self {
+            axes: M,
+            velocity: anything,
+            acceleration: anything,
+            jerk: [f64::INFINITY; M],
+            judges_jerk: false,
+            jump: [0.0; M],
+            jump_beyond: [0.0; M],
+            travel: [[f64::NEG_INFINITY, f64::INFINITY]; M],
+            feed_axes: [[1.0; M]; FEEDS],
+            chord_tolerance: f64::INFINITY,
+            period: 1e-3,
+            end_speeds: [0.0; 2],
+        }
+    }
+}
