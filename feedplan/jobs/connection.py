@@ -30,9 +30,9 @@ def connect(address: ClusterAddress) -> Client:
         raise MissingPackageError(
             f"a cluster needs the package {error.name}: `pip install feedplan[cluster]`"
         ) from None
-    # Our own errors report broken connections, and large programs need no warning.
+    # Our own errors report broken connections, Ctrl-C needs no traceback, and large programs need no warning.
     for name in tuple(logging.root.manager.loggerDict):
-        if name.startswith("distributed"):
+        if name.startswith(("distributed", "tornado")):
             logging.getLogger(name).setLevel(logging.CRITICAL)
     dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TB"})
     own = address.certificates

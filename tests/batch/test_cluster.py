@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import signal
 import threading
@@ -129,6 +130,8 @@ def test_progress_comes_from_the_workers(cluster: LocalCluster, tmp_path: Path) 
     order = Order(file.name, "auto", "jerk-limited", formats=())
     place = Cluster(ClusterAddress.of(*cluster.options[1::2]), LIMITS)
     assert place.slots() == 2
+    # An interrupt in the middle of a request would print a traceback of tornado.
+    assert not logging.getLogger("tornado.application").isEnabledFor(logging.ERROR)
     told: list[tuple[int, str, float]] = []
     stop = threading.Event()
 
