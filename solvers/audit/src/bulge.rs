@@ -1,5 +1,5 @@
-//! How far the rates of a phase are from the straight lines between places of it, from bounds of the derivatives of its piece and of
-//! its speed.
+//! Bounds how far velocity, acceleration and jerk on a phase are from the straight lines between their values at two places, by
+//! bounds of the derivatives of the piece and of the speed.
 //!
 //! On an interval of length h a function is off the straight line between its ends by no more than h²/8 times its greatest second
 //! derivative. With g = |C'| and T = C'/g all derivatives by u follow from the bounds of those of C: T·T' = 0, so g' = T·C'',
@@ -8,19 +8,19 @@
 use super::number::Number;
 use super::speed_by_length::Bounds;
 
-/// How far, at most, velocity, acceleration, jerk and dT/ds between two places are as vectors from the straight line between
-/// those of the two, and the greatest speed along the path.
+/// Bounds between two places: how far velocity, acceleration, jerk and dT/ds are, as vectors, from the straight line between
+/// their values at the two; and the greatest speed along the path.
 #[derive(Clone, Copy, Debug)]
 pub struct Bulge<T> {
     pub rates: [T; 3],
     pub curvature: T,
     pub most_speed: T,
-    /// At least |C'|. Where that is not above 0 there is no bound.
+    /// A lower bound of |C'|. If it is not positive, the other bounds do not hold.
     pub slope: T,
 }
 
 impl<T: Number> Bulge<T> {
-    /// Where nothing bounds what lies between; `like` has the places of its numbers.
+    /// If no bounds are known: all are infinite. `like` only gives the type of number.
     #[inline(always)]
     pub fn unknown(like: T) -> Self {
         let any = like.filled(f64::INFINITY);
@@ -28,20 +28,20 @@ impl<T: Number> Bulge<T> {
     }
 }
 
-/// What is known of places of a phase.
+/// What is known at some places of a phase.
 pub struct Known<T> {
-    /// The longest interval of u from one to the next.
+    /// The longest interval of u between two neighbouring places.
     pub interval: T,
-    /// The least and the greatest |C'| at them.
+    /// The least and the greatest |C'| at the places.
     pub slopes: [T; 2],
-    /// The greatest lengths of the second and the third derivative by the length.
+    /// The greatest lengths of the second and the third derivative by the length at the places.
     pub second: T,
     pub third: T,
     /// Bounds of the motion along the path by the length; see `SpeedByLength::bounds`.
     pub paces: [Bounds<T>; 3],
 }
 
-/// Of the longest interval between places, on a piece with these bounds of the second to the fifth derivative.
+/// The bounds on the longest interval, on a piece with these bounds of the second to the fifth derivative by u.
 #[inline(always)]
 pub fn bulge<T: Number>([m2, m3, m4, m5]: [T; 4], known: &Known<T>) -> Bulge<T> {
     let h = known.interval;

@@ -2,8 +2,8 @@
 
 use super::number::Number;
 
-/// How far a circle of this curvature leaves its chord of length `step`. Chords longer than the diameter do not
-/// exist; a path of length `step` stays within half of it of one of its ends.
+/// Distance of a circle of this curvature from its chord of length `step`. A circle has no chord longer than its diameter: the
+/// result is then half of `step`, as a path of that length stays within half of it of one of its ends.
 #[inline(always)]
 pub fn chord_error<T: Number>(step: T, curvature: T) -> T {
     let (half, one) = (step * 0.5, step.filled(1.0));

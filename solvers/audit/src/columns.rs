@@ -1,5 +1,6 @@
-//! What limits are about, as functions of the parameter u of the pieces of a path: its axes, or joints that the recorded kinematics
-//! makes of them (`joints::columns`). What differs between the two is here: the checks of a profile and of setpoints are the same.
+//! Evaluates the columns of a path, the quantities that machine limits apply to, as functions of the parameter u of its pieces:
+//! the axes of the path, or the joints by the recorded kinematics (`joints::columns`). All that differs between the two is in
+//! this file: the checks of profiles and setpoints are the same for both.
 
 use std::rc::Rc;
 
@@ -13,15 +14,15 @@ use super::together::Together;
 use super::vectors::{from_to, length, times, vector_of};
 use super::{Check, Limits, Sided, EPS, FEEDS, ROUNDINGS};
 
-/// The speed that chord errors are about, beside those that feeds are about.
+/// Index of the speed that chord errors depend on; the indices below it are those of the feeds.
 pub const CHORD: usize = FEEDS;
 
-/// Pieces of axes, and of joints, that meet at a smaller angle than this, in rad, meet without a corner: between two pieces the
-/// formula of joints is evaluated on other numbers.
+/// Two pieces whose directions differ by less than this angle in rad meet without a corner. The first number is for axes, the
+/// second for joints, whose formula is evaluated on other numbers on the next piece.
 const SMOOTH: [f64; 2] = [1e-9, 1e-6];
 
-/// Intervals of a phase that covers its whole piece, for each degree, those of one from rest, and the least number; of axes, and of
-/// joints.
+/// Number of intervals of a phase: for each degree of its piece that it covers, for the relative change of its speed (1 from
+/// rest), and at least; for axes and for joints.
 const INTERVALS: [[f64; 3]; 2] = [[5.0, 10.0, 4.0], [3.0, 0.0, 2.0]];
 
 /// The rates of an axis: velocity, acceleration and jerk.
@@ -31,9 +32,9 @@ pub const RATES: [Check; 3] = [Check::Velocity, Check::Acceleration, Check::Jerk
 pub struct Columns<'a, const M: usize> {
     pub path: Followed<'a>,
     pub limits: &'a Limits<M>,
-    /// The limits of the rates, and 1 over them.
+    /// The limits of velocity, acceleration and jerk, and their inverses.
     pub rates: [[Sided<M>; 2]; 3],
-    /// 1 over the smaller of the limits of both directions.
+    /// The inverse of the smaller limit of both directions.
     pub per_least: [[f64; M]; 3],
     curves: Curves<'a, M>,
     joints: Option<Box<JointColumns<'a, M>>>,
@@ -54,18 +55,19 @@ impl<'a, const M: usize> Columns<'a, M> {
         self.limits.axes
     }
 
-    /// Whether the columns are the axes of the path, so that bounds of its derivatives are theirs, and a speed at the feed is
-    /// one along the path.
+    /// Whether the columns are the axes of the path: then bounds of its derivatives hold for them, and a speed at the feed is one
+    /// along the path.
     pub fn are_axes(&self) -> bool {
         self.joints.is_none()
     }
 
-    /// The tool's path on a piece, and what each of its axes counts in its length.
+    /// The tool's path on a piece.
     pub fn curve(&mut self, piece: usize) -> &Rc<Curve<M>> {
         self.curves.get(piece)
     }
 
-    /// What computes the columns at several places of a piece at once; None for a piece with weights, and in narrow vectors.
+    /// Evaluates the columns at eight places of a piece at once. None for a rational piece, and on processors with narrow
+    /// vectors.
     pub fn together(&mut self, piece: usize) -> Option<Together<'a, M>> {
         let bend = self.bend(piece);
         let curve = self.curves.get(piece);
@@ -86,7 +88,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// Computes stations and their rounding at once for later calls, each on its piece. Only those of joints are computed so.
+    /// Computes stations and bounds of their rounding errors, each on its piece, several at once for later calls. Only those of
+    /// joints are computed so.
     pub fn look_ahead_on_each(&mut self, at: &[(usize, f64)], room: &mut [Lanes]) {
         let Some(joints) = self.joints.as_mut().filter(|_| are_vectors_wide()) else { return };
         let at: Vec<_> =
@@ -94,11 +97,12 @@ impl<'a, const M: usize> Columns<'a, M> {
         joints.look_ahead_on_each(&at, room);
     }
 
-    /// Memory for the results of the joints' formula at several places at once.
+    /// Memory for the results of the joints' formula at eight places at once.
     pub fn room(&self) -> Vec<Lanes> {
         self.joints.as_ref().map_or(Vec::new(), |joints| joints.of.room([0.0; 8]))
     }
 
+    /// The factor of each path axis in the length of the path.
     pub fn scale(&self) -> [f64; M] {
         self.joints.as_ref().map_or([1.0; M], |joints| joints.of.scale())
     }
@@ -116,7 +120,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         Place { piece, u, tip, position, slope, way_slope, tip_slope: way_slope }
     }
 
-    /// The same with derivatives by the length of the path; none where the piece has no direction.
+    /// The derivatives by the length of the path at the place u of a piece; None where the piece has no direction.
     pub fn station(&mut self, piece: usize, u: f64) -> Option<Station<M>> {
         let curve = self.curves.get(piece);
         match &mut self.joints {
@@ -125,7 +129,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// A station at an end of a phase, where the rounding of joints is asked for and takes little longer with the rest.
+    /// A station at an end of a phase. For joints its rounding errors are needed later, and are computed with it at little extra
+    /// cost.
     pub fn station_at_end(&mut self, piece: usize, u: f64) -> Option<Station<M>> {
         match self.are_axes() {
             true => self.station(piece, u),
@@ -133,7 +138,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// What of a station of a piece may be rounding.
+    /// Bounds of the rounding errors of a station on a piece.
     pub fn roundings(&mut self, piece: usize, station: &Station<M>) -> Roundings<M> {
         let curve = self.curves.get(piece);
         match &mut self.joints {
@@ -142,7 +147,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// A station and what of it may be rounding. It is inlined, so that what is not used of both is not computed.
+    /// A station, and bounds of its rounding errors. Inlined, so that what a caller does not use of both is not computed.
     #[inline(always)]
     pub fn rounded_station(&mut self, piece: usize, u: f64) -> Option<(Station<M>, Roundings<M>)> {
         let curve = self.curves.get(piece);
@@ -154,7 +159,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         Some((station, Roundings::new(curve, &station, &derivatives)))
     }
 
-    /// The way of each column from one place of a piece to another.
+    /// Displacement of each column from one place of a piece to another one.
     pub fn way(&mut self, from: &Place<M>, to: &Place<M>) -> Rounded<M> {
         let curve = self.curves.get(from.piece);
         if let Some(joints) = &mut self.joints {
@@ -165,7 +170,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         Rounded { value, rounding: vector_of(|k| step * from.slope.rounding[k]) }
     }
 
-    /// From a place on one piece to a place on another: angles known up to whole turns go the shorter way.
+    /// Displacement from a place on one piece to a place on another: angles known up to whole turns go the shorter way.
     pub fn difference(&mut self, pieces: [usize; 2], a: &[f64; M], b: &[f64; M]) -> [f64; M] {
         match &mut self.joints {
             Some(joints) => joints.difference(&mut self.curves, pieces, a, b),
@@ -173,7 +178,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// The way from the place u of a piece to `q`, and the slopes there.
+    /// The displacement from the place u of a piece to `q`, and the derivatives by u at that place.
     pub fn toward(&mut self, piece: usize, u: f64, q: &[f64; M]) -> [[f64; M]; 2] {
         let curve = self.curves.get(piece);
         if let Some(joints) = &mut self.joints {
@@ -183,7 +188,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         [from_to(&point, q), slope]
     }
 
-    /// Derivative by u of the way whose speed a phase holds, in which axes of the path count by their `share`, and its error.
+    /// Derivative by u of the length whose speed a phase holds, in which the axes of the path count by their `share`; and its
+    /// error.
     pub fn held_slope(&mut self, piece: usize, u: f64, share: &[f64; M]) -> [f64; 2] {
         let curve = self.curves.get(piece);
         if let Some(joints) = &mut self.joints {
@@ -194,17 +200,17 @@ impl<'a, const M: usize> Columns<'a, M> {
         [slope, ROUNDINGS * EPS * size]
     }
 
-    /// The same derivative at several places.
+    /// The derivative of `held_slope` at several places.
     pub fn held_slopes<const K: usize>(&mut self, piece: usize, u: [f64; K], share: &[f64; M]) -> [f64; K] {
         let (curve, Some(joints)) = (self.curves.get(piece), &mut self.joints) else {
-            // Mostly lines, whose derivative takes no longer alone.
+            // For axes these pieces are mostly lines, on which one place at a time takes no longer.
             return u.map(|u| self.held_slope(piece, u, share)[0]);
         };
         let on = joints.piece(piece, curve);
         on.fed_axes().map_or_else(|| u.map(|u| on.feed_slope(u)), |counts| curve.speeds(u, &counts))
     }
 
-    /// The greatest speeds of a piece.
+    /// The feeds of a piece, in mm/s or degrees/s.
     pub fn feeds(&self, piece: usize) -> [f64; FEEDS] {
         match &self.joints {
             Some(joints) => [joints.of.feed[piece], f64::INFINITY, f64::INFINITY, f64::INFINITY],
@@ -212,7 +218,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// Which feeds of a piece limit the speed along the path, or that of the tool of joints: they count all axes that move.
+    /// Which feeds of a piece count all axes that move on it, and so limit the speed along the path (for joints: the speed of the
+    /// tool).
     pub fn feeds_along(&mut self, piece: usize) -> [bool; FEEDS] {
         let (are_axes, limits) = (self.are_axes(), self.limits);
         let moves = self.curves.get(piece).derivative_size();
@@ -220,8 +227,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         std::array::from_fn(|feed| !are_axes || (0..limits.axes).all(|k| counts(feed, k)))
     }
 
-    /// The speed that a feed, or with `CHORD` the chord error, is about, and its error: from velocities of the columns, or that
-    /// of the `tip`.
+    /// The speed that a feed limits, or with `CHORD` the one that the chord error depends on, and its error, in mm/s. For axes it
+    /// follows from their velocities; for joints it is that of the tool, `tip`.
     pub fn speed(&self, feed: usize, velocity: &Rounded<M>, tip: [f64; 2]) -> [f64; 2] {
         let Rounded { value, rounding } = velocity;
         match feed {
@@ -231,7 +238,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// The tool where the columns are at `q`, whose place on the path is known.
+    /// Position of the tool for the columns `q`, which belong to the place u of a piece.
     pub fn tip(&mut self, piece: usize, u: f64, q: &[f64; M]) -> [f64; M] {
         match self.are_axes() {
             true => *q,
@@ -239,8 +246,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// The tool of joints at a place, in the axes whose motion the feed of its piece limits, and that feed; it is not a number where it
-    /// limits a turn.
+    /// For joints: position of the tool at a place, in the axes whose motion the feed of its piece limits, and that feed. NaN
+    /// instead of the feed where it limits an angular speed.
     pub fn fed_tip(&mut self, nearest::Place { piece, u }: nearest::Place) -> ([f64; M], f64) {
         let curve = self.curves.get(piece);
         let (tip, Some(joints)) = (curve.at(u), &mut self.joints) else { return ([0.0; M], f64::NAN) };
@@ -248,7 +255,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         counts.map_or((tip, f64::NAN), |counts| (times(&counts, &tip), feed))
     }
 
-    /// The straight way of the tool that a feed limits between two places of a piece.
+    /// Straight distance of the tool between two places of a piece, as `feed` counts it.
     pub fn tip_way(&mut self, piece: usize, feed: usize, from: &[f64; M], to: &[f64; M]) -> f64 {
         match &mut self.joints {
             Some(joints) => joints.piece(piece, self.curves.get(piece)).feed_way(from, to),
@@ -256,7 +263,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// Which axes of the path a chord error is measured in, and the curvature of the tool's path there, in 1/mm.
+    /// The axes of the path in which a chord error is measured, 1 or 0.
     pub fn chord_axes(&mut self, piece: usize) -> [f64; M] {
         match &mut self.joints {
             Some(joints) => joints.piece(piece, self.curves.get(piece)).linear(),
@@ -264,6 +271,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
+    /// Curvature of the tool's path at u of a piece, in 1/mm.
     pub fn curvature(&mut self, piece: usize, u: f64) -> f64 {
         let curve = self.curves.get(piece);
         match &mut self.joints {
@@ -272,7 +280,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// The greatest second derivative of the columns by u on a piece, of joints about; infinite where it is not known.
+    /// Bound of the second derivative of the columns by u on a piece, for joints an estimate; infinite if it is not known.
     pub fn bend(&mut self, piece: usize) -> f64 {
         match &self.joints {
             Some(joints) => joints.bend(piece),
@@ -280,7 +288,8 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// What the rounding of positions on a piece is relative to, beside the positions: the greatest coordinate of its ends.
+    /// The magnitude to which the rounding of positions on a piece is relative, besides the positions: the greatest coordinate of
+    /// its ends, for joints that of the first control point.
     pub fn magnitude(&mut self, piece: usize) -> f64 {
         let curve = self.curves.get(piece);
         match &mut self.joints {
@@ -289,7 +298,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// What rounding of the control points turns the slopes of a piece against those of its neighbour.
+    /// By how much rounding of the control points may change C' of a piece against that of its neighbour; 0 for joints.
     pub fn turned(&mut self, piece: usize) -> f64 {
         let curve = self.curves.get(piece);
         match self.joints {
@@ -305,20 +314,20 @@ impl<'a, const M: usize> Columns<'a, M> {
         before == after
     }
 
-    /// Intervals on which the rates of a phase by length are followed that covers so many degrees of its piece and changes
-    /// its speed by this part.
+    /// Number of intervals of a phase by length that covers `covered` degrees of its piece and changes its speed by the relative
+    /// amount `change`.
     pub fn intervals(&self, covered: f64, change: f64) -> f64 {
         let [places, speeds, least] = INTERVALS[usize::from(!self.are_axes())];
         (places * covered + speeds * change).max(least)
     }
 
-    /// A time in s over which a jump of velocity may spread on a phase of this duration, in a servo period at least. Plans of
-    /// joints are made on stand-ins for them, some 1e-10 mm off.
+    /// Time in s over which a jump of velocity may be spread on a phase of this duration, at least a servo period. It is longer
+    /// for joints: their plans are made on interpolants of the joints, which are some 1e-10 mm off.
     pub fn settling(&self, duration: f64) -> f64 {
         self.limits.period.max(if self.are_axes() { 0.0 } else { duration })
     }
 
-    /// A jump of the speed of the tool, at a place and over a settling time, that means nothing to any column.
+    /// The greatest jump of the tool's speed at a place, in mm/s, that is negligible for all columns if it is spread over `time`.
     pub fn negligible_speed(&self, place: &Place<M>, time: f64) -> f64 {
         let least = |of: &dyn Fn(usize) -> f64| (0..self.count()).map(of).fold(f64::INFINITY, f64::min);
         let weakest = |time: f64| least(&|k| self.limits.negligible_jump(k, time));
@@ -336,7 +345,7 @@ impl<'a, const M: usize> Columns<'a, M> {
         }
     }
 
-    /// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
+    /// Two pieces whose directions differ by less than this angle in rad meet without a corner.
     pub fn smooth(&self) -> f64 {
         SMOOTH[usize::from(!self.are_axes())]
     }

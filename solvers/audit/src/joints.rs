@@ -1,4 +1,4 @@
-//! What the audit knows of joints that are not the path's axes: by the recorded formula of the kinematics.
+//! Evaluates joints that are not the path's axes, by the recorded formula of the kinematics.
 
 pub(crate) mod columns;
 pub mod formula;

@@ -63,18 +63,18 @@ use parallel::tell;
 pub use parallel::Seen;
 pub use tally::{Check, Tally, Worst, CHECKS};
 
-/// A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
-/// 100 000 pieces (some 1e-10) and means nothing to a machine.
+/// A use of a limit (value over limit) passes up to here: a millionth covers the planner's own rounding over 100 000 pieces (some
+/// 1e-10) and does not matter to a machine.
 pub const PASS_MARK: f64 = 1.0 + PASS_EXCESS;
 
-/// What the pass mark allows beyond the limit.
+/// The part of a limit by which the pass mark is above it.
 pub const PASS_EXCESS: f64 = 1e-6;
 
-/// Spacing of the numbers at 1.
+/// Spacing of the floating-point numbers at 1.
 pub const EPS: f64 = f64::EPSILON;
 
-/// Roundings, in units of `EPS` of the magnitude, that one evaluated position or velocity may carry: some
-/// sixteen operations of half a unit each lie on the way from the stored numbers to it.
+/// Rounding error bound of an evaluated position or velocity, in units of `EPS` of the magnitude: it takes some sixteen
+/// operations of half a unit each from the stored numbers.
 pub const ROUNDINGS: f64 = 8.0;
 
 /// How far, in mm, a setpoint may lie from its place on the path, beyond rounding: a nanometre.

@@ -1,11 +1,11 @@
-//! The limits of a machine that hold everywhere on a path.
+//! The limits of the machine and of the path that hold at all places.
 
 use super::{vectors, PASS_EXCESS};
 
-/// Speeds that feeds are about: along X, Y, Z, along U, V, W, of all other axes, and of all together.
+/// Number of speeds that a feed can limit: along X, Y, Z; along U, V, W; of all other axes; and of all axes together.
 pub const FEEDS: usize = 4;
 
-/// A limit of each axis in both directions, as sizes: of what is positive, of what is negative.
+/// A limit of each axis for positive and for negative values, both as absolute values.
 #[derive(Clone, Copy, Debug)]
 pub struct Sided<const M: usize> {
     pub positive: [f64; M],
@@ -16,7 +16,7 @@ impl<const M: usize> Sided<M> {
     /// The limit that holds for a value, by its sign.
     #[inline(always)]
     pub fn of(&self, axis: usize, value: f64) -> f64 {
-        // Both are read, so that no branch follows a sign that changes often.
+        // Both are read, so that there is no branch on a sign that changes often.
         let (positive, negative) = (self.positive[axis], self.negative[axis]);
         if value < 0.0 {
             negative
@@ -31,7 +31,8 @@ impl<const M: usize> Sided<M> {
         vectors::vector_of(|k| self.of(k, values[k]))
     }
 
-    /// What a value is to be multiplied by for the share of its limit; a limit of 0 stays out of reach of 0 alone.
+    /// 1/limit: value × inverse is the use of the limit. A limit of 0 gives the greatest finite number, so that any value but 0
+    /// exceeds it.
     pub fn inverse(&self) -> Self {
         let inverse = |limits: [f64; M]| limits.map(|limit| (1.0 / limit).min(f64::MAX));
         Self { positive: inverse(self.positive), negative: inverse(self.negative) }
@@ -58,22 +59,22 @@ impl<const M: usize> Sided<M> {
 /// The limits that hold everywhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
-    /// Those beyond are 0, and their travel is not limited.
+    /// Number of axes. The limits of axes beyond are 0, and their travel is not limited.
     pub axes: usize,
     /// In mm/s, mm/s² and mm/s³.
     pub velocity: Sided<M>,
     pub acceleration: Sided<M>,
     pub jerk: [f64; M],
-    /// Whether jerk is judged; else it is only measured where that costs nothing.
+    /// Whether jerk limits are checked; otherwise jerk is only measured where that costs nothing.
     pub judges_jerk: bool,
     /// Jump of each axis velocity that is allowed at a corner, in mm/s.
     pub jump: [f64; M],
-    /// What of it may show in differences of setpoints as an acceleration above the limit: nothing of a jump that is
-    /// no more than the limit over a period.
+    /// Jump of each axis velocity at a corner, in mm/s, that may show in differences of setpoints as an acceleration above its
+    /// limit; 0 if `jump` is only what the acceleration limit gives in a period.
     pub jump_beyond: [f64; M],
     /// Least and greatest position, in mm.
     pub travel: [[f64; 2]; M],
-    /// What the velocity of each axis counts in each speed that a feed is about, 0 or 1.
+    /// The factor, 0 or 1, of each axis velocity in each speed that a feed can limit.
     pub feed_axes: [[f64; M]; FEEDS],
     /// In mm; infinite: not limited.
     pub chord_tolerance: f64,
@@ -84,21 +85,22 @@ pub struct Limits<const M: usize> {
 }
 
 impl<const M: usize> Limits<M> {
-    /// What of a velocity or a way counts in a speed that a feed is about.
+    /// The components of a velocity or displacement that count towards a kind of feed; the others are 0.
     #[inline]
     pub fn counted(&self, feed: usize, of: &[f64; M]) -> [f64; M] {
         std::array::from_fn(|k| self.feed_axes[feed][k] * of[k])
     }
 
-    /// How far the mean of the recorded velocities of one axis at both ends of a step may be from the mean velocity: an eighth of the
-    /// way from the least acceleration to the greatest, and half of a jump.
+    /// How far the mean of the recorded velocities of one axis at both ends of a step may be from the mean velocity, in mm/s: an
+    /// eighth of the range of accelerations times `step` in s, and half of a jump.
     #[inline(always)]
     pub fn mean_velocity_off(&self, axis: usize, step: f64) -> f64 {
         let span = self.acceleration.positive[axis] + self.acceleration.negative[axis];
         0.125 * span * step + 0.5 * self.jump[axis]
     }
 
-    /// The jump of one axis velocity that means nothing: over this time it adds no more than the pass mark to the acceleration.
+    /// The greatest jump of one axis velocity that is negligible, in mm/s: over `time` in s it adds no more than `PASS_EXCESS` of
+    /// the acceleration limit.
     #[inline]
     pub fn negligible_jump(&self, axis: usize, time: f64) -> f64 {
         PASS_EXCESS * self.acceleration.least(axis) * time
@@ -107,7 +109,7 @@ impl<const M: usize> Limits<M> {
 
 #[cfg(test)]
 impl<const M: usize> Limits<M> {
-    /// Nothing is limited.
+    /// Limits that allow everything.
     pub fn none() -> Self {
         let anything = Sided { positive: [f64::INFINITY; M], negative: [f64::INFINITY; M] };
         Self {

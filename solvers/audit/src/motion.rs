@@ -1,4 +1,4 @@
-//! The motion on a phase of a profile, by the length of the path or by the parameter.
+//! The motion on a phase of a profile, given by the length of the path or by the parameter.
 
 use super::columns::Columns;
 use super::phase_by_length::PhaseByLength;
@@ -8,7 +8,7 @@ use super::speed_by_length::Pace;
 use super::station::Rounded;
 use super::vectors::vector_of;
 
-/// Halvings until a place is known as closely as its numbers.
+/// Bisection steps after which a place is known to all its bits.
 const MOST_STEPS: u32 = 53;
 
 /// A phase ready to be evaluated at any u of it.
@@ -24,7 +24,7 @@ enum Law<const M: usize> {
     ByParameter(PhaseMotion<M>),
 }
 
-/// A place of a phase.
+/// The motion at a place of a phase.
 #[derive(Clone, Copy, Debug)]
 pub struct Passage<const M: usize> {
     pub u: f64,
@@ -32,12 +32,13 @@ pub struct Passage<const M: usize> {
     pub since: f64,
     pub doubt: f64,
     pub velocity: Rounded<M>,
-    /// Where it follows from the place at once: on phases by length; any where the path has no direction.
+    /// Accelerations, if they follow from the place directly: on phases by length. Where the path has no direction their error is
+    /// infinite.
     pub acceleration: Option<Rounded<M>>,
 }
 
 impl<const M: usize> Passage<M> {
-    /// Where it is at u, but not when and how.
+    /// A passage at u, whose time and motion are not known.
     pub fn unknown(u: f64) -> Self {
         let velocity = Rounded { value: [f64::NAN; M], rounding: [0.0; M] };
         Self { u, since: f64::NAN, doubt: f64::NAN, velocity, acceleration: None }
@@ -45,7 +46,7 @@ impl<const M: usize> Passage<M> {
 }
 
 impl<const M: usize> Motion<M> {
-    /// Of phase `i`, whose numbers must be good.
+    /// The motion on phase `i`, whose numbers must be usable (`Phases::have_good_numbers`).
     pub fn new(phases: &Phases, i: usize, columns: &mut Columns<M>) -> Self {
         let law = match phases.by_length(i, columns) {
             Some(motion) => Law::ByLength(motion),
@@ -101,7 +102,7 @@ impl<const M: usize> Motion<M> {
         }
     }
 
-    /// u at a time since the start of the phase.
+    /// u at a time in s since the start of the phase, by bisection.
     pub fn place_at(&self, time: f64, columns: &mut Columns<M>) -> f64 {
         let [mut low, mut high] = self.u;
         for _ in 0..MOST_STEPS {

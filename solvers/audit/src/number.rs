@@ -1,4 +1,4 @@
-//! Formulas that are evaluated for one number as well as for eight at once, in the vectors of the processor.
+//! Formulas that are evaluated for one number as well as for eight at once, in SIMD vectors.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -17,12 +17,12 @@ pub trait Number:
     + Mul<f64, Output = Self>
     + Div<Output = Self>
 {
-    /// Its form in memory.
+    /// The type that holds it in memory.
     type Kept: Copy;
     fn kept(self) -> Self::Kept;
-    /// The number that is kept. In this and the next function `self` tells only how many places it has.
+    /// Reads it from memory. In this and the next function `self` only gives the type.
     fn taken(self, kept: &Self::Kept) -> Self;
-    /// The value in all places.
+    /// The value in all lanes.
     fn filled(self, value: f64) -> Self;
     fn smaller(self, other: Self) -> Self;
     fn greater(self, other: Self) -> Self;
@@ -30,7 +30,7 @@ pub trait Number:
     fn root(self) -> Self;
     /// The nearest integer.
     fn rounded(self) -> Self;
-    /// The number itself where `of` is finite, else `other`.
+    /// `self` where `of` is finite, else `other`.
     fn where_finite(self, of: Self, other: f64) -> Self;
 }
 
@@ -132,13 +132,13 @@ impl<S: Simd> Number for f64x8<S> {
 
     #[inline(always)]
     fn where_finite(self, of: Self, other: f64) -> Self {
-        // 0 times what is not finite is no number.
+        // 0 × x is NaN if x is not finite.
         (of * 0.0).simd_eq(of.filled(0.0)).select(self, of.filled(other))
     }
 }
 
-/// Whether places are computed at eight at once. In vectors of two numbers, which every x86-64 processor has, that takes as long as
-/// one place after the other, so it is compiled for wider ones only.
+/// Whether eight places are computed at once. With vectors of two numbers, which every x86-64 processor has, that is no faster
+/// than one place after the other, so it is compiled for wider ones only.
 pub fn are_vectors_wide() -> bool {
     #[cfg(target_arch = "x86_64")]
     let are_wide = fearless_simd::Level::new().as_avx2().is_some();
@@ -147,7 +147,7 @@ pub fn are_vectors_wide() -> bool {
     are_wide
 }
 
-/// Evaluates an expression in the vectors of a processor where `are_vectors_wide`.
+/// Evaluates an expression in SIMD vectors; only on a processor where `are_vectors_wide`.
 macro_rules! in_wide_vectors {
     ($simd:ident => $of:expr) => {
         match fearless_simd::Level::new() {
@@ -168,7 +168,7 @@ macro_rules! in_wide_vectors {
 }
 pub(crate) use in_wide_vectors;
 
-/// How a vector is kept in memory.
+/// The numbers of a vector in the type that holds them in memory.
 #[inline(always)]
 pub fn kept<const M: usize, T: Number>(a: [T; M]) -> [T::Kept; M] {
     let mut kept = [a[0].kept(); M];

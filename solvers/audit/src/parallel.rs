@@ -1,5 +1,5 @@
-//! Loops over blocks on all cores, and what is told of their progress. The loop itself is compiled once, not for each kind of
-//! work and each number of axes.
+//! Loops over blocks on all cores, and their progress callback. The loop itself is compiled once, not for each kind of work and
+//! each number of axes.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -8,20 +8,20 @@ use rayon::prelude::*;
 
 use super::Tally;
 
-/// Told of how many more phases, pieces or moves have been looked at; it may end the audit by unwinding.
+/// Progress callback: gets the number of phases, pieces or moves checked since its last call. It may stop the audit by a panic.
 pub type Seen<'a> = &'a (dyn Fn(usize) + Sync);
 
-/// It is told of so many at a time.
+/// Number that the callback gets at each call.
 const TOLD: usize = 64;
 
-/// Tells of number `i` of a loop.
+/// Calls the callback at every `TOLD`-th item `i` of a loop.
 pub fn tell(seen: Seen, i: usize) {
     if i.is_multiple_of(TOLD) {
         seen(TOLD);
     }
 }
 
-/// Threads that work on a loop.
+/// Number of threads that work on a loop.
 pub fn threads() -> usize {
     rayon::current_num_threads()
 }
@@ -30,18 +30,19 @@ fn each_block(blocks: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..blocks).into_par_iter().for_each(work);
 }
 
-/// Calls `work` with the number of every part of so many items, and the part.
+/// Divides the items into parts of `size` and calls `work` with the number of each part and the part.
 pub fn each_part<T: Send>(items: &mut [T], size: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
     let parts: Vec<Mutex<&mut [T]>> = items.chunks_mut(size).map(Mutex::new).collect();
     each_block(parts.len(), &|number| {
-        // Nobody else ever has it.
+        // No other thread ever locks this part.
         if let Ok(mut part) = parts[number].lock() {
             work(number, &mut part);
         }
     });
 }
 
-/// What `work` finds in blocks of so many of `count` things, in their order, beside what is known.
+/// Calls `work` for blocks of `size` of the `count` items and merges what they find. Each block starts from the tally `known`,
+/// without its samples.
 pub fn tally<const M: usize>(
     known: &Tally<M>,
     count: usize,

@@ -1,16 +1,16 @@
-//! Between three even places, where a share of a limit is greatest: at the vertex of a parabola.
+//! Estimates the peak of a limit's use between three equally spaced places by the vertex of the parabola through them.
 
-/// A peak above the places by less than this part is left out.
+/// A peak that is above the places by less than this part is ignored.
 const NEGLIGIBLE: f64 = 1e-6;
 
-/// A share at a vertex, and where that is: from −1 at the first place to 1 at the last.
+/// The use of a limit at a vertex, and the place of the vertex: from −1 at the first place to 1 at the last.
 pub struct Peak {
     pub at: f64,
     pub top: f64,
 }
 
-/// Of a share with its sign at three places, each as far from the next: the peak, up or down, that it may have beyond all three and
-/// the `worst` so far.
+/// The peak, up or down, of a use with its sign at three equally spaced places; None if it cannot be above all three and the
+/// `worst` so far.
 #[inline(always)]
 pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<Peak> {
     let (bend, slope) = (2.0 * b - a - c, c - a);
@@ -19,20 +19,20 @@ pub fn peak([a, b, c]: [f64; 3], worst: f64) -> Option<Peak> {
     }
     let top = b + slope * slope / (8.0 * bend);
     let most = a.abs().max(b.abs()).max(c.abs()).max(worst);
-    // The true peak may be beyond the vertex: the third order shows the more, the more the three bend.
+    // Terms of third order may raise the true peak above the vertex: by more, the more the three uses bend.
     let missed = bend * bend / most;
     let peak = Peak { at: 0.5 * slope / bend, top };
     (top.abs() + missed > (1.0 + NEGLIGIBLE) * most).then_some(peak)
 }
 
-/// Whether no peak of the share is beyond the `worst` so far, however the three bend: neither the vertex nor what it may have missed
-/// adds more than half of the bend, and all of it.
+/// Whether no peak can be above the `worst` so far, whatever the slope: the vertex adds at most half of the second difference
+/// `bend`, the terms of third order add at most all of it.
 #[inline(always)]
 fn is_far_below([a, b, c]: [f64; 3], worst: f64) -> bool {
     b.abs() + 1.5 * (2.0 * b - a - c).abs() <= worst
 }
 
-/// The same of all axes: most shares are far below.
+/// Whether `is_far_below` holds for all axes, as it does at most places.
 #[inline(always)]
 pub fn are_far_below<const M: usize>([a, b, c]: [&[f64; M]; 3], worst: &[f64; M]) -> bool {
     let mut all = true;
@@ -43,8 +43,8 @@ pub fn are_far_below<const M: usize>([a, b, c]: [&[f64; M]; 3], worst: &[f64; M]
 }
 
 impl Peak {
-    /// Whether the share beside the peak may be beyond the `worst` so far, where it is `found` at the vertex: about as far from that as
-    /// the parabola has been.
+    /// Whether the use beside the vertex may be above the `worst` so far. At the vertex the use is `found`, which differs from
+    /// the parabola; beside it the use is taken to exceed `found` by up to this difference.
     pub fn may_pass(&self, found: f64, worst: f64) -> bool {
         found.abs() + (found - self.top).abs() > (1.0 + NEGLIGIBLE) * worst
     }

@@ -1,7 +1,8 @@
-//! The motion on a phase whose speed is known by the length of the path: at the feed, at constant jerk, v² a cubic of it.
+//! The motion on a phase whose speed is given by the length of the path: constant, at constant jerk, or with v² a cubic of the
+//! length.
 //!
-//! Speed v, acceleration a and jerk j along the path come from the length (`speed_by_length`), the length from Kronrod's rule
-//! over |C'|; the rates of the axes from both and the place (`station`).
+//! Speed v, acceleration a and jerk j along the path follow from the length (`speed_by_length`), the length from Kronrod's rule
+//! over |C'|. With the derivatives by the length (`station`) these give the rates of the axes.
 
 use super::number::inner;
 use std::rc::Rc;
@@ -13,16 +14,16 @@ use super::speed_by_length::{Pace, SpeedByLength};
 use super::station::Station;
 use super::{EPS, ROUNDINGS};
 
-/// An interval on which the rule is good: the distance of its start from the anchor and the length up to there, and the same of
-/// its middle.
+/// An interval on which the rule is accurate. `start` is the distance of its start from the anchor in u, and the length from the
+/// anchor up to there; `middle` is the same for its middle.
 #[derive(Clone, Copy)]
 struct Measured {
     start: [f64; 2],
     middle: [f64; 2],
 }
 
-/// A place of a phase: u, the length from the anchor, the motion along the path, and the time from the anchor where the motion
-/// follows from that.
+/// A place of a phase: u, the length from the anchor, and the motion along the path; and the time from the anchor, if the motion
+/// was computed from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub u: f64,
@@ -35,20 +36,21 @@ pub struct Place {
 #[derive(Clone)]
 pub struct PhaseByLength<const M: usize> {
     curve: Rc<Curve<M>>,
-    /// What each axis counts in the length.
+    /// The factor of each axis in the length.
     scale: [f64; M],
     u: [f64; 2],
     anchored_at_end: bool,
     duration: f64,
     speed: SpeedByLength,
-    /// Where the rule is good, in order, mostly once, and the distance of the last end from the anchor and the length up to there.
+    /// Intervals on which the rule is accurate, in order; mostly there is only the first one. `whole` is the distance of the end
+    /// of the last one from the anchor in u, and the length up to there.
     first: Option<Measured>,
     others: Vec<Measured>,
     whole: [f64; 2],
 }
 
 impl<const M: usize> PhaseByLength<M> {
-    /// Between two parameters, with the speed that `speed` makes of the whole length; lengths and times count from the anchor.
+    /// The phase between two parameters; `speed` makes its speed from its length. Lengths and times count from the anchor.
     pub fn new(
         curve: Rc<Curve<M>>,
         scale: [f64; M],
@@ -75,7 +77,7 @@ impl<const M: usize> PhaseByLength<M> {
         self.curve.speeds(at, &self.scale)
     }
 
-    /// Adds the lengths of parts between two distances from the anchor.
+    /// Adds the intervals between two distances from the anchor, which are halved until the rule is accurate.
     fn measure(&mut self, from: f64, to: f64, halvings: &mut u32) {
         let ([fine, doubt], half) = kronrod_halves(|d| self.slopes(d), from, to);
         let middle = 0.5 * (from + to);
@@ -107,7 +109,7 @@ impl<const M: usize> PhaseByLength<M> {
         let way = if d >= self.whole[0] {
             self.whole[1]
         } else if d > from + EPS * self.u[1] {
-            // On half of an interval Gauss's rule is closer than it was on the whole one.
+            // On half of an interval Gauss's rule is more accurate than it was on the whole one.
             before + gauss(|d| self.slopes(d), from, d)
         } else {
             before
@@ -119,7 +121,7 @@ impl<const M: usize> PhaseByLength<M> {
         Place { u, way, pace, time }
     }
 
-    /// Time since the start of the phase at a place.
+    /// Time from the start of the phase to a place, in s.
     pub fn since(&self, place: &Place) -> f64 {
         let time = place.time.unwrap_or_else(|| self.speed.time(place.way));
         if self.anchored_at_end {
@@ -134,19 +136,18 @@ impl<const M: usize> PhaseByLength<M> {
         matches!(self.speed, SpeedByLength::Constant { .. })
     }
 
-    /// Time of the whole phase by its law.
+    /// Time of the whole phase by its law, in s.
     pub fn time(&self) -> f64 {
         self.speed.time(self.whole[1])
     }
 
-    /// What of the velocity of each axis may be rounding, for all that moves in the direction of the path by 1: where the length
-    /// is rounded v is another one.
+    /// Bound of the error in v, in mm/s, that comes from the rounding of the length: v² changes by 2 a times that.
     pub fn speed_rounding(&self, Pace { v, a, .. }: Pace, slope: f64) -> f64 {
         let gained = a.abs() * EPS * self.curve.width() * slope;
         ROUNDINGS * if gained < v * v { gained / v } else { gained.sqrt() }
     }
 
-    /// What is known of the places between two, in the order of travel; nothing where |C'| has no bound.
+    /// Bounds between two places, in the order of travel; None if |C'| has no positive lower bound.
     pub fn bulge(&self, [from, to]: [&Place; 2], [near, far]: [&Station<M>; 2]) -> Option<Bulge<f64>> {
         let most = |a: &[f64; M], b: &[f64; M]| inner(a, a).max(inner(b, b)).sqrt();
         let known = Known {

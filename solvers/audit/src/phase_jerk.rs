@@ -1,8 +1,8 @@
-//! Audits what a method that limits jerk says of the acceleration along the path, and its jumps where phases meet: of axes, and of
-//! joints on the way of the tool.
+//! Audits the accelerations along the path that a plan with limited jerk records, and their jumps where phases meet; for axes,
+//! and for joints along the path of the tool.
 //!
-//! Where the path's curvature jumps A does so too, however smooth v is. A third difference of setpoints that lies half-way
-//! over such a step shows 3/4 of it over the period as a jerk: with more than the limit of that alone, setpoints break it.
+//! Where the path's curvature jumps, the acceleration does so too, however smooth v is. A third difference of setpoints whose
+//! middle is at such a jump shows 3/4 of it over the period as a jerk: if this alone is above the limit, the setpoints break it.
 
 use super::columns::Columns;
 use super::phases::Phases;
@@ -11,7 +11,7 @@ use super::station::Station;
 use super::vectors::{distance, length};
 use super::{Check, Limits, Tally, EPS, PASS_EXCESS, ROUNDINGS};
 
-/// The greatest part of a step of the acceleration over a period that a third difference of setpoints shows.
+/// The greatest part of a jump of the acceleration, over a period, that a third difference of setpoints shows.
 const MOST_SHOWN: f64 = 0.75;
 
 /// A path and the profile on it.
@@ -25,11 +25,12 @@ pub struct Jerks<'a, const M: usize> {
 }
 
 impl<const M: usize> Jerks<'_, M> {
-    /// The recorded accelerations of phase `i` against its jerk, and whether a law limits its jerk at all.
+    /// Checks the recorded accelerations of phase `i` against its jerk. A phase whose law does not limit the jerk breaks all jerk
+    /// limits.
     pub fn alone(&self, i: usize, width_rounding: f64, is_by_length: bool, line: i32, tally: &mut Tally<M>) {
         let (phases, limits, start) = (self.phases, self.limits, self.starts[i]);
         let error = phases.acceleration_error(i, width_rounding);
-        // An error that builds up over the phase is that much jerk.
+        // Spread over the phase, the error is a jerk of that size over the duration.
         let negligible = self.negligible(phases.duration[i]);
         tally.offer(Check::AccelerationContinuity, 0, error, negligible, start, line);
         for k in (0..limits.axes).filter(|&k| !is_by_length && limits.jerk[k].is_finite()) {
@@ -37,20 +38,20 @@ impl<const M: usize> Jerks<'_, M> {
         }
     }
 
-    /// The acceleration at the start or the end of a run at rest.
+    /// Checks that the acceleration is 0 at the start or the end of a run at rest.
     pub fn rest(&self, i: usize, at_end: bool, line: i32, tally: &mut Tally<M>) {
         let a = self.phases.end_acceleration(i, at_end).map_or(0.0, f64::abs);
         let time = self.starts[i] + if at_end { self.phases.duration[i] } else { 0.0 };
         tally.offer(Check::AccelerationContinuity, 0, a, self.negligible(0.0), time, line);
     }
 
-    /// The step of the acceleration from phase `i` to phase `j`, the next one in its run.
+    /// Checks the jump of the acceleration from phase `i` to phase `j`, the next one in its run.
     pub fn joint(&self, [i, j]: [usize; 2], columns: &mut Columns<M>, line: i32, tally: &mut Tally<M>) {
         let (phases, limits, time) = (self.phases, self.limits, self.starts[j]);
         let (Some(before), Some(after)) =
             (phases.end_acceleration(i, true), phases.end_acceleration(j, false))
         else {
-            return; // said of the phase itself
+            return; // reported with the phase itself
         };
         let rests = phases.p1[i] == 0.0 && phases.p0[j] == 0.0;
         if !rests {
@@ -66,7 +67,7 @@ impl<const M: usize> Jerks<'_, M> {
         let ends = [(pieces[0], phases.u1[i]), (pieces[1], phases.u0[j])]
             .map(|(piece, u)| columns.rounded_station(piece, u));
         let [Some((from, from_roundings)), Some((to, to_roundings))] = ends else {
-            // Without a direction an acceleration goes anywhere.
+            // Without a direction of the path the accelerations are not known: at rest that counts as a jump.
             for k in (0..limits.axes).filter(|_| rests) {
                 tally.offer(Check::AccelerationContinuity, k, f64::INFINITY, limits.jerk[k], time, line);
             }
@@ -77,7 +78,8 @@ impl<const M: usize> Jerks<'_, M> {
             let turn = distance(&directions[0], &directions[1]);
             turn.is_nan() || turn > self.smooth
         };
-        // At a corner the velocities jump. At rest the motion goes on only where the path turns back along the line that it came on.
+        // At a corner the velocities jump as well. At rest an acceleration can go on only where the path turns back along the
+        // same line.
         if !rests && is_corner() {
             return;
         }
@@ -96,8 +98,8 @@ impl<const M: usize> Jerks<'_, M> {
         }
     }
 
-    /// A change of the acceleration over a time that means nothing to any axis: in that time, or in a servo period if that
-    /// is longer, it adds no more than the pass mark to the jerk.
+    /// The greatest change of the acceleration over a time that is negligible for all axes, in mm/s²: over that time, or over a
+    /// servo period if that is longer, it adds no more than `PASS_EXCESS` of the jerk limit.
     fn negligible(&self, time: f64) -> f64 {
         let least = self.limits.jerk[..self.limits.axes].iter().fold(f64::INFINITY, |least, &j| least.min(j));
         PASS_EXCESS * least * time.max(self.limits.period)

@@ -1,15 +1,17 @@
-//! The motion on a phase whose p = u̇² is known by the parameter u: velocities of all columns, times, and how well both are known.
+//! The motion on a phase whose p = u̇² is known by the parameter u: velocities of all columns and times, each with a bound of
+//! its error.
 //!
 //! | law | what it says |
 //! |---|---|
 //! | acceleration of column k | v_k² = v_k(anchor)² + 2 a Δq_k, u̇ = v_k / q'_k |
-//! | velocity of column k | the same with a = 0 |
+//! | velocity of column k | v_k constant, u̇ = v_k / q'_k |
 //! | parameter acceleration | p = p(anchor) + 2 s Δu |
-//! | feed of shares, speed line | v² linear in u, u̇ = v over the slope of the way that counts |
+//! | feed with axis shares, speed line | v² linear in u, u̇ = v over the derivative by u of the length in these shares |
 //!
-//! The anchor of a phase is its slower end: from there both terms have one sign and lose no digits. While column k has a constant
-//! acceleration a way Δq_k takes 2 Δq_k over the sum of its speeds at both ends; where p is linear in u, Δu takes 2 Δu over the sum
-//! of √p; where v² is linear in u the slope of the way is integrated over the variable in which v is linear.
+//! The anchor of a phase is its slower end: counted from there both terms have one sign, so no digits cancel. At a constant
+//! acceleration of column k the time for Δq_k is 2 Δq_k over the sum of its speeds at both ends. Where p is linear in u the
+//! time for Δu is 2 Δu over the sum of √p. Where v² is linear in u the derivative of the length by u is integrated over the
+//! variable in which v is linear.
 
 use super::columns::Columns;
 use super::phases::{Phases, AXIS_ACCELERATION, AXIS_VELOCITY, FEED, PARAMETER_ACCELERATION, SPEED_LINE};
@@ -21,10 +23,11 @@ use super::{EPS, ROUNDINGS};
 /// Relative rounding of a speed or time after a few operations.
 pub const ROUNDING: f64 = 2.0 * ROUNDINGS * EPS;
 
-/// Where a greater part of a speed is uncertain, it is taken from the recorded p at the ends of the phase.
+/// If the relative error of a speed is above this, the speed is taken from the recorded p at the ends of the phase.
 pub const HIDDEN: f64 = 1e-3;
 
-/// Parts of a phase over which an acceleration near a place is taken: inside it, of the way to a turn, and at its ends.
+/// Half the interval in u over which the acceleration near a place is taken: inside the phase as a part of its width, near a turn
+/// as a part of the distance to it, and at the ends of the phase as a part of its width.
 const NEAR: f64 = 5e-4;
 const OF_TURN: f64 = 0.01;
 const AT_END: f64 = 1e-6;
@@ -39,7 +42,7 @@ enum Law {
     Speed { speed_sq: [f64; 2] },
 }
 
-/// One phase, ready to be evaluated at any u of it.
+/// A phase ready to be evaluated at any u.
 #[derive(Clone, Copy, Debug)]
 pub struct PhaseMotion<const M: usize> {
     law: Law,
@@ -50,7 +53,7 @@ pub struct PhaseMotion<const M: usize> {
     whole: f64,
     pub anchored_at_end: bool,
     anchor: State<M>,
-    /// What the axes of the path count in a speed that is held.
+    /// The factor of each path axis in the speed that is held.
     share: [f64; M],
 }
 
@@ -61,23 +64,23 @@ pub struct State<const M: usize> {
     /// u̇, and its relative error.
     pub root_p: f64,
     pub doubt: f64,
-    /// The speed that the law is about, with its error.
+    /// The speed that the law determines, and its error, in mm/s.
     speed: [f64; 2],
     pub velocity: Rounded<M>,
 }
 
 impl<const M: usize> State<M> {
-    /// By √p alone.
+    /// From u̇ = √p and its relative error.
     pub fn new(place: Place<M>, root_p: f64, doubt: f64) -> Self {
         let value: [f64; M] = vector_of(|k| place.slope.value[k] * root_p);
         let of = |k: usize| if value[k] == 0.0 { 0.0 } else { value[k].abs() * (doubt + ROUNDING) };
-        // At rest nothing moves, also where nothing is known of a slope.
+        // At rest the velocity is 0, also where nothing is known of a slope.
         let by_slope = |k: usize| if root_p == 0.0 { 0.0 } else { place.slope.rounding[k] * root_p };
         let rounding = vector_of(|k| by_slope(k) + of(k));
         Self { place, root_p, doubt, speed: [0.0; 2], velocity: Rounded { value, rounding } }
     }
 
-    /// The speed of the tool that feeds limit, and its error.
+    /// The speed of the tool that feeds limit, and its error, in mm/s.
     pub fn tip(&self) -> [f64; 2] {
         let speed = self.place.tip_slope * self.root_p;
         [speed, speed * (self.doubt + ROUNDING)]
@@ -85,7 +88,7 @@ impl<const M: usize> State<M> {
 }
 
 impl<const M: usize> PhaseMotion<M> {
-    /// Phase `i`, whose numbers must be good.
+    /// Phase `i`, whose numbers must be usable (`Phases::have_good_numbers`).
     pub fn new(phases: &Phases, i: usize, columns: &mut Columns<M>) -> Self {
         let (piece, kind, k) = (phases.piece[i] as usize, phases.kind[i], phases.axis[i] as usize);
         let (u, p, value) = ([phases.u0[i], phases.u1[i]], [phases.p0[i], phases.p1[i]], phases.value[i]);
@@ -120,7 +123,8 @@ impl<const M: usize> PhaseMotion<M> {
         let anchor = State::new(place, root_p, ROUNDING);
         let mut motion = Self { law, u, p, whole, anchored_at_end, anchor, share };
         let by_law = motion.state(place, columns);
-        // Where a column accelerates the recorded p stands for itself at the anchor, also where the column stands.
+        // At the anchor a phase at constant axis acceleration keeps its recorded p: if the column is at rest there, the law does
+        // not give p.
         motion.anchor =
             if kind == AXIS_ACCELERATION { State { speed: by_law.speed, ..anchor } } else { by_law };
         motion
@@ -130,7 +134,7 @@ impl<const M: usize> PhaseMotion<M> {
         self.u[1] - self.u[0]
     }
 
-    /// What of a time or a way from the anchor may be rounding: mostly that of the ends of the phase.
+    /// Relative rounding error of a time or a displacement from the anchor: mostly that of the ends of the phase.
     fn rounding(&self) -> f64 {
         ROUNDING * (1.0 + self.whole / self.width())
     }
@@ -148,7 +152,7 @@ impl<const M: usize> PhaseMotion<M> {
         }
     }
 
-    /// u at the share y of a variable in which √p is linear where p is linear in u: 0 at the anchor, 1 at the other end.
+    /// u at a share y of the phase: y is 0 at the anchor, 1 at the other end, and √p is linear in y if p is linear in u.
     pub fn parameter(&self, y: f64) -> f64 {
         let [near, far] = self.roots();
         let share = y * (2.0 * near + (far - near) * y) / (near + far);
@@ -160,7 +164,7 @@ impl<const M: usize> PhaseMotion<M> {
         }
     }
 
-    /// The y of a share of the width, counted from the anchor.
+    /// Inverse of `parameter`: y where this share of the width has been covered from the anchor.
     pub fn variable(&self, share: f64) -> f64 {
         let [near, far] = self.roots();
         let c = (near + far) * share;
@@ -198,7 +202,7 @@ impl<const M: usize> PhaseMotion<M> {
                 );
                 let mut state = State::new(place, root_p, doubt);
                 state.speed = [speed, unknown];
-                // The law tells it better than the slope does.
+                // The law gives this velocity more accurately than the slope does.
                 let sign = if slope == 0.0 { 0.0 } else { slope.signum() };
                 (state.velocity.value[k], state.velocity.rounding[k]) = (sign * speed, unknown);
                 state
@@ -219,15 +223,15 @@ impl<const M: usize> PhaseMotion<M> {
         }
     }
 
-    /// The speed that is held at u.
+    /// The speed at u by a law that holds v² or makes it linear in u.
     fn held(&self, u: f64) -> f64 {
         let Law::Speed { speed_sq: [from, to] } = self.law else { return f64::NAN };
         let share = ((u - self.u[0]) / self.width()).clamp(0.0, 1.0);
         (from + (to - from) * share).sqrt()
     }
 
-    /// √p and its relative error. Where rounding hides the motion of the column p is taken from its recorded ends, if it is nearly
-    /// constant.
+    /// √p and its relative error. Where rounding hides the velocity of the column, p is interpolated between the recorded ends
+    /// of the phase, if it is nearly constant.
     fn known(&self, u: f64, by_law: [f64; 2]) -> [f64; 2] {
         let [from, to] = self.p;
         let other = 0.5 * (to - from).abs() / from.max(to) + ROUNDING;
@@ -237,7 +241,7 @@ impl<const M: usize> PhaseMotion<M> {
         [(from + (to - from) * ((u - self.u[0]) / self.width())).sqrt(), other]
     }
 
-    /// The time between two states, and its relative error.
+    /// The time between two states in s, and its relative error.
     pub fn time(&self, [a, b]: [&State<M>; 2], columns: &mut Columns<M>) -> [f64; 2] {
         let step = (b.place.u - a.place.u).abs();
         if step == 0.0 {
@@ -249,17 +253,18 @@ impl<const M: usize> PhaseMotion<M> {
                 let way = columns.way(&a.place, &b.place);
                 let errors = a.speed[1] + b.speed[1];
                 let (mut sum, mut change) = (a.speed[0] + b.speed[0], (b.speed[0] - a.speed[0]).abs());
-                // Where a phase begins at a turn of the column, rounding may put the turn after its first place.
+                // If the phase begins at a turn of the column, rounding may put the turn behind its first place: the velocities
+                // at both states then have opposite signs.
                 if a.place.slope.value[k] * b.place.slope.value[k] < 0.0 {
                     (sum, change) = (change, sum);
                 }
                 let by_way = way.value[k].abs();
                 let mut found = [2.0 * by_way / sum, rounding + way.rounding[k] / by_way + errors / sum];
-                // The change of the speed over the acceleration, where that has the smaller error.
+                // The change of velocity over the acceleration, if that has the smaller error.
                 if twice != 0.0 && errors / change < found[1] {
                     found = [2.0 * change / twice.abs(), errors / change];
                 }
-                // Where the ways are all rounding, the step of the parameter over the mean √p.
+                // Where the displacement is mostly rounding: the step of the parameter over the mean √p.
                 let uneven = rounding + (b.root_p - a.root_p).abs() / both + 0.5 * (a.doubt + b.doubt);
                 if found[1].is_nan() || (found[1] > HIDDEN && uneven < found[1]) {
                     found = [2.0 * step / both, uneven];
@@ -278,13 +283,13 @@ impl<const M: usize> PhaseMotion<M> {
         }
     }
 
-    /// Time since the start of the phase, which takes `duration`, and its error in s.
+    /// Time since the start of the phase, and its error, in s. The phase takes `duration`.
     pub fn since(&self, here: &State<M>, duration: f64, columns: &mut Columns<M>) -> [f64; 2] {
         let [time, doubt] = self.time([&self.anchor, here], columns);
         [if self.anchored_at_end { duration - time } else { time }, time * doubt]
     }
 
-    /// Accelerations near u as a difference quotient over a small part of the phase, less where p changes fast.
+    /// Accelerations near u, as difference quotients over a small part of the phase; over a smaller one where p changes fast.
     pub fn acceleration_near(&self, u: f64, columns: &mut Columns<M>) -> Rounded<M> {
         let beside = (u - self.u[0]).min(self.u[1] - u);
         let half = f64::min(NEAR * self.width(), OF_TURN * self.way_to_turn(u, columns));
@@ -300,7 +305,8 @@ impl<const M: usize> PhaseMotion<M> {
         }
     }
 
-    /// About how far from u the column of the law turns round, or the path where the speed along it is given: p changes fast there.
+    /// Estimates the distance in u to where the column of the law turns round, or to where C' vanishes if the law is about the
+    /// speed along the path: p changes fast there.
     fn way_to_turn(&self, u: f64, columns: &mut Columns<M>) -> f64 {
         let inwards = if u < 0.5 * (self.u[0] + self.u[1]) { AT_END } else { -AT_END };
         let step = inwards * self.width();
@@ -314,7 +320,7 @@ impl<const M: usize> PhaseMotion<M> {
         (share * step).abs()
     }
 
-    /// The column that the law is about.
+    /// The column whose acceleration or velocity the law holds.
     pub fn held_column(&self) -> Option<usize> {
         match self.law {
             Law::Column { k, .. } => Some(k),
@@ -322,7 +328,8 @@ impl<const M: usize> PhaseMotion<M> {
         }
     }
 
-    /// Whether the accelerations can have a maximum inside the phase: on slides along a velocity limit.
+    /// Whether accelerations can have a maximum inside the phase: on slides, where an axis velocity is constant or v² is linear
+    /// in u.
     pub fn is_slide(&self) -> bool {
         match self.law {
             Law::Column { twice, .. } => twice == 0.0,
@@ -339,7 +346,7 @@ mod tests {
     use crate::polygon::Polygon;
     use crate::Limits;
 
-    /// One phase on one piece in X and Y, and what it is on.
+    /// A phase on a piece in X and Y, and the columns of its path.
     struct Phase<'a> {
         columns: Columns<'a, 2>,
         motion: PhaseMotion<2>,

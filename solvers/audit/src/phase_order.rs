@@ -1,10 +1,10 @@
-//! Whether the phases of a profile follow each other without gap over every piece of every run.
+//! Checks that the phases of a profile follow each other without gap over every piece of every run.
 
 use super::curve::Followed;
 use super::phases::Phases;
 use super::{Check, Tally, EPS, GAP_TOLERANCE, ROUNDINGS};
 
-/// A path and the phases on it, and whether the numbers of each can be measured.
+/// A path and the phases on it, with their start times in s; `are_good` tells whether the numbers of a phase can be used.
 pub struct PhaseOrder<'a> {
     pub path: &'a Followed<'a>,
     pub phases: &'a Phases<'a>,
@@ -12,14 +12,15 @@ pub struct PhaseOrder<'a> {
     pub are_good: &'a [bool],
 }
 
-/// Where the next phase has to begin.
+/// The place where the next phase has to begin.
 struct Next {
     piece: usize,
     u: f64,
 }
 
 impl PhaseOrder<'_> {
-    /// Offers the gaps; whether the runs are those of the path and all numbers are good, so that the ends of runs can be judged.
+    /// Offers the gaps to the tally. Returns whether the runs are those of the path and all numbers can be used, so that the ends
+    /// of runs can be checked.
     pub fn audit<const M: usize>(&self, tally: &mut Tally<M>) -> bool {
         let Self { path, phases, starts, are_good } = *self;
         if phases.runs.len() != path.runs.len()
@@ -60,7 +61,7 @@ impl PhaseOrder<'_> {
         true
     }
 
-    /// Moves on to `piece`: what is left of the pieces before it has been passed over.
+    /// Moves on to `piece`; what phases have not covered of the pieces before it is offered as a gap.
     fn finish_piece<const M: usize>(&self, next: &mut Next, piece: usize, time: f64, tally: &mut Tally<M>) {
         while next.piece < piece {
             let left = self.path.width[next.piece] - next.u;

@@ -1,4 +1,4 @@
-//! The phases of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
+//! The phases of a speed profile: their arrays, their start times, and what their numbers alone show to be wrong.
 
 use std::ops::Range;
 
@@ -25,8 +25,7 @@ pub struct Phases<'a> {
     /// Acceleration along the path at both ends, in mm/s².
     pub a0: &'a [f64],
     pub a1: &'a [f64],
-    /// What the velocities of the axes count in the speed that is constant on phases at the feed, one row a piece; empty
-    /// where all count as they are.
+    /// The factor of each axis in the speed that is constant on phases at the feed, one row a piece; empty if all are 1.
     pub share: &'a [f64],
     /// Number of pieces of the path.
     pub pieces: usize,
@@ -83,7 +82,7 @@ impl Phases<'_> {
         self.piece.is_empty()
     }
 
-    /// Phases that follow each other on one piece or several, so many of both at most.
+    /// Divides the phases `among` into groups of consecutive ones, with at most `most` phases on at most `most_pieces` pieces.
     pub fn groups(&self, among: Range<usize>, [most, most_pieces]: [usize; 2]) -> Vec<Range<usize>> {
         let (mut groups, mut start, mut pieces) = (Vec::new(), among.start, 1);
         for i in among.start + 1..=among.end {
@@ -98,7 +97,8 @@ impl Phases<'_> {
         groups
     }
 
-    /// Whether the phases are those of the runs of a path, with good numbers on so many axes or joints.
+    /// Whether the runs of the phases match those of the path, and the numbers of all phases can be used with `axes` axes or
+    /// joints.
     pub fn fits(&self, path: &Followed, axes: usize) -> bool {
         let runs = self.runs;
         !self.is_empty()
@@ -109,7 +109,7 @@ impl Phases<'_> {
             && self.have_good_numbers(axes).iter().all(|&good| good)
     }
 
-    /// When each phase begins, and when the last one ends, in s; pauses before and between the runs included.
+    /// Start time of each phase, and end time of the last one, in s, including the pauses before and between the runs.
     pub fn starts(&self, path: &Followed) -> Vec<f64> {
         let mut starts = Vec::with_capacity(self.len() + 1);
         let (mut time, mut run) = (path.start_dwell, 0);
@@ -125,9 +125,9 @@ impl Phases<'_> {
         starts
     }
 
-    /// Whether the numbers of each phase, taken alone, can be measured; on a path of so many axes or joints.
+    /// Whether the numbers of each phase are finite and in their range, with `axes` axes or joints.
     pub fn have_good_numbers(&self, axes: usize) -> Vec<bool> {
-        // 0 times what is not finite is no number; column after column, in the vectors of the processor.
+        // 0 × x is NaN if x is not finite. One column follows the other, so that SIMD vectors are used.
         let mut nothing = vec![0.0; self.len()];
         for column in [self.value, self.u0, self.u1, self.p0, self.p1, self.duration, self.a0, self.a1] {
             for (sum, number) in nothing.iter_mut().zip(column) {
@@ -151,14 +151,14 @@ impl Phases<'_> {
         are_good
     }
 
-    /// Whether the speed on phase `i` is known by the length of the path.
+    /// Whether the speed on phase `i` is given by the length of the path.
     pub fn is_by_length<const M: usize>(&self, i: usize, columns: &Columns<M>) -> bool {
         let kind = self.kind[i];
         matches!(kind, PATH_JERK | SPEED_CUBIC)
             || (kind == FEED && columns.are_axes() && self.counted::<M>(i) == [1.0; M])
     }
 
-    /// Phase `i` on its piece, where its speed is known by the length of the path; its numbers must be good.
+    /// Phase `i` on its piece; None if its speed is not given by the length of the path. Its numbers must be usable.
     pub fn by_length<const M: usize>(&self, i: usize, columns: &mut Columns<M>) -> Option<PhaseByLength<M>> {
         if !self.is_by_length(i, columns) {
             return None;
@@ -167,7 +167,8 @@ impl Phases<'_> {
         let (scale, curve) = (columns.scale(), columns.curve(piece).clone());
         let slopes = curve.speeds(u, &scale);
         let mut speeds = [slopes[0] * self.p0[i].sqrt(), slopes[1] * self.p1[i].sqrt()];
-        // From the slower end, where the time of a length is the most sensitive; time runs back from the end of the phase.
+        // Counted from the slower end, where the time depends most on the length. If that is the end of the phase, time runs
+        // back.
         let anchored_at_end = kind != FEED && speeds[1] < speeds[0];
         let mut a = [self.a0[i], self.a1[i]];
         if anchored_at_end {
@@ -183,14 +184,14 @@ impl Phases<'_> {
         Some(PhaseByLength::new(curve, scale, u, anchored_at_end, duration, speed))
     }
 
-    /// What the axes count in the speed that is constant on phase `i`.
+    /// The factor of each axis in the speed that is constant on phase `i`.
     pub fn counted<const M: usize>(&self, i: usize) -> [f64; M] {
         let axes = self.share.len().checked_div(self.pieces).unwrap_or(0);
         let row = self.piece[i] as usize * axes;
         std::array::from_fn(|k| if k < axes { self.share[row + k] } else { 1.0 })
     }
 
-    /// The recorded acceleration along the path at an end of phase `i`, where its kind tells one.
+    /// The acceleration along the path at an end of phase `i`, in mm/s²; None if its law gives none.
     pub fn end_acceleration(&self, i: usize, at_end: bool) -> Option<f64> {
         match self.kind[i] {
             FEED if self.counted::<9>(i) == [1.0; 9] => Some(0.0),
@@ -199,8 +200,8 @@ impl Phases<'_> {
         }
     }
 
-    /// How far the accelerations recorded at both ends of phase `i` are from its constant jerk, in mm/s², less what the part
-    /// of its width does that is rounding.
+    /// How far the change between the recorded accelerations at both ends of phase `i` is from its constant jerk times its
+    /// duration, in mm/s², less what rounding may add; `width_rounding` is the relative rounding of its width.
     pub fn acceleration_error(&self, i: usize, width_rounding: f64) -> f64 {
         if self.kind[i] != PATH_JERK {
             return 0.0;

@@ -1,8 +1,10 @@
-//! Audits a speed profile: every phase at as many places as its motion needs, and the joints between the phases.
+//! Audits a speed profile against all limits: every phase at as many places as its motion needs, the switches from phase to
+//! phase, and the ends of runs.
 //!
-//! On a phase whose p is known by the parameter the velocities of all columns are taken at some ten places, closer together where p
-//! changes fast and very close at both ends, where accelerations have their extremes. Between two places the acceleration is the
-//! difference of the velocities over the time, less what the errors of both can add. Phases by length: `at_once`, `by_length`.
+//! A column is an axis of the path or a joint. On a phase whose p is known by the parameter the velocities of all columns are
+//! evaluated at about ten places, closer together where p changes fast and very close at both ends, where the accelerations have
+//! their extremes. Between two places the acceleration is the difference of the velocities over the time, less what the errors of
+//! both can add. `at_once` and `by_length` audit the phases whose speed is known by the length of the path.
 
 mod at_once;
 mod by_length;
@@ -27,46 +29,47 @@ use by_length::{Look, Looker};
 /// Even intervals of a phase.
 const INTERVALS: usize = 8;
 
-/// Intervals of a slide on which some acceleration comes near its limit.
+/// Number of intervals of a slide (see `PhaseMotion::is_slide`) on which some acceleration comes near its limit.
 const SLIDE_INTERVALS: usize = 64;
 
-/// Share of an acceleration limit from which a slide is looked at more closely.
+/// Use of an acceleration limit from which a slide is divided into `SLIDE_INTERVALS`.
 const NEAR: f64 = 0.9;
 
-/// The end intervals are as short as lets rounding hide this share of the acceleration limit, but no shorter than this part of the
-/// width of the phase: their time would have no digits.
+/// The two end intervals of a phase are as short as rounding allows: it adds `HIDDEN` of the acceleration limit there. They have
+/// at least `SHORTEST` of the width of the phase; the time of a shorter one would have no correct digits.
 const HIDDEN: f64 = 1e-7;
 const SHORTEST: f64 = 1e-7;
 
-/// An interval is halved where its time is off that at constant acceleration of the parameter by more than this part; so often at
-/// most on a phase.
+/// An interval is halved where its time differs by more than this part from that at constant ü; at most `MOST_HALVINGS` times on
+/// a phase.
 const UNEVEN: f64 = 0.05;
 const MOST_HALVINGS: u32 = 200;
 
-/// Phases a thread takes at a time.
+/// Phases that a thread takes at a time.
 const BLOCK: usize = 4096;
 
-/// Phases are looked at together, so many on so many pieces at most.
+/// Greatest number of phases in a group, and of pieces that they are on.
 const GROUP: [usize; 2] = [16, KEPT];
 
-/// One of so many groups of phases, in all of the profile, is looked at before all others: most phases use less of the limits than the
-/// most that is found there, and need no closer look. In groups farther apart that is less: where the use of a limit grows from phase to
-/// phase, every phase uses more than was found before.
+/// Every `FIRST`-th group of phases is audited in a first pass. The greatest uses of the limits found there show that most phases
+/// of the second pass need no closer look. A sparser first pass finds smaller uses; and where the use of a limit grows from phase
+/// to phase, each phase exceeds all that was found before.
 const FIRST: usize = 8;
 
-/// What is measured on which path.
+/// A profile, and the limits that it is audited against.
 pub struct Audited<'a, const M: usize> {
-    /// One more entry than the path has pieces.
+    /// Greatest speed at the start of each piece, and at the end of the last one, in mm/s.
     pub junction_speed: &'a [f64],
     pub phases: &'a Phases<'a>,
     pub limits: &'a Limits<M>,
-    /// When each phase begins, and the last one ends.
+    /// Start time of each phase, and end time of the last one, in s.
     pub starts: &'a [f64],
-    /// Whether the numbers of each phase, taken alone, can be measured.
+    /// Whether the numbers of each phase can be used; see `Phases::have_good_numbers`.
     pub are_good: &'a [bool],
 }
 
-/// The whole profile: phases, joints, ends of runs. Each thread makes columns of its own.
+/// Audits the whole profile: phases, switches, ends of runs. `columns` makes new columns for every block of phases, since threads
+/// cannot share them.
 pub fn audit_profile<'a, const M: usize>(
     of: &Audited<M>,
     columns: &(dyn Fn() -> Columns<'a, M> + Sync),
@@ -108,12 +111,12 @@ pub fn audit_profile<'a, const M: usize>(
                     false => of.phase((i, looks.times[member]), &mut columns, &mut last, tally),
                 };
                 let was_good = std::mem::replace(&mut is_good, found);
-                // Of runs without a phase several begin at once.
+                // Several runs begin at once if some have no phase.
                 let mut begins = false;
                 while runs.next_if_eq(&&(i as i64)).is_some() {
                     begins = true;
                 }
-                // What has no good numbers is reported with the phase itself.
+                // Phases with unusable numbers are reported by `phase`.
                 if i > 0 && was_good && is_good && !begins {
                     of.joint([i - 1, i], &mut columns, tally);
                 }
@@ -126,8 +129,8 @@ pub fn audit_profile<'a, const M: usize>(
 }
 
 impl<const M: usize> Audited<'_, M> {
-    /// A phase, with its time where it cannot change the tally; whether its numbers, taken alone, can be measured. `last` is the station
-    /// at the end of the one before, with its piece.
+    /// Audits phase `i`; returns whether its numbers can be used. `known` is its time in s if `at_once` has found that the phase
+    /// cannot raise any use in the tally. `last` is the station at the end of the phase before, with its piece.
     fn phase(
         &self,
         (i, known): (usize, Option<f64>),
@@ -216,8 +219,8 @@ impl<const M: usize> Audited<'_, M> {
         true
     }
 
-    /// Finds the times of those phases of a group that cannot change the tally, where eight places of each and a bound of what lies
-    /// between show that.
+    /// Finds the times of those phases of a group that cannot raise any use in the tally, from eight places of each and a bound
+    /// of what lies between them. They are in `looks.times`, with None for the other phases.
     fn at_once<'a>(
         &self,
         group: &Range<usize>,
@@ -252,7 +255,8 @@ impl<const M: usize> Audited<'_, M> {
         Judge { rates, per_least, limits: self.limits }.look_at(looks, tally);
     }
 
-    /// Looks ahead at the ends of a group's phases that have to be looked at closer, and at those where two pieces meet.
+    /// Computes ahead, several at once, the stations at the ends of those phases of a group that need a closer look, and where
+    /// two pieces meet. Only stations of joints are computed so.
     fn look_ahead(&self, group: &Range<usize>, columns: &mut Columns<M>, looks: &mut Looks<M>) {
         let phases = self.phases;
         if columns.are_axes() {
@@ -266,7 +270,7 @@ impl<const M: usize> Audited<'_, M> {
             }
         };
         for (i, time) in group.clone().zip(&looks.times) {
-            // The end of a piece is looked at together with the start of the next one.
+            // Where pieces meet, `joint` asks for the end of one phase together with the start of the next one.
             if meets_other(i) {
                 add(i - 1, phases.u1[i - 1]);
                 add(i, phases.u0[i]);
@@ -280,9 +284,9 @@ impl<const M: usize> Audited<'_, M> {
         columns.look_ahead_on_each(&looks.ends, &mut looks.room);
     }
 
-    /// The recorded duration against the audit's own, which has an error. A rounding of u0 or u1 changes the width by the share
-    /// `width_rounding`, and the time by at least this share; at a slow end by the time in which the motion covers the rounding
-    /// there.
+    /// Compares the recorded duration of phase `i` with the audit's own time `elapsed`, which has the error `doubt`, both in s. A
+    /// rounding of u0 or u1 changes the width by the share `width_rounding`, and the time by at least this share; at a slow end
+    /// it changes the time by what the motion takes over that rounding.
     fn duration(
         &self,
         i: usize,
@@ -293,7 +297,7 @@ impl<const M: usize> Audited<'_, M> {
     ) {
         let phases = self.phases;
         let off = (phases.duration[i] - elapsed).abs();
-        // Most phases are not off by more than the rounding of their width.
+        // Most phases differ by no more than the rounding of their width.
         if off < ROUNDINGS * width_rounding * elapsed && tally.is_measured(Check::Duration, 0) {
             return;
         }
@@ -305,7 +309,7 @@ impl<const M: usize> Audited<'_, M> {
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[i], line);
     }
 
-    /// The recorded p at both ends against the speed by the length, as a jump of velocity.
+    /// Compares the recorded p at both ends with the speed by the length there; the difference is offered as a jump of velocity.
     fn ends_by_length(
         &self,
         i: usize,
@@ -334,7 +338,8 @@ impl<const M: usize> Audited<'_, M> {
         }
     }
 
-    /// The recorded p at both ends against what the phase's definition gives there, as a jump of velocity.
+    /// Compares the recorded p at both ends with what the law of the phase gives there; the difference is offered as a jump of
+    /// velocity.
     fn recorded_ends(
         &self,
         i: usize,
@@ -352,8 +357,9 @@ impl<const M: usize> Audited<'_, M> {
         }
     }
 
-    /// Two speeds at an end of a phase, of which each column has this rate, as a jump of velocity. A place is known to its rounding:
-    /// over that way, which is that of u times `slope`, the column may accelerate.
+    /// Offers the difference of two speeds at an end of phase `i` as a jump of velocity; `rates` times a speed is the velocity of
+    /// each column. A place is known up to its rounding in u, which is a length of `slope` times that: what a column may gain by
+    /// accelerating over this length is no jump.
     fn recorded_end(
         &self,
         [i, side]: [usize; 2],
@@ -380,7 +386,7 @@ impl<const M: usize> Audited<'_, M> {
         }
     }
 
-    /// A jump of the velocity of a column that means nothing on phase `i`.
+    /// The greatest jump of the velocity of a column that is negligible on phase `i`, in mm/s.
     fn negligible(&self, i: usize, k: usize, columns: &Columns<M>) -> f64 {
         self.limits.negligible_jump(k, columns.settling(self.phases.duration[i]))
     }
@@ -390,7 +396,8 @@ impl<const M: usize> Audited<'_, M> {
         Jerks { phases, limits, starts, smooth: columns.smooth() }
     }
 
-    /// Phases must follow each other without gap over every piece, and runs begin and end at rest.
+    /// Checks that the phases of a run cover all its pieces without gap, and that runs begin and end at rest, the first and the
+    /// last one at the end speeds of the path.
     fn order(&self, columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let Self { phases, starts, are_good, .. } = *self;
         let order = PhaseOrder { path: &columns.path, phases, starts, are_good };
@@ -415,7 +422,7 @@ impl<const M: usize> Audited<'_, M> {
         (columns.place(phases.piece[i] as usize, u), p.sqrt())
     }
 
-    /// The change from one phase to the next: no jump of the speed, and of the velocities only at corners.
+    /// Checks the switch from phase `i` to phase `j`: the speed may not jump, and axis velocities only where two pieces meet.
     fn joint(&self, [i, j]: [usize; 2], columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let phases = self.phases;
         let pieces = [i, j].map(|phase| phases.piece[phase] as usize);
@@ -425,7 +432,7 @@ impl<const M: usize> Audited<'_, M> {
             self.jerks(columns).joint([i, j], columns, line, tally);
         }
         if before == after && phases.u1[i] == phases.u0[j] && phases.p1[i] == phases.p0[j] {
-            // One place, and one speed there.
+            // It is one place, with one speed.
             for k in 0..columns.count() {
                 if !tally.is_measured(Check::Jump, k) {
                     tally.offer(Check::Jump, k, 0.0, self.negligible(j, k, columns), time, line);
@@ -435,7 +442,7 @@ impl<const M: usize> Audited<'_, M> {
         }
         let states = [[i, 1], [j, 0]].map(|end| {
             let (mut place, root_p) = self.end(end, columns);
-            // Between two pieces the control points' own rounding turns the tangent.
+            // Where two pieces meet, the rounding of their control points turns the tangents.
             let turned = if before == after { 0.0 } else { columns.turned(place.piece) };
             place.slope.rounding = vector_of(|k| place.slope.rounding[k] + turned);
             State::new(place, root_p, 0.0)
@@ -452,7 +459,7 @@ impl<const M: usize> Audited<'_, M> {
         }
         let slack = columns.negligible_speed(&states[1].place, columns.settling(phases.duration[j]));
         let speeds = states.each_ref().map(|state| columns.speed(CHORD, &state.velocity, state.tip()));
-        // The speeds are of one kind only where the feed limits the same axes.
+        // The two speeds can be compared only if both feeds limit the same axes.
         if columns.comparable(pieces) {
             let jump = (speeds[1][0] - speeds[0][0]).abs() - speeds[0][1] - speeds[1][1];
             tally.offer(Check::Continuity, 0, jump, slack, time, line);
@@ -468,7 +475,7 @@ impl<const M: usize> Audited<'_, M> {
         }
     }
 
-    /// The speed at the start or the end of a run.
+    /// Checks the speed at the start or the end of a run against the `wanted` one in mm/s.
     fn run_end(&self, [i, side]: [usize; 2], wanted: f64, columns: &mut Columns<M>, tally: &mut Tally<M>) {
         let (place, root_p) = self.end([i, side], columns);
         let line = columns.path.line_of(place.piece);
@@ -489,7 +496,7 @@ fn is_order([from, to]: [f64; 2], width: f64) -> bool {
     from < to && 0.0 <= from && to <= width * (1.0 + ROUNDINGS * EPS)
 }
 
-/// Walks one phase and offers what it meets.
+/// Walks over one phase, from its anchor on, and offers what it uses of the limits to the tally.
 struct Probe<'a, 'b, const M: usize> {
     motion: &'a PhaseMotion<M>,
     columns: &'a mut Columns<'b, M>,
@@ -501,7 +508,7 @@ struct Probe<'a, 'b, const M: usize> {
     line: i32,
     /// Time from the anchor, and its error, in s.
     elapsed: [f64; 2],
-    /// Greatest share of an acceleration limit met so far.
+    /// Greatest use of an acceleration limit so far, except by the column that the law holds.
     nearest_limit: f64,
     halvings: u32,
 }
@@ -511,7 +518,8 @@ impl<const M: usize> Probe<'_, '_, M> {
         self.motion.at(self.motion.parameter(y), self.columns)
     }
 
-    /// Even intervals with a short one at each end; the states at both ends.
+    /// Walks over equal intervals of y (see `PhaseMotion::parameter`) with a short one at each end; returns the states at both
+    /// ends.
     fn run(&mut self) -> [State<M>; 2] {
         let ends = [0.0, 1.0].map(|y| self.state(y));
         self.place(&ends[0]);
@@ -525,7 +533,8 @@ impl<const M: usize> Probe<'_, '_, M> {
         let inner = (1..INTERVALS).map(|i| i as f64 * step);
         for y in head.into_iter().chain(inner).chain(tail.map(|y| 1.0 - y)) {
             let next = self.state(y);
-            // So near an end where its column stands the law may tell nothing.
+            // Next to an end where the column of the law is at rest, rounding may hide the speed by the law: such a place is left
+            // out.
             if (y < step || y > 1.0 - step) && (next.doubt.is_nan() || next.doubt > phase_motion::HIDDEN) {
                 continue;
             }
@@ -545,7 +554,7 @@ impl<const M: usize> Probe<'_, '_, M> {
         }
     }
 
-    /// The length in y of an end interval that lets rounding hide no more than `HIDDEN` of any limit.
+    /// Length in y of an end interval in which rounding adds no more than `HIDDEN` of any acceleration limit.
     fn short_interval(&self, end: &State<M>) -> f64 {
         let mut time = 0.0_f64;
         for k in 0..M {
@@ -554,7 +563,7 @@ impl<const M: usize> Probe<'_, '_, M> {
         time / self.duration
     }
 
-    /// From one place to the next, halved where p changes fast between them.
+    /// Goes on from one place to the next one; the interval is halved where p changes fast.
     fn advance(&mut self, from: &State<M>, to: &State<M>) {
         let [time, doubt] = self.motion.time([from, to], self.columns);
         let (a, b) = (from.place.u, to.place.u);
@@ -577,7 +586,7 @@ impl<const M: usize> Probe<'_, '_, M> {
         let middle = self.clock(self.elapsed[0] + 0.5 * time);
         self.elapsed = [self.elapsed[0] + time, self.elapsed[1] + time * doubt];
         let held = self.motion.held_column();
-        // A phase that is anchored at its end is walked against the time.
+        // On a phase that is anchored at its end, the walk goes back in time.
         let [early, late] = if self.motion.anchored_at_end { [to, from] } else { [from, to] };
         let way = self.columns.way(&early.place, &late.place);
         let certain = |rate: f64| rate - rate.abs() * doubt;
@@ -597,7 +606,7 @@ impl<const M: usize> Probe<'_, '_, M> {
         self.place(to);
     }
 
-    /// The velocities at one place.
+    /// Offers the velocities, the feeds and the chord error at one place.
     fn place(&mut self, state: &State<M>) {
         let time = self.clock(self.elapsed[0]);
         self.tally.samples += 1;
@@ -619,7 +628,7 @@ impl<const M: usize> Probe<'_, '_, M> {
         }
     }
 
-    /// The program's time at a time from the anchor.
+    /// Time in the program, in s, at `elapsed` from the anchor.
     fn clock(&self, elapsed: f64) -> f64 {
         self.start + if self.motion.anchored_at_end { self.duration - elapsed } else { elapsed }
     }

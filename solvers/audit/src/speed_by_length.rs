@@ -1,5 +1,5 @@
-//! Speed, acceleration and jerk along the path at a length from the anchor of a phase, which is the end of it that lengths and
-//! times are counted from; and the time from there.
+//! Speed, acceleration and jerk along the path as functions of the length from the anchor of a phase (the end from which lengths
+//! and times are counted), and the time from there.
 //!
 //! At constant jerk the time is found by Newton's method within a bracket; where v² is a cubic polynomial of the length, it is
 //! the integral of 1/v.
@@ -10,7 +10,7 @@ use super::number::Number;
 use super::quadrature::{integral, MOST_HALVINGS};
 use super::{EPS, ROUNDINGS};
 
-/// A bracket of floating-point numbers cannot be halved more often than this.
+/// Most steps of a bisection: a bracket of floating-point numbers cannot be halved more often.
 const MOST_STEPS: u32 = 1100;
 
 /// Speed, acceleration and jerk along the path, in mm and s.
@@ -21,7 +21,7 @@ pub struct Pace<T = f64> {
     pub j: T,
 }
 
-/// The speed along a phase, counted from its anchor: where that is the end, time runs back.
+/// The speed along a phase, counted from its anchor; if that is the end of the phase, time runs back.
 #[derive(Clone, Copy, Debug)]
 pub enum SpeedByLength {
     Constant {
@@ -32,7 +32,7 @@ pub enum SpeedByLength {
         start: Pace,
         duration: f64,
     },
-    /// v² by powers of the share of the length.
+    /// v² by powers of the share of the length, `c`.
     Cubic {
         c: [f64; 4],
         length: f64,
@@ -40,12 +40,12 @@ pub enum SpeedByLength {
 }
 
 impl SpeedByLength {
-    /// From v² and a at the anchor and at the other end.
+    /// With a cubic v², from v² and a at the anchor and at the other end.
     pub fn cubic(speed_sq: [f64; 2], a: [f64; 2], length: f64) -> Self {
         Self::Cubic { c: cubic(speed_sq, a, length), length }
     }
 
-    /// The time from the anchor to a length; not a number where it cannot be integrated.
+    /// The time from the anchor to a length, in s; NaN if it cannot be integrated.
     pub fn time(&self, way: f64) -> f64 {
         match self {
             Self::Constant { speed } => way / speed,
@@ -56,7 +56,7 @@ impl SpeedByLength {
         }
     }
 
-    /// The motion at a length from the anchor, and the time to there where the motion follows from it.
+    /// The motion at a length from the anchor; and the time to there, if the motion was computed from it.
     pub fn pace(&self, way: f64) -> (Pace, Option<f64>) {
         match self {
             Self::Constant { speed } => (Pace { v: *speed, a: 0.0, j: 0.0 }, None),
@@ -73,12 +73,12 @@ impl SpeedByLength {
         }
     }
 
-    /// Bounds of v, a and j and of their derivatives by the length between two places that are so long a way apart, in the order
-    /// of travel: v' = a/v, a' = j/v.
+    /// Bounds between two places, in the order of travel, of v, a and j and of their first two derivatives by the length: v' =
+    /// a/v, a' = j/v. `way` is the length between the places.
     pub fn bounds(&self, [from, to]: [&Pace; 2], way: f64) -> [Bounds<f64>; 3] {
         match self {
             Self::Constant { speed } => [[*speed, 0.0, 0.0], [0.0; 3], [0.0; 3]].map(Bounds),
-            // v between its coefficients in Bernstein form by time, a linear.
+            // v lies between its Bernstein coefficients by time, and a is linear in time.
             Self::Jerk { start: Pace { j: constant, .. }, .. } => {
                 let gained = 0.5 * from.a * (to.a - from.a) / constant;
                 let inner = from.v + if gained.is_finite() { gained } else { 0.0 };
@@ -98,14 +98,14 @@ pub fn cubic<T: Number>([from, to]: [T; 2], a: [T; 2], length: T) -> [T; 4] {
     [from, slope, rise * 3.0 - slope * 2.0 - end_slope, slope + end_slope - rise * 2.0]
 }
 
-/// a at a share of the length.
+/// a at a share x of the length.
 #[inline(always)]
 pub fn cubic_acceleration<T: Number>(c: &[T; 4], length: T, x: T) -> T {
     (c[1] + x * (c[2] * 2.0 + x * 3.0 * c[3])) * 0.5 / length
 }
 
-/// The same where v² is a cubic of the length: v² and a between their coefficients in Bernstein form by the length, in which j/v is
-/// linear.
+/// `SpeedByLength::bounds` where v² is a cubic of the length: v² and a lie between their Bernstein coefficients by the length,
+/// and j/v is linear in it.
 #[inline(always)]
 pub fn cubic_bounds<T: Number>([from, to]: [&Pace<T>; 2], way: T) -> [Bounds<T>; 3] {
     let third = way * (2.0 / 3.0);
@@ -124,7 +124,8 @@ pub fn cubic_bounds<T: Number>([from, to]: [&Pace<T>; 2], way: T) -> [Bounds<T>;
     bounds_from(slowest, [v, a], [rate * v, j1, j2])
 }
 
-/// From the least speed, the greatest speed and acceleration, and the greatest jerk with its derivatives by the length.
+/// Bounds from the least speed, the greatest speed and acceleration, and the greatest jerk with its first two derivatives by the
+/// length.
 #[inline(always)]
 fn bounds_from<T: Number>(slowest: T, [v, a]: [T; 2], [j, j1, j2]: [T; 3]) -> [Bounds<T>; 3] {
     let per = slowest.filled(1.0) / slowest;
@@ -133,24 +134,26 @@ fn bounds_from<T: Number>(slowest: T, [v, a]: [T; 2], [j, j1, j2]: [T; 3]) -> [B
     [v, a, Bounds([j, j1, j2])]
 }
 
-/// Whether a recorded speed is the same as another one: the rounding of the velocities is at least twice this part of them.
+/// Whether a recorded speed equals another one up to rounding: the rounding error bound of the velocities is at least twice what
+/// is allowed here.
 pub fn is_same_speed(speed: f64, recorded: f64) -> bool {
     (recorded - speed).abs() <= 0.5 * ROUNDINGS * EPS * speed
 }
 
-/// Bounds of the size of a function and of its first two derivatives.
+/// Bounds of the absolute values of a function and of its first two derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds<T>(pub [T; 3]);
 
 impl<T: Number> Bounds<T> {
-    /// Of a product.
+    /// Bounds for the product of two functions.
     #[inline(always)]
     pub fn times(self, Self(b): Self) -> Self {
         let Self(a) = self;
         Self([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[0] * b[2] + a[1] * b[1] * 2.0 + a[2] * b[0]])
     }
 
-    /// By a variable in which that of the function has these first two derivatives.
+    /// Bounds with derivatives by another variable: `first` and `second` bound the first two derivatives of the present variable
+    /// by that one.
     #[inline(always)]
     pub fn at(self, first: T, second: T) -> Self {
         let Self([f, f1, f2]) = self;
@@ -158,7 +161,7 @@ impl<T: Number> Bounds<T> {
     }
 }
 
-/// Time at constant jerk from the anchor to a length; beyond the phase's own at its mean speed.
+/// Time in s at constant jerk from the anchor to a length; beyond the phase it goes on at the mean speed of the phase.
 fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
     let whole = start.way(duration);
     if way <= 0.0 {
@@ -168,7 +171,7 @@ fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
         return duration * (way / whole);
     }
     let (mut low, mut high) = (0.0, duration);
-    // Where the speed changes little the time is as the length, from rest as its cube root.
+    // First guess: if the speed changes little, the time is proportional to the length; from rest, to its cube root.
     let share = way / whole;
     let mut t = match 2.0 * start.v * duration > whole {
         true => duration * share,
@@ -182,7 +185,7 @@ fn time_at_jerk(start: &Pace, duration: f64, way: f64) -> f64 {
             low = t;
         }
         let newton = t - miss / start.after(t).v;
-        // A step of rounding alone leads out of the bracket as often as not.
+        // A step of this size is only rounding, and may well lead out of the bracket.
         if (newton - t).abs() <= EPS * t {
             break;
         }
@@ -205,7 +208,7 @@ impl Pace {
     }
 }
 
-/// `length` over the root of the square at several x, in the vectors of the processor.
+/// `length` over v at several shares x of the length, in SIMD vectors.
 fn slowness(c: &[f64; 4], length: f64, x: [f64; 8]) -> [f64; 8] {
     dispatch!(Level::new(), _simd => {
         let mut slowness = [length; 8];
@@ -216,7 +219,7 @@ fn slowness(c: &[f64; 4], length: f64, x: [f64; 8]) -> [f64; 8] {
     })
 }
 
-/// v² at a share of the length.
+/// v² at a share x of the length.
 #[inline(always)]
 pub fn square<T: Number>(c: &[T; 4], x: T) -> T {
     c[0] + x * (c[1] + x * (c[2] + x * c[3]))

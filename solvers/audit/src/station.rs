@@ -12,27 +12,27 @@ use super::speed_by_length::Pace;
 use super::vectors::vector_of;
 use super::{EPS, ROUNDINGS};
 
-/// Where |C'| is below this share of its size the piece has no direction to speak of.
+/// If |C'| is not above this share of its magnitude (`Curve::size_lengths`), the piece has no usable direction.
 pub const STILL: f64 = 1e-6;
 
-/// A vector, and what of it may be rounding.
+/// A vector, and bounds of the rounding errors of its numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounded<const M: usize, T = f64> {
     pub value: [T; M],
     pub rounding: [T; M],
 }
 
-/// A place of a piece: the columns and their slopes by u, each with a bound of its error; of positions beside the rounding of the
-/// greatest coordinate. Or several places.
+/// A place of a piece, or several in lanes: positions of the columns and their derivatives by u, each with an error bound. That
+/// of a position comes on top of the rounding of the greatest coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<const M: usize, T = f64> {
     pub piece: usize,
     pub u: T,
-    /// The tool's place, in axes of the path.
+    /// Position of the tool, in axes of the path.
     pub tip: [T; M],
     pub position: Rounded<M, T>,
     pub slope: Rounded<M, T>,
-    /// Derivatives by u of the length of the path and of the way of the tool that the feed limits.
+    /// Derivatives by u of the length of the path, and of the length that the feed of the tool limits.
     pub way_slope: T,
     pub tip_slope: T,
 }
@@ -53,7 +53,7 @@ impl<const M: usize, T: Number> Place<M, T> {
 }
 
 impl<const M: usize> Station<M, Lanes> {
-    /// One of them.
+    /// The station in one lane.
     pub fn of_lane(&self, lane: usize) -> Station<M> {
         Station {
             u: self.u[lane],
@@ -68,7 +68,7 @@ impl<const M: usize> Station<M, Lanes> {
 }
 
 impl<const M: usize> Roundings<M, Lanes> {
-    /// One of them.
+    /// The bounds in one lane.
     pub fn of_lane(&self, lane: usize) -> Roundings<M> {
         let [first, second, third] =
             [&self.first, &self.second, &self.third].map(|row| row.map(|of| of[lane]));
@@ -77,7 +77,7 @@ impl<const M: usize> Roundings<M, Lanes> {
 }
 
 impl<const M: usize> Place<M, Lanes> {
-    /// One of them.
+    /// The place in one lane.
     pub fn of_lane(&self, lane: usize) -> Place<M> {
         Place {
             piece: self.piece,
@@ -92,7 +92,7 @@ impl<const M: usize> Place<M, Lanes> {
 }
 
 impl<const M: usize> Rounded<M, Lanes> {
-    /// One of them.
+    /// The vector in one lane.
     pub fn of_lane(&self, lane: usize) -> Rounded<M> {
         Rounded { value: self.value.map(|of| of[lane]), rounding: self.rounding.map(|of| of[lane]) }
     }
@@ -105,7 +105,7 @@ impl<const M: usize, T: Number> Rounded<M, T> {
     }
 }
 
-/// A place, and what is known there whatever the speed; or several places.
+/// The derivatives of the columns by the length at a place, which do not depend on the speed; or at several places in lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct Station<const M: usize, T = f64> {
     pub u: T,
@@ -114,13 +114,13 @@ pub struct Station<const M: usize, T = f64> {
     pub first: [T; M],
     pub second: [T; M],
     pub third: [T; M],
-    /// What the speed of the tool that feeds limit is of that along the path, and the curvature of its path in 1/mm.
+    /// The speed of the tool that feeds limit, over the speed along the path; and the curvature of the tool's path in 1/mm.
     pub tip: T,
     pub curvature: T,
 }
 
-/// What of the derivatives at a station may be rounding. It takes as long to know as the derivatives, and is asked for where these
-/// come near a limit.
+/// Bounds of the rounding errors of the derivatives at a station. They take as long to compute as the derivatives, and are
+/// computed only where these come near a limit.
 #[derive(Clone, Copy, Debug)]
 pub struct Roundings<const M: usize, T = f64> {
     first: [T; M],
@@ -129,12 +129,12 @@ pub struct Roundings<const M: usize, T = f64> {
 }
 
 impl<const M: usize> Station<M> {
-    /// The place u of a piece; none where that has no direction.
+    /// The place u of a piece; None where the piece has no direction.
     pub fn new(curve: &Curve<M>, u: f64) -> Option<Self> {
         Self::by(curve, u, &curve.derivatives(u))
     }
 
-    /// The same where the derivatives are at hand.
+    /// The place u, from derivatives by u that are known already; None where the piece has no direction.
     #[inline(always)]
     pub fn by(curve: &Curve<M>, u: f64, derivatives: &[[f64; M]; 3]) -> Option<Self> {
         let station = Self::anywhere(u, derivatives);
@@ -148,7 +148,7 @@ impl<const M: usize> Station<M> {
 }
 
 impl<const M: usize, T: Number> Station<M, T> {
-    /// Of joints by their first three derivatives by u and g with its first two:
+    /// For joints, from their first three derivatives by u, and g with its first two:
     /// q_s = q_u/g, q_ss = (q_uu − q_u g_u/g)/g², q_sss = (q_uuu − 3 q_uu g_u/g + q_u (3 g_u²/g² − g_uu/g))/g³.
     #[inline(always)]
     pub fn of_joints(
@@ -170,7 +170,7 @@ impl<const M: usize, T: Number> Station<M, T> {
         station
     }
 
-    /// By these derivatives, whether or not the piece has a direction there.
+    /// From the first three derivatives of C by u, whether or not the piece has a direction there.
     #[inline(always)]
     pub fn anywhere(u: T, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
         let (g, one) = (inner(c1, c1).root(), u.filled(1.0));
@@ -224,8 +224,8 @@ impl<const M: usize, T: Number> Roundings<M, T> {
         Roundings { first: kept(self.first), second: kept(self.second), third: kept(self.third) }
     }
 
-    /// Of joints and their first three derivatives by u, and g with its first two, each with how wrong it may be. Where nothing is
-    /// known of a derivative its rounding is as great as any number.
+    /// For joints, from their first three derivatives by u, and g with its first two, each with an error bound. If a derivative
+    /// is not known, its rounding is `f64::MAX`.
     #[inline(always)]
     pub fn of_joints([_, first, second, third]: &[Rounded<M, T>; 4], way: &Jet<3, 3, T>) -> Self {
         let ([g, dg, ddg], [_, dg_error, ddg_error]) = (way.value, way.error);
@@ -252,7 +252,8 @@ impl<const M: usize, T: Number> Roundings<M, T> {
         roundings
     }
 
-    /// At a station of a curve with these derivatives: what is rounded in C', C'' and C''' is felt in g and its derivatives as well.
+    /// At a station of a curve with these derivatives by u. Rounding errors of C', C'' and C''' also enter through g and its
+    /// derivatives.
     #[inline(always)]
     pub fn new(curve: &Curve<M>, station: &Station<M, T>, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
         let [size1, size2, size3] = curve.derivative_sizes();

@@ -1,14 +1,14 @@
-//! What an audit finds: of every limit, the place that uses most of it.
+//! What an audit finds: for every limit the place with the greatest use.
 
 use super::vectors;
 
-/// What is checked. The name is how it appears to users.
+/// The kinds of checks, by the names that users see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(usize)]
 pub enum Check {
     /// Numbers that are not finite, or out of their range.
     Numbers,
-    /// Phases that do not cover the pieces in order, in mm of parameter.
+    /// Phases that do not cover the pieces in order: gaps in mm of the parameter.
     Order,
     /// Speed, in mm/s.
     Feed,
@@ -18,9 +18,9 @@ pub enum Check {
     Junction,
     /// Jump of the speed at a junction, in mm/s.
     Continuity,
-    /// Jump of the acceleration along the path, at rest from 0, in mm/s².
+    /// Jump of the acceleration along the path, in mm/s²; at rest the acceleration itself.
     AccelerationContinuity,
-    /// Recorded duration against the audit's own integral, relative.
+    /// Difference of the recorded duration from the audit's own integral, relative.
     Duration,
     /// Distance between followed and programmed path, in mm.
     Deviation,
@@ -102,23 +102,23 @@ impl Check {
         }
     }
 
-    /// Whether the check is kept for each axis on its own.
+    /// Whether each axis has its own worst value.
     pub fn per_axis(self) -> bool {
         self as usize >= Check::Velocity as usize
     }
 }
 
-/// The worst place found of one limit.
+/// The place with the greatest use of one limit so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worst {
-    /// The value measured there, less its rounding allowance.
+    /// The value measured there, less its rounding error bound.
     pub value: f64,
     pub limit: f64,
-    /// `value / limit`; negative while nothing was measured, infinite for what is not a number.
+    /// `value / limit`; negative while nothing was measured, infinite for NaN.
     pub ratio: f64,
     /// In s from the start of the program.
     pub time: f64,
-    /// Source line; 0 where none is known.
+    /// Source line; 0 if it is not known.
     pub line: i32,
 }
 
@@ -126,7 +126,7 @@ impl Worst {
     const NONE: Worst = Worst { value: 0.0, limit: f64::INFINITY, ratio: -1.0, time: 0.0, line: 0 };
 }
 
-/// The worst of every limit, and how many samples were looked at.
+/// The worst place of every limit, and the number of places that were evaluated.
 #[derive(Clone, Debug)]
 pub struct Tally<const M: usize> {
     pub worst: [[Worst; M]; CHECKS],
@@ -140,13 +140,13 @@ impl<const M: usize> Default for Tally<M> {
 }
 
 impl<const M: usize> Tally<M> {
-    /// Keeps the value if no worse one was seen. What is not a number is the worst there is.
+    /// Keeps the value if its ratio to the limit is the greatest so far. NaN counts as the greatest.
     #[inline(always)]
     pub fn offer(&mut self, check: Check, axis: usize, value: f64, limit: f64, time: f64, line: i32) {
         self.offer_at(check, axis, value, limit, line, || time);
     }
 
-    /// The same where the time is computed only for a value that is kept.
+    /// `offer` with a time that is computed only if the value is kept.
     #[inline(always)]
     pub fn offer_at(
         &mut self,
@@ -157,7 +157,7 @@ impl<const M: usize> Tally<M> {
         line: i32,
         time: impl FnOnce() -> f64,
     ) {
-        // Most values change nothing, and a product is had sooner than a ratio.
+        // Most values change nothing, and a product is faster than a ratio.
         if self.is_passed(check, axis, value, limit) {
             return;
         }
@@ -165,21 +165,21 @@ impl<const M: usize> Tally<M> {
         self.offer_share(check, axis, (value, limit, ratio), line, time);
     }
 
-    /// Whether a value up to `most` changes nothing; what is not a number always does.
+    /// Whether values up to `most` change nothing. A NaN always does.
     #[inline(always)]
     pub fn is_passed(&self, check: Check, axis: usize, most: f64, limit: f64) -> bool {
         let known = self.worst[check as usize][axis].ratio;
         known >= 0.0 && most <= known * limit
     }
 
-    /// Whether a value that is not above 0 changes nothing, whatever its limit.
+    /// Whether values that are not above 0 change nothing, whatever their limit.
     #[inline(always)]
     pub fn is_measured(&self, check: Check, axis: usize) -> bool {
         self.worst[check as usize][axis].ratio >= 0.0
     }
 
-    /// At most what a value may be to change nothing; not a number where nothing is known. A value against no limit only has to be a
-    /// number.
+    /// The greatest value that changes nothing; NaN if nothing was measured yet. With an infinite limit any finite value changes
+    /// nothing.
     pub fn most(&self, check: Check, axis: usize, limit: f64) -> f64 {
         match self.worst[check as usize][axis].ratio {
             known if known < 0.0 => f64::NAN,
@@ -194,7 +194,7 @@ impl<const M: usize> Tally<M> {
         vectors::vector_of(|k| self.worst[check as usize][k].ratio)
     }
 
-    /// The same of value, limit and their ratio.
+    /// `offer_at` with the ratio of value and limit given.
     #[inline(always)]
     pub fn offer_share(
         &mut self,
@@ -212,7 +212,7 @@ impl<const M: usize> Tally<M> {
         }
     }
 
-    /// The same where the ratio is not that of value and limit.
+    /// Keeps what was found if its ratio is the greatest so far; the ratio need not be that of value and limit.
     pub fn offer_ratio(&mut self, check: Check, axis: usize, mut found: Worst) {
         if found.ratio.is_nan() {
             found.ratio = f64::INFINITY;
@@ -223,7 +223,7 @@ impl<const M: usize> Tally<M> {
         }
     }
 
-    /// The worse of both, for every limit.
+    /// Combines two tallies: the worse place for every limit, and all samples.
     pub fn merge(mut self, other: Self) -> Self {
         for (mine, theirs) in self.worst.iter_mut().flatten().zip(other.worst.iter().flatten()) {
             if theirs.ratio > mine.ratio {
@@ -234,7 +234,7 @@ impl<const M: usize> Tally<M> {
         self
     }
 
-    /// The worst of one check.
+    /// The worst place of one check.
     pub fn get(&self, check: Check, axis: usize) -> &Worst {
         &self.worst[check as usize][axis]
     }
@@ -269,7 +269,7 @@ mod tests {
     fn what_uses_no_more_than_the_worst_changes_nothing() {
         let mut tally = Tally::<1>::default();
         assert!(!tally.is_passed(Check::Velocity, 0, 0.0, 0.0));
-        // An axis that rests, with a limit and without one.
+        // An axis at rest, with a limit of 0 and with another one.
         tally.offer(Check::Velocity, 0, 0.0, 0.0, 0.0, 1);
         assert!(
             tally.is_passed(Check::Velocity, 0, 0.0, 0.0) && tally.is_passed(Check::Velocity, 0, 0.0, 2.0)

@@ -1,11 +1,11 @@
-//! Vectors of M numbers, one an axis: length, distance, curvature, and straight lines between two points.
+//! Vectors of M numbers, one for each axis: length, distance, curvature, and straight lines between two points.
 
 use super::number::{inner, Number};
 
-/// Row `i` of a table with a column for each axis.
+/// Row `i` of a table with `axes` columns; numbers beyond are 0.
 #[inline(always)]
 pub fn vector<const M: usize>(table: &[f64], axes: usize, i: usize) -> [f64; M] {
-    // The usual case on its own: rows of a length that is known are read without a branch.
+    // The usual case: rows of constant length are read without a branch.
     if axes == M {
         let row = &table[i * M..(i + 1) * M];
         std::array::from_fn(|k| row[k])
@@ -31,7 +31,7 @@ pub fn length<const M: usize>(a: &[f64; M]) -> f64 {
     inner(a, a).sqrt()
 }
 
-/// The products by axis.
+/// The products of the components.
 #[inline(always)]
 pub fn times<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
     vector_of(|k| a[k] * b[k])
@@ -49,7 +49,7 @@ pub fn distance<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     length(&from_to(a, b))
 }
 
-/// Curvature in 1/mm from C' and C'': the part of C'' across the path over |C'|²; 0 where C' vanishes.
+/// Curvature in 1/mm from C' and C'': the component of C'' normal to the path over |C'|²; 0 where C' vanishes.
 #[inline(always)]
 pub fn curvature<const M: usize, T: Number>(tangent: &[T; M], bend: &[T; M]) -> T {
     let square = inner(tangent, tangent);
@@ -59,7 +59,7 @@ pub fn curvature<const M: usize, T: Number>(tangent: &[T; M], bend: &[T; M]) -> 
         across[k] = bend[k] - along * tangent[k];
     }
     let curvature = inner(&across, &across).root() / square;
-    // What is no number does not get lost.
+    // 0 × C'² keeps a NaN.
     curvature.where_finite(square.filled(1.0) / square, 0.0) + square * 0.0
 }
 
@@ -67,7 +67,7 @@ pub fn curvature<const M: usize, T: Number>(tangent: &[T; M], bend: &[T; M]) -> 
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<const M: usize> {
     start: [f64; M],
-    /// To the other end, and the inverse of its square; 0 where that would be infinite.
+    /// Vector to the other end, and 1/length²; 0 if that would be infinite.
     along: [f64; M],
     per_length_sq: f64,
 }

@@ -1,4 +1,5 @@
-//! Joints that are not the path's axes, as columns by the parameter of the tool's path: see `columns`.
+//! Evaluates joints that are not the path's axes as columns, by the parameter of the tool's path (see `columns`); keeps the last
+//! results and those computed ahead.
 
 use std::rc::Rc;
 
@@ -8,23 +9,24 @@ use crate::number::Lanes;
 use crate::station::{Place, Rounded, Roundings, Station};
 use crate::vectors::{length, vector_of};
 
-/// The second derivative of joints by u is estimated as this many times that at the last station of the piece. Newton's method stops at
-/// a thousandth of the error that is allowed for a place: were the derivative ten times the estimate, the error would be a hundredth.
+/// The second derivative of joints by u on a piece is estimated as this many times that at the last station on it. Newton's
+/// method stops at a thousandth of the error that is allowed for a place. If the derivative were ten times the estimate, it would
+/// stop at a hundredth of the allowed error.
 const BEND_GROWS: f64 = 4.0;
 
-/// A station with its place and what of it may be rounding.
+/// A place and its station, with bounds of the rounding errors of the latter.
 type RoundedStation<const M: usize> = (Place<M>, Station<M>, Roundings<M>);
 
 pub struct JointColumns<'a, const M: usize> {
     pub of: &'a JointPath<'a>,
     room: Vec<f64>,
-    /// The last pieces.
+    /// The pieces that were used last.
     pieces: [Option<Rc<Piece<'a, M>>>; KEPT],
-    /// The last place, the last station with its piece, and the last two stations whose rounding is known, the last one first.
+    /// The last place; the last station with its piece; the last two stations with error bounds, the last one first.
     last: Option<Place<M>>,
     known: Option<(usize, Station<M>)>,
     rounded: [Option<RoundedStation<M>>; 2],
-    /// Places and stations ahead that have been computed at once.
+    /// Places and stations that have been computed ahead.
     ahead: Vec<Place<M>>,
     stations_ahead: Vec<RoundedStation<M>>,
 }
@@ -43,7 +45,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         }
     }
 
-    /// A piece of the path, on its curve.
+    /// Piece `number` of the path, with its curve.
     pub fn piece(&mut self, number: usize, curve: &Rc<Curve<M>>) -> Rc<Piece<'a, M>> {
         let kept = &mut self.pieces[number % KEPT];
         kept.take_if(|piece| piece.number != number);
@@ -94,7 +96,7 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         self.rounded.iter().flatten().chain(&self.stations_ahead).find(is_here).copied()
     }
 
-    /// Computes stations and their rounding, each on its piece, at once for later calls.
+    /// Computes stations and bounds of their rounding errors, each on its piece, several at once for later calls.
     pub fn look_ahead_on_each(&mut self, at: &[(Rc<Piece<M>>, f64)], room: &mut [Lanes]) {
         self.stations_ahead.clear();
         for alike in at.chunk_by(|(a, _), (b, _)| a.is_like(b)) {
@@ -134,7 +136,8 @@ impl<'a, const M: usize> JointColumns<'a, M> {
         [on.way(&position, q), slope]
     }
 
-    /// The second derivative by u where it was last looked at on a piece, which may be some times that elsewhere.
+    /// Estimates the greatest second derivative of the joints by u on a piece from the last station on it; infinite if there is
+    /// none.
     pub fn bend(&self, piece: usize) -> f64 {
         let last = self.known.as_ref().filter(|(number, _)| *number == piece);
         last.map_or(f64::INFINITY, |(_, at)| BEND_GROWS * length(&at.second) * at.slope * at.slope)

@@ -1,10 +1,11 @@
-//! Evaluates the recorded formula of a kinematics: values and derivatives by the chain rule, each with a bound of its rounding.
+//! Evaluates the recorded formula of a kinematics: values and derivatives by the chain rule, each with a bound of its rounding
+//! error.
 //!
 //! A recorded formula is a list of operations on the results of earlier ones. A jet holds f, f', f'', f''' by the path's
-//! parameter, as many as are asked for; products go by Leibniz's rule, functions by Faà di Bruno's. Each derivative
-//! has a bound of its error in units of the rounding of 1: the errors of the operands carried over, and the rounding of each term
-//! (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.3). Bounds take longer than the values, so a
-//! jet has them only if they are asked for. A formula is evaluated at one place or at eight at once, with the same bits.
+//! parameter, as many as are asked for; products follow Leibniz's rule, functions Faà di Bruno's. Each derivative has a bound of
+//! its error in units of `EPS`: the errors of the operands carried over, and the rounding of each term (Higham, Accuracy and
+//! Stability of Numerical Algorithms, 2002, section 3.3). Bounds take longer than the values, so a jet has them only if they are
+//! asked for. A formula is evaluated at one place or at eight at once, with the same bits.
 
 use std::f64::consts::PI;
 
@@ -16,19 +17,19 @@ use crate::number::Lanes;
 /// Error of an elementary function, in roundings of its value.
 const ELEMENTARY: f64 = 4.0;
 
-/// The first N of f, f', f'', f''' and their errors in units of `EPS`, N or none.
+/// The first N of f, f', f'', f''', and bounds of their errors in units of `EPS`: E is N, or 0 without bounds.
 #[derive(Clone, Copy, Debug)]
 pub struct Jet<const N: usize, const E: usize, T = f64> {
     pub value: [T; N],
     pub error: [T; E],
 }
 
-/// The most numbers of a jet.
+/// Most numbers of a jet: four values and four errors.
 pub const JET: usize = 8;
 
 /// What a formula is evaluated on: a number, or eight at once.
 pub trait Argument: Elementary {
-    /// Fills the table of results, in which the inputs are given; each result has N values and E errors.
+    /// Evaluates all operations into the table of results, which begins with the inputs; each result has N values and E errors.
     fn evaluate<const N: usize, const E: usize>(formula: &Formula, table: &mut [Self::Kept]);
 }
 
@@ -39,7 +40,7 @@ impl Argument for f64 {
 }
 
 impl<S: Simd> Argument for f64x8<S> {
-    // Its loop is built once, and not in all that call it.
+    // The loop over the operations is compiled once, not inlined into every caller.
     #[inline(always)]
     fn evaluate<const N: usize, const E: usize>(formula: &Formula, table: &mut [Lanes]) {
         formula.evaluate_at_once::<N, E>(table);
@@ -73,7 +74,7 @@ impl Formula {
         let mut steps: Vec<Step> = Vec::with_capacity(rows.len());
         for (&[code, a, b], &constant) in rows.iter().zip(constants) {
             let end = inputs + steps.len();
-            // Operands that an operation does not have are 0; the first has none at all.
+            // Operands that an operation does not have are 0; a constant, code 0, has none and may come first.
             let operands = if code == 0 { [0, 0] } else { [place(a, end)?, place(b, end)?] };
             let follows = steps.last().is_some_and(|step| step.code == SINE && step.operands == operands);
             if !(0..CODES).contains(&code) || (code == COSINE && !follows) {
@@ -92,12 +93,12 @@ impl Formula {
         self.inputs + self.steps.len()
     }
 
-    /// Fills the table of results at eight places, in the vectors of the processor.
+    /// Fills the table of results at eight places, in SIMD vectors.
     pub fn evaluate_at_once<const N: usize, const E: usize>(&self, table: &mut [Lanes]) {
         dispatch!(Level::new(), simd => self.fill::<N, E, _>(f64x8::splat(simd, 0.0), table));
     }
 
-    /// Fills the table of results, in which the inputs are given; `nothing` is 0 in all places.
+    /// Fills the table of results, in which the inputs are given; `nothing` is 0 in all lanes.
     #[inline(always)]
     fn fill<const N: usize, const E: usize, T: Elementary>(&self, nothing: T, table: &mut [T::Kept]) {
         // The cosine of an angle comes right after its sine.
@@ -141,7 +142,7 @@ const BINOMIAL: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0], [1.0, 2.0, 1.0, 0.0], [1.0, 3.0, 3.0, 1.0]];
 
 impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
-    /// Known exactly, and the same everywhere.
+    /// A constant without error; its derivatives are 0.
     #[inline(always)]
     pub fn constant(value: T) -> Self {
         let nothing = value.filled(0.0);
@@ -150,7 +151,7 @@ impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
         jet
     }
 
-    /// A result in a table; `like` has the places of its numbers.
+    /// Reads result `place` of a table; `like` only gives the type of number.
     #[inline(always)]
     pub fn taken(like: T, table: &[T::Kept], place: usize) -> Self {
         let row = &table[place * (N + E)..][..N + E];
@@ -164,7 +165,7 @@ impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
         jet
     }
 
-    /// Puts it into a table.
+    /// Writes the jet into row `place` of a table.
     #[inline(always)]
     pub fn keep(&self, table: &mut [T::Kept], place: usize) {
         let row = &mut table[place * (N + E)..][..N + E];
@@ -215,7 +216,7 @@ impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
         self.times_to(other, N)
     }
 
-    /// The first terms of a product, the others 0.
+    /// The first `terms` numbers of a product; the others are 0.
     #[inline(always)]
     fn times_to(&self, other: &Self, terms: usize) -> Self {
         let nothing = self.value[0].filled(0.0);
@@ -244,12 +245,13 @@ impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
         jet
     }
 
-    /// A function of the jet, from the value and the first four derivatives of the function, each with an error of `roundings`.
+    /// f of the jet, from the value and the first four derivatives of f, which have errors of `roundings` times `EPS` relative to
+    /// their size.
     #[inline(always)]
     fn composed(&self, f: [T; 5], roundings: f64) -> Self {
         let (x, e) = (&self.value, &self.error);
         let mut jet = Self::constant(f[0]);
-        // How wrong the function and its derivatives are.
+        // Errors of f and of its derivatives.
         let mut wrong = f;
         if E > 0 {
             for k in 0..4 {
@@ -331,7 +333,7 @@ impl<const N: usize, const E: usize, T: Elementary> Jet<N, E, T> {
         jet
     }
 
-    /// The derivative; its last term is not known, and 0.
+    /// The derivative of the jet; its last number is not known and set to 0.
     #[inline(always)]
     fn slope(&self) -> Self {
         let mut slope = Self::constant(self.value[0].filled(0.0));
@@ -379,7 +381,7 @@ mod tests {
                 found.value[k],
                 exact[k]
             );
-            // Bounds of the worst case add up over the operations, and stay far below a part in 1e12.
+            // The worst-case bounds add up over the operations, but stay far below a part in 1e12.
             let most = 2000.0 * exact.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
             assert!(found.error[k] <= most, "{k}: {} roundings", found.error[k]);
         }

@@ -12,17 +12,17 @@ use crate::vectors::{curvature, length, times, vector_of};
 use crate::{EPS, ROUNDINGS};
 
 pub const TURN: f64 = 360.0;
-/// Degrees of an angle of 1.
+/// An angle of 1 rad in degrees.
 const DEGREE: f64 = 180.0 / std::f64::consts::PI;
-/// Error of a coordinate of the tip in the formula, in roundings of the greatest coordinate of its piece.
+/// Rounding error of a tip coordinate in the formula, in roundings of the greatest coordinate of its piece.
 pub const TIP_ROUNDINGS: f64 = 2.0 * ROUNDINGS;
 
-/// What the words of runs mean.
+/// The kinematics of a run: how its axis words determine the joints.
 pub struct Words {
     pub formula: Formula,
-    /// Which joints are known up to whole turns only.
+    /// Whether the angle of a joint is known up to whole turns only.
     pub turning: Vec<bool>,
-    /// For each coordinate of the tip the axis of the path; one without stays at 0.
+    /// For each coordinate of the tip its axis of the path; None if the coordinate stays at 0.
     pub column: Vec<Option<usize>>,
     /// Whether the tip's coordinates end with a direction I, J, K.
     pub directed: bool,
@@ -30,35 +30,35 @@ pub struct Words {
 
 /// The joints of a problem whose path is that of the tool's tip.
 ///
-/// Some angles are known up to whole turns only: between two places that are compared such a joint turns by less than half a
-/// turn.
+/// Some angles are known up to whole turns only: between two places that are compared such a joint is taken to turn by less than
+/// half a turn.
 pub struct JointPath<'a> {
     pub path: Followed<'a>,
     /// Number of joints.
     pub joints: usize,
     pub words: &'a [Words],
-    /// The words of each run.
+    /// Index of the words of each run.
     pub words_of: &'a [usize],
-    /// Axes X, Y, Z and I, J, K of the path.
+    /// Which axes of the path are X, Y, Z, and which are I, J, K.
     pub xyz: &'a [bool],
     pub ijk: &'a [bool],
-    /// What each axis of the path counts in its length.
+    /// The factor of each path axis in the length of the path.
     pub way_scale: &'a [f64],
-    /// The greatest speed of each piece.
+    /// Feed of each piece, in mm/s or degrees/s.
     pub feed: &'a [f64],
 }
 
-/// A piece ready to be measured.
+/// A piece ready to be evaluated.
 pub struct Piece<'a, const M: usize> {
     pub number: usize,
     pub width: f64,
     pub curve: Rc<Curve<M>>,
     words: &'a Words,
-    /// The axes whose motion the feed limits, 1 or 0: X, Y, Z where these move, else the others.
+    /// 1 for the axes whose motion the feed limits, else 0: X, Y, Z where these move, else the others.
     pub counts: [f64; M],
-    /// Whether only the direction of the tool turns: then the feed limits the degrees that it turns.
+    /// Whether only the direction of the tool turns: then the feed limits its angular speed in degrees/s.
     turns: bool,
-    /// What each axis of the path counts in its length.
+    /// The factor of each path axis in the length of the path.
     way_scale: [f64; M],
     xyz: [f64; M],
     ijk: [usize; 3],
@@ -67,7 +67,7 @@ pub struct Piece<'a, const M: usize> {
     start_size: f64,
 }
 
-/// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
+/// Positions of the joints and their first three derivatives by u, and |C'| with its first two derivatives.
 type Bends<const M: usize, const W: usize, T> = ([Rounded<M, T>; 4], Jet<3, W, T>);
 
 #[cfg(test)]
@@ -103,23 +103,23 @@ impl JointPath<'_> {
         self.path.runs.partition_point(|&first| first <= piece as i64) - 1
     }
 
-    /// What each axis of the path counts in its length.
+    /// The factor of each path axis in the length of the path.
     pub fn scale<const M: usize>(&self) -> [f64; M] {
         std::array::from_fn(|k| self.way_scale.get(k).copied().unwrap_or(0.0))
     }
 
-    /// Room for the results of all formulas, used again at every place.
+    /// Memory for the results of any of the formulas, used again at every place.
     pub fn room<K: Copy>(&self, nothing: K) -> Vec<K> {
         let most = self.words.iter().map(|words| words.formula.places()).max().unwrap_or(0);
         vec![nothing; JET * most]
     }
 
-    /// A piece ready to be measured.
+    /// A piece ready to be evaluated.
     pub fn piece<const M: usize>(&self, number: usize) -> Piece<'_, M> {
         self.piece_on(number, Rc::new(self.path.curve::<M>(number)))
     }
 
-    /// The same where its curve is at hand.
+    /// The piece, from its curve.
     pub(super) fn piece_on<const M: usize>(&self, number: usize, curve: Rc<Curve<M>>) -> Piece<'_, M> {
         let run = self.run_of(number);
         let words = &self.words[self.words_of[run]];
@@ -165,7 +165,7 @@ fn counted<const M: usize, T: Number>(of: &[T; M], counts: &[f64; M]) -> [T; M] 
 }
 
 impl<const M: usize> Piece<'_, M> {
-    /// The axes of X, Y, Z whose motion the feed limits, 1 or 0.
+    /// 1 for X, Y, Z if the feed limits their motion, else 0.
     pub fn linear(&self) -> [f64; M] {
         times(&self.counts, &self.xyz)
     }
@@ -176,7 +176,7 @@ impl<const M: usize> Piece<'_, M> {
         [of[i], of[j], of[k]]
     }
 
-    /// The axes whose motion the feed limits, 1 or 0; none where it limits a turn.
+    /// 1 for the axes whose motion the feed limits, else 0; None where the feed limits an angular speed.
     pub fn fed_axes(&self) -> Option<[f64; M]> {
         (!self.turns).then_some(self.counts)
     }
@@ -191,7 +191,7 @@ impl<const M: usize> Piece<'_, M> {
         times(&self.counts, &self.curve.derivative(u))
     }
 
-    /// Curvature of the path in the axes whose motion the feed limits, if X, Y, Z are among these.
+    /// Curvature in 1/mm of the path in the axes whose motion the feed limits; 0 if X, Y, Z are not among these.
     pub fn curvature(&self, u: f64) -> f64 {
         self.curvature_by(&self.curve.derivatives(u))
     }
@@ -204,7 +204,7 @@ impl<const M: usize> Piece<'_, M> {
         curvature(&counted(tangent, &self.counts), &counted(bend, &self.counts))
     }
 
-    /// Derivative by u of the way that the feed limits.
+    /// Derivative by u of the length (or angle in degrees) that the feed limits.
     pub fn feed_slope(&self, u: f64) -> f64 {
         if self.turns {
             self.feed_slope_of(&self.curve.at(u), &self.curve.derivative(u))
@@ -224,7 +224,8 @@ impl<const M: usize> Piece<'_, M> {
         inner(&across, &across).root() / inner(&direction, &direction) * DEGREE
     }
 
-    /// The way that the feed limits, straight from one point of the piece to another.
+    /// Straight distance of two points of the piece in the axes whose motion the feed limits, in mm; where the feed limits an
+    /// angular speed, the angle between both directions in degrees.
     pub fn feed_way(&self, start: &[f64; M], end: &[f64; M]) -> f64 {
         if !self.turns {
             let way: [f64; M] = std::array::from_fn(|k| self.counts[k] * (end[k] - start[k]));
@@ -235,7 +236,8 @@ impl<const M: usize> Piece<'_, M> {
         across.atan2((0..3).map(|k| first[k] * last[k]).sum()).to_degrees()
     }
 
-    /// Fills the table of results from the position of the tip and its first derivatives; their roundings are relative to `sizes`.
+    /// Evaluates the formula into the table of results, from the position of the tip and its first derivatives; their rounding
+    /// errors are relative to `sizes`.
     #[inline(always)]
     fn fill<const N: usize, const E: usize, T: Argument>(
         &self,
@@ -259,7 +261,7 @@ impl<const M: usize> Piece<'_, M> {
         T::evaluate::<N, E>(&self.words.formula, table);
     }
 
-    /// A derivative of all joints from the table of results; `like` has the places of its numbers.
+    /// Derivative `order` of all joints, 0 for positions, from the table of results; `like` only gives the type of number.
     #[inline(always)]
     fn joint_rows<const N: usize, const E: usize, T: Argument>(
         &self,
@@ -275,7 +277,7 @@ impl<const M: usize> Piece<'_, M> {
             if E > 0 {
                 rounding[joint] = jet.error[order] * EPS;
             }
-            // At a singular place nothing is known of a derivative.
+            // At a singular place a derivative is not finite: it is unknown then.
             if order > 0 {
                 let both = value[joint] + rounding[joint];
                 value[joint] = value[joint].where_finite(both, 0.0);
@@ -285,7 +287,7 @@ impl<const M: usize> Piece<'_, M> {
         Rounded { value, rounding }
     }
 
-    /// Positions of the joints at eight places, angles as the kinematics gives them.
+    /// Positions of the joints at eight places; angles are not continued over whole turns.
     pub fn at_each(&self, u: &Lanes, room: &mut [Lanes]) -> [Lanes; M] {
         let mut tips = [[0.0; 8]; M];
         if self.curve.polygon.is_rational() {
@@ -299,7 +301,7 @@ impl<const M: usize> Piece<'_, M> {
         dispatch!(Level::new(), simd => self.look_at_each(f64x8::from_slice(simd, u), &tips, room))
     }
 
-    /// The same; on pieces with weights the positions of the tip are given.
+    /// Positions of the joints for numbers of one type; on rational pieces the positions of the tip are given.
     #[inline(always)]
     fn look_at_each<T: Argument<Kept = Lanes>>(
         &self,
@@ -319,7 +321,7 @@ impl<const M: usize> Piece<'_, M> {
         kept(self.joint_rows::<1, 0, T>(room, 0, u).value)
     }
 
-    /// Positions and slopes of the joints, from those of the tip.
+    /// Positions of the joints and their derivatives by u, from those of the tip.
     #[inline(always)]
     pub fn position_and_slope<T: Argument>(&self, tip: &[[T; M]; 2], room: &mut [T::Kept]) -> [[T; M]; 2] {
         self.fill(room, tip, &[]);
@@ -363,18 +365,18 @@ impl<const M: usize> Piece<'_, M> {
         Place { piece: self.number, u, tip: *tip, position, slope, way_slope, tip_slope: feed_slope }
     }
 
-    /// The first three derivatives of the joints by the length of the way at u, from the tip and its derivatives by u.
+    /// The station at u, with the derivatives of the joints by the length of the path, from the tip and its derivatives by u.
     #[inline(always)]
     pub fn station<T: Argument>(&self, u: T, tip: &[[T; M]; 4], room: &mut [T::Kept]) -> Station<M, T> {
         self.station_of(u, tip, &self.bends::<0, 0, T>(room, tip, &[]))
     }
 
-    /// The same with the place, and what of it may be rounding.
+    /// The place and the station at u, with bounds of the rounding errors.
     pub fn rounded_station(&self, u: f64, room: &mut [f64]) -> (Place<M>, Station<M>, Roundings<M>) {
         self.rounded_by(u, &self.curve.jet(u), &self.sizes, room)
     }
 
-    /// The same at places on a piece without weights.
+    /// Stations at several places of a piece without weights, with bounds of their rounding errors.
     #[inline(always)]
     pub fn rounded_stations<T: Argument<Kept = Lanes>>(
         &self,
@@ -386,7 +388,8 @@ impl<const M: usize> Piece<'_, M> {
         (station, roundings)
     }
 
-    /// The same at one place of this piece, or of another one that is like it, in each lane.
+    /// A place and a station in each lane, with bounds of their rounding errors; each is on this piece or on one that `is_like`
+    /// it.
     pub fn rounded_on_each(
         &self,
         on: [(&Self, f64); 8],
@@ -430,7 +433,7 @@ impl<const M: usize> Piece<'_, M> {
         std::ptr::eq(self.words, other.words) && self.counts == other.counts && self.turns == other.turns
     }
 
-    /// The magnitudes to which the roundings of the tip are relative; `like` has the places of their numbers.
+    /// The magnitudes to which the roundings of the tip are relative, as numbers of the type of `like`.
     #[inline(always)]
     fn sizes_like<T: Number>(&self, like: T) -> [[T; M]; 4] {
         let mut sizes = [[like; M]; 4];
@@ -470,7 +473,7 @@ impl<const M: usize> Piece<'_, M> {
         Station::of_joints(u, [&q1.value, &q2.value, &q3.value], way.value, tool)
     }
 
-    /// Positions of the joints and their first three derivatives by u, and |C'| with two of its own.
+    /// Positions of the joints and their first three derivatives by u, and |C'| with its first two derivatives.
     #[inline(always)]
     fn bends<const E: usize, const W: usize, T: Argument>(
         &self,
@@ -480,7 +483,7 @@ impl<const M: usize> Piece<'_, M> {
     ) -> Bends<M, W, T> {
         self.fill(table, tip, sizes);
         let like = tip[0][0];
-        // |C'|² by its axes.
+        // |C'|² as a sum over the axes.
         let mut square = Jet::<3, W, T>::constant(like.filled(0.0));
         for k in 0..M {
             let scale = self.way_scale[k];
@@ -511,7 +514,8 @@ impl<const M: usize> Piece<'_, M> {
         (joints, square.root())
     }
 
-    /// From one position to another, both of this piece: joints known up to whole turns turn by the smaller angle.
+    /// Displacement from one position to another one, both on this piece: joints known up to whole turns turn by the smaller
+    /// angle.
     #[inline(always)]
     pub fn way<T: Number>(&self, before: &[T; M], after: &[T; M]) -> [T; M] {
         let mut way = *after;
@@ -524,14 +528,15 @@ impl<const M: usize> Piece<'_, M> {
         way
     }
 
-    /// From a position on another piece to one on this: joints known up to whole turns on one of them turn by the smaller angle.
+    /// Displacement from a position on another piece to one on this piece: joints known up to whole turns on one of them turn by
+    /// the smaller angle.
     pub fn way_from(&self, other: &Piece<M>, before: &[f64; M], after: &[f64; M]) -> [f64; M] {
         let way = self.way(before, after);
         let turns = |k: usize| other.turning(k) && !self.turning(k);
         vector_of(|k| if turns(k) { way[k] - TURN * (way[k] / TURN).round() } else { way[k] })
     }
 
-    /// The greatest coordinate of the first control point.
+    /// The greatest coordinate of the first control point, as an absolute value in mm.
     pub fn start_size(&self) -> f64 {
         self.start_size
     }

@@ -1,7 +1,7 @@
 //! Audits the positions of joints that are not the path's axes against their travel, along the whole path.
 //!
-//! Some angles are known up to whole turns only. They are continuous from place to place, and a piece on which a joint's own angle
-//! is known tells its whole turns on all pieces.
+//! Some angles are known up to whole turns only. They are continued from place to place; a piece on which such an angle is known
+//! absolutely gives the number of whole turns on all pieces.
 
 use std::rc::Rc;
 
@@ -14,13 +14,13 @@ use crate::profile_clock::ProfileClock;
 use crate::profile_reader::Reader;
 use crate::{Check, Limits, Tally, Worst};
 
-/// Even intervals of a piece for each degree.
+/// Number of equal intervals of a piece, for each of its degrees.
 const INTERVALS: usize = 4;
 
-/// Least and greatest position of a joint, with their places.
+/// Least and greatest position of a joint, and where these are.
 type Span = [(f64, Place); 2];
 
-/// The travel of every joint, at the times of a profile if its numbers can be used.
+/// Audits the travel of every joint; the times are those of the profile, if its numbers can be used.
 pub fn audit_travel<const M: usize>(
     of: &JointPath,
     phases: Phases,
@@ -31,7 +31,7 @@ pub fn audit_travel<const M: usize>(
     let nowhere = (f64::NAN, Place { piece: 0, u: 0.0 });
     let mut spans: [Span; M] = [[nowhere; 2]; M];
     let mut turns = [f64::NAN; M];
-    // The last piece and its end, as the kinematics says and continuous.
+    // The last piece with the positions at its last place: as the kinematics gives them, and continued without jumps.
     let mut last: Option<(Rc<Piece<M>>, [f64; M], [f64; M])> = None;
     for number in 0..path.len() {
         let piece = Rc::new(of.piece(number));
@@ -79,7 +79,7 @@ pub fn audit_travel<const M: usize>(
             continue;
         }
         let (middle, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
-        // An angle that is known up to whole turns on all pieces is taken on the turn that fits its travel best.
+        // If an angle is known up to whole turns on all pieces, it is shifted by the whole turns that fit its travel best.
         let turns = match turns[k] {
             turns if turns.is_nan() => TURN * ((middle - 0.5 * (least.0 + most.0)) / TURN).round(),
             turns => turns,

@@ -1,11 +1,13 @@
-//! Tells which of some phases can change what was found: eight phases at once, in the vectors of the processor.
+//! Finds, for eight phases at once in SIMD vectors, those that cannot raise the greatest use of any limit found so far, and their
+//! times; only the others need the closer look of `by_length`.
 //!
-//! The phases may be on several pieces. Each is looked at in eight places, the nodes of Lobatto's rule (Abramowitz and Stegun
-//! 25.4.32), both ends among them. |C'| there gives the lengths up to all of them by the polynomial through them, v² by the length
-//! gives speed, acceleration and jerk along the path, and the derivatives of C give those of all axes. A phase needs no closer look
-//! where no place uses more of a limit than was found before, nor does a parabola between two places, nor the polynomial half-way.
-//! As in `by_length`, which looks at more places, `bulge` bounds what lies between two: where that is much above both, both halves
-//! are looked at instead. Where more of a limit is used, `by_length` looks.
+//! The phases may be on several pieces. Each is evaluated at eight places, the nodes of Lobatto's rule (Abramowitz and Stegun
+//! 25.4.32), which include both ends. The polynomial through |C'| at these places gives the lengths up to all of them; v² as a
+//! cubic of the length gives speed, acceleration and jerk along the path; with the derivatives of C these give those of all axes.
+//! A phase cannot raise a use if no place has a greater one than was found before, and nothing between two places can have: that
+//! is shown by the bound of `bulge`, or, if this bound is small, by parabolas through two places and the polynomial half-way
+//! between them. If the bound is too large for that, both halves of the phase are evaluated instead. If a place has a greater
+//! use, the phase needs the closer look.
 
 use fearless_simd::{f64x8, mask64x8, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
@@ -20,13 +22,13 @@ use crate::{Check, Limits, Sided, Tally, FEEDS};
 
 use super::by_length::WIDE;
 
-/// Phases that are looked at at once.
+/// Number of phases that are evaluated at once.
 pub const PHASES: usize = 8;
 
-/// Places of a phase.
+/// Number of places of a phase.
 pub const PLACES: usize = 8;
 
-/// Where the places are: from −1 at the start of the phase to 1 at its end; and in parts of the phase.
+/// The places: from −1 at the start of the phase to 1 at its end; and as parts of the phase.
 const NODES: [f64; PLACES] = {
     let [a, b, c] = [0.209_299_217_902_478_88, 0.591_700_181_433_142_3, 0.871_740_148_509_606_6];
     [-1.0, -c, -b, -a, a, b, c, 1.0]
@@ -40,15 +42,19 @@ const SHARES: [f64; PLACES] = {
     shares
 };
 
-/// What the values at the places make of a function, by the polynomials that are 1 at one of some places and 0 at the others.
+/// Weights of the values at some places in integrals of a function and in its values elsewhere, by the Lagrange polynomials of
+/// these places.
 struct Weights {
-    /// Of the integrals from the start up to each place, a row for each value. The last column is Lobatto's rule, good to degree 13.
+    /// For the integrals from the start up to each place, in parts of the phase; a row for each value. The last column is
+    /// Lobatto's rule, exact to degree 13.
     up_to: [[f64; PLACES]; PLACES],
-    /// Of the values half-way to the next place; at the last place of its own.
+    /// For the values half-way to the next place; the last column is for the value at the last place.
     between: [[f64; PLACES]; PLACES],
-    /// Of the integral over the first half, less half of the whole one: of what is odd about the middle.
+    /// For the integral over the first half less half of the whole integral, to which only the part of the function that is odd
+    /// about the middle contributes.
     odd: [f64; PLACES],
-    /// Of the greatest change that a value makes half-way between two places, against the polynomial through the others.
+    /// For the difference between the polynomial through all places and that through all but the last one, half-way between those
+    /// two neighbouring places where it is greatest.
     last: [f64; PLACES],
 }
 
@@ -57,7 +63,7 @@ const fn weights<const N: usize>(places: [usize; N]) -> Weights {
     let mut weights = Weights { up_to: none, between: none, odd: [0.0; PLACES], last: [0.0; PLACES] };
     let mut row = 0;
     while row < N {
-        // By powers of the node.
+        // Coefficients of the Lagrange polynomial by powers of the node.
         let (own, mut c, mut count) = (NODES[places[row]], [0.0; PLACES], 0);
         c[0] = 1.0;
         while count < N {
@@ -112,36 +118,36 @@ const fn primitive(c: &[f64; PLACES], x: f64) -> f64 {
 
 const ALL: Weights = weights([0, 1, 2, 3, 4, 5, 6, 7]);
 
-/// Without the middle pair, good to degree 5, and by the first and the third pair, good to degree 3.
+/// Weights without the middle pair, exact to degree 5, and of the first and the third pair alone, exact to degree 3.
 const LOWER: Weights = weights([0, 1, 2, 5, 6, 7]);
 const LOWEST: Weights = weights([0, 2, 5, 7]);
 
-/// The lowest rule counts by this share, as the others can agree by chance, and an integral is good where none is off by more than this
-/// part.
+/// The other rules can agree by chance, so the difference of the lowest one counts as well, times this. An integral is accepted
+/// if no difference is more than `RULES_AGREE` of it.
 const CHANCE: f64 = 3e-3;
 const RULES_AGREE: f64 = 3e-8;
 
-/// The polynomial through all places is nowhere greater than this times the greatest value at one of them.
+/// The polynomial through all places is nowhere greater than this times the greatest absolute value at a place.
 const GREATEST: f64 = 2.0;
 
 /// The longest interval between two places, in parts of the phase.
 const LONGEST: f64 = SHARES[4] - SHARES[3];
 
-/// Next to rest, where v² at one end is below this part of that at the other one, the length leaves too few digits of it.
+/// Next to rest, where v² at one end is below this part of that at the other one, v² by the length has too few correct digits.
 const SLOW_SQ: f64 = 1e-4;
 
-/// A part of a phase of joints, of which nothing bounds what lies between the places, has no more than this part of its piece in degrees:
-/// as close to each other are the places that `by_length` looks at.
+/// For joints no bound of what lies between the places is known. So a part of a phase covers at most this share of its piece,
+/// divided by `Curve::turns`: then its places are as close to each other as those of `by_length`.
 const MOST_TURNED: f64 = 7.0 / 3.0;
 
-/// A part of a phase is halved so often at most: all places of one look cost as much as some five of `by_length`.
+/// A part of a phase is halved at most this many times: its eight places cost as much as about five places of `by_length`.
 const MOST_HALVINGS: u32 = 4;
 
-/// A phase on which v² is a cubic polynomial of the length: u, p and the acceleration along the path at both ends; and where v² is
-/// constant, its value, of which p is another record.
+/// A phase whose v² is a cubic polynomial of the length: u, p in mm²/s² and the acceleration along the path at both ends. If
+/// v² is constant, `held_sq` is its value, and p is another record of it.
 #[derive(Clone, Copy)]
 pub struct Phase {
-    /// The number of its piece among those of the phases that are looked at.
+    /// Index of its piece in `Looks::pieces`.
     pub piece: usize,
     pub u: [f64; 2],
     pub p: [f64; 2],
@@ -149,25 +155,26 @@ pub struct Phase {
     pub held_sq: Option<f64>,
 }
 
-/// A part of a phase, which has this number among those that are looked at. What is not known of it is no number.
+/// A part of the phase `number` of `Looks::phases`. Numbers that are not known are NaN.
 #[derive(Clone, Copy)]
 struct Part {
     number: usize,
     u: [f64; 2],
-    /// The lengths from the start of the phase up to both ends.
+    /// The lengths from the start of the phase up to both ends of the part.
     ends: [f64; 2],
-    /// v² at both ends of the phase, and its length.
+    /// v² at both ends of the phase, and the length of the phase.
     speed_sq: [f64; 2],
     whole: f64,
     halvings: u32,
 }
 
-/// What eight places of a part show: that it changes nothing; that fewer of it may show that; or that it has to be looked at closer.
+/// Verdicts on a part: it cannot raise any use; that is open, and its halves may show it; it needs a closer look.
 const NOTHING: f64 = 0.0;
 const OPEN: f64 = 1.0;
 const MORE: f64 = 2.0;
 
-/// The same of each part, with its time, its length, and v² at both ends and the length of its phase, each where that is known.
+/// The verdict on each part, with its time, its length, and v² at both ends and the length of its phase; NaN where a number is
+/// not known.
 struct Found {
     verdict: Lanes,
     time: Lanes,
@@ -176,32 +183,32 @@ struct Found {
     whole: Lanes,
 }
 
-/// A piece without weights, and what holds on it.
+/// A polynomial piece, with its feeds and bounds.
 pub struct OnPiece<'a, const M: usize> {
     on: Together<'a, M>,
     feeds: [f64; FEEDS],
     feeds_along: [bool; FEEDS],
-    /// See `Curve`.
+    /// See `Curve::bounds`.
     bounds: [f64; 4],
     moves: [f64; M],
 }
 
-/// Consecutive phases, those that can be looked at at once, and the times of those of them that change nothing.
+/// Consecutive phases, without those that cannot be evaluated at once, and the times of those that cannot raise any use.
 pub struct Looks<'a, const M: usize> {
     pub pieces: Vec<OnPiece<'a, M>>,
     pub phases: Vec<Option<Phase>>,
     pub times: Vec<Option<f64>>,
-    /// Parts of them that have not been looked at.
+    /// Parts of phases that have not been evaluated yet.
     open: Vec<Part>,
-    /// The places of eight of these; those of fewer are beside others that nothing is asked of.
+    /// The places of eight parts; if there are fewer, the results of the other lanes are ignored.
     stations: Box<[Station<M, Lanes>; PHASES]>,
-    /// Ends of them that are looked at closer, each with its piece.
+    /// Ends of phases that need a closer look, and those where two pieces meet, each with its piece.
     pub ends: Vec<(usize, f64)>,
     /// See `Columns::room`.
     pub room: Vec<Lanes>,
 }
 
-/// Judges phases by the limits.
+/// Compares phases with the limits.
 pub struct Judge<'a, const M: usize> {
     /// See `Columns`.
     pub rates: &'a [[Sided<M>; 2]; 3],
@@ -210,7 +217,7 @@ pub struct Judge<'a, const M: usize> {
 }
 
 impl<'a, const M: usize> OnPiece<'a, M> {
-    /// None for a piece with weights, and in narrow vectors.
+    /// None for a rational piece, and on processors with narrow vectors.
     pub fn new(piece: usize, columns: &mut Columns<'a, M>) -> Option<Self> {
         let on = columns.together(piece)?;
         let (feeds, feeds_along) = (columns.feeds(piece), columns.feeds_along(piece));
@@ -222,7 +229,7 @@ impl<'a, const M: usize> OnPiece<'a, M> {
         self.on.curve.width()
     }
 
-    /// The widest part of a phase that is looked at, which of axes may be anything.
+    /// Width in u of the widest part of a phase that is evaluated; infinite for axes.
     fn widest(&self) -> f64 {
         match self.on.joints {
             Some(_) => MOST_TURNED / self.on.curve.turns() as f64 * self.width(),
@@ -230,12 +237,12 @@ impl<'a, const M: usize> OnPiece<'a, M> {
         }
     }
 
-    /// Derivatives of the length by u.
+    /// Derivatives of the length by u, at several u.
     fn speeds<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
         self.on.curve.speeds(u, &self.on.scale.unwrap_or([1.0; M]))
     }
 
-    /// The length between two parameters.
+    /// The length between two parameters; None if the rules still differ after `halvings` halvings.
     fn length(&self, [from, to]: [f64; 2], halvings: u32) -> Option<f64> {
         let width = to - from;
         let (length, doubts) = integral(&self.speeds(SHARES.map(|share| from + share * width)));
@@ -246,7 +253,8 @@ impl<'a, const M: usize> OnPiece<'a, M> {
         Some(self.length([from, middle], halvings)? + self.length([middle, to], halvings)?)
     }
 
-    /// Adds both halves of a part; what was found of it, if it has been looked at.
+    /// Adds both halves of a part to `open`, with what its own evaluation has found, if there was one. None if it has been halved
+    /// too often, or if its length or its speed is not known.
     fn halve(
         &self,
         (part, phase): (&Part, &Phase),
@@ -274,7 +282,7 @@ impl<'a, const M: usize> OnPiece<'a, M> {
 }
 
 impl<const M: usize> Looks<'_, M> {
-    /// Without any phases.
+    /// Without any phase.
     pub fn new(room: Vec<Lanes>) -> Self {
         let (number, vector) = ([f64::NAN; PLACES], [[f64::NAN; PLACES]; M]);
         let [u, slope, tip, curvature] = [number; 4];
@@ -285,7 +293,7 @@ impl<const M: usize> Looks<'_, M> {
 }
 
 impl<const M: usize> Judge<'_, M> {
-    /// Finds the times of those phases that cannot change the tally, by their laws.
+    /// Finds the times of those phases that cannot raise any use in the tally; the others get None.
     pub fn look_at(&self, looks: &mut Looks<M>, tally: &Tally<M>) {
         let Looks { pieces, phases, times, open, stations, room, .. } = looks;
         times.clear();
@@ -305,7 +313,7 @@ impl<const M: usize> Judge<'_, M> {
         let Some((&any, Some(phase))) = open.last().map(|part| (part, &phases[part.number])) else { return };
         let (mut parts, mut lanes, mut on) = ([any; PHASES], [phase; PHASES], [&pieces[phase.piece]; PHASES]);
         loop {
-            // Halves of parts that were open, and other phases.
+            // Halves of open parts come first, then other phases.
             let mut count = 0;
             while let Some(part) = if count < PHASES { open.pop() } else { None } {
                 if let (Some(_), Some(phase)) = (times[part.number], &phases[part.number]) {
@@ -338,7 +346,7 @@ impl<const M: usize> Judge<'_, M> {
         }
     }
 
-    /// Looks at parts of phases.
+    /// Evaluates eight parts of phases, and compares them with the limits.
     #[inline(always)]
     fn look<S: Simd>(
         &self,
@@ -445,8 +453,8 @@ impl<const M: usize> Judge<'_, M> {
         verdict = is_good.select(verdict, open);
         verdict = is_still.select(more, verdict);
         let mut find = |found: f64x8<S>| verdict = verdict.simd_eq(nothing).select(found, verdict);
-        // How far what lies between two places may be off the straight line, in parts of a limit; where nothing bounds it, that is told
-        // by the polynomial through the places.
+        // How far a use between two places may be off the straight line between them, in parts of the limit. None for joints, for
+        // which no bound is known: there the polynomial through the places decides.
         let off = |rate: f64x8<S>, per: f64x8<S>| are_axes.then(|| rate * per);
         // The limits of the axes.
         let judged = if self.limits.judges_jerk { 3 } else { 2 };
@@ -454,7 +462,7 @@ impl<const M: usize> Judge<'_, M> {
             let worst = tally.ratios(RATES[row]);
             let (per, per_least) = (&self.rates[row][1], &self.per_least[row]);
             for k in 0..self.limits.axes {
-                // What does not move on a piece stays on the straight line.
+                // An axis that does not move on a piece stays on the straight line.
                 let moves = |piece: &&OnPiece<M>| !are_axes || piece.moves[k] > 0.0;
                 if !on.iter().any(moves) {
                     continue;
@@ -472,7 +480,7 @@ impl<const M: usize> Judge<'_, M> {
         let worst = |check: Check| tally.get(check, 0).ratio;
         for feed in (0..FEEDS).filter(|&feed| on.iter().any(|piece| piece.feeds[feed] != f64::INFINITY)) {
             let (per, worst) = (1.0 / of_each(simd, on, |piece| piece.feeds[feed]), worst(Check::Feed));
-            // No share of the speed along the path is greater than that speed.
+            // The speed that a feed limits is at most that along the path.
             if are_all((bulge.most_speed * per).simd_le(all(worst))) {
                 continue;
             }
@@ -499,7 +507,8 @@ impl<const M: usize> Judge<'_, M> {
             let (period, most) = (self.limits.period, all(worst(Check::Chord) * self.limits.chord_tolerance));
             let mut are_low = are_chords_low(bulge.most_speed, most_curved, &bulge, period, most);
             if !are_all(are_low) {
-                // From each place to the next one neither speed nor curvature is beyond both by more than the bound of what lies between.
+                // Between two neighbouring places, speed and curvature exceed the greater value at these by no more than their
+                // bounds.
                 let mut are_steps_low = nothing.simd_eq(nothing);
                 for i in 0..PLACES - 1 {
                     let (fastest, curved) = (v[i].max(v[i + 1]), curvature[i].max(curvature[i + 1]));
@@ -520,8 +529,8 @@ impl<const M: usize> Judge<'_, M> {
 }
 
 impl Phase {
-    /// v² at both ends, where the squares of |C'| there are known; nothing next to rest, and where both records of a speed that is held
-    /// differ by more than rounding.
+    /// v² at both ends, from the squares of |C'| there. None next to rest, and where a constant speed and its record by p differ
+    /// by more than rounding.
     fn speed_sq(&self, square: [f64; 2]) -> Option<[f64; 2]> {
         let recorded = [square[0] * self.p[0], square[1] * self.p[1]];
         let is_held = |sq: f64| recorded.iter().all(|recorded| is_same_speed(sq.sqrt(), recorded.sqrt()));
@@ -535,7 +544,7 @@ impl Phase {
 }
 
 impl Part {
-    /// The lengths from the start of the phase up to both ends of the part, whose length is known.
+    /// The lengths from the start of the phase up to both ends of the part, from the length of the part.
     fn ends(&self, length: f64) -> [f64; 2] {
         match self.ends {
             [start, end] if start.is_nan() => [end - length, end],
@@ -543,7 +552,8 @@ impl Part {
         }
     }
 
-    /// The time of a part that changes nothing. That of a speed that changes fast takes more places than anything else.
+    /// The time of a part that cannot raise any use. Where the speed changes so fast that eight places do not give it, it is
+    /// integrated with more places. None if that fails.
     fn time(&self, phase: &Phase, found: &Found, i: usize) -> Option<f64> {
         let mut time = found.time[i];
         if time.is_nan() {
@@ -555,9 +565,10 @@ impl Part {
     }
 }
 
-/// What the uses of a limit at the places say, where nothing between two of them is off the straight line from place to place by more
-/// than `off`, if that is known: by that bound, by the polynomial through all places, which is nowhere greater than `GREATEST` times
-/// what is greatest at one of them, or by a parabola through two places and the polynomial half-way between those; see `peak`.
+/// The verdict on one limit from its uses at the places. `off` bounds how far the use may be off the straight line between two
+/// places, if that is known. That no use between the places is above `worst` is shown by this bound; by the polynomial through
+/// all places, which is nowhere greater than `GREATEST` times the greatest value at a place; or by parabolas through two
+/// neighbouring places and the polynomial half-way between them (see `peak`).
 #[inline(always)]
 fn verdict_of<S: Simd>(
     rate: &[f64x8<S>; PLACES],
@@ -571,7 +582,7 @@ fn verdict_of<S: Simd>(
     for i in 0..PLACES {
         used[i] = use_of(rate[i]);
         greatest = greatest.max(used[i].abs());
-        // A number that is none does not get lost in sums.
+        // `max` may lose a NaN, a sum does not.
         sum += used[i];
     }
     let are_below = greatest.simd_le(most) & (sum * 0.0).simd_eq(all(0.0));
@@ -614,7 +625,7 @@ fn verdict_of<S: Simd>(
     are_low.select(all(NOTHING), verdict)
 }
 
-/// Where chords at this speed and this curvature, and at what lies between the places, are not above `most`.
+/// Where the chord error is at most `most` for this speed and this curvature, each increased by its bound between the places.
 #[inline(always)]
 fn are_chords_low<S: Simd>(
     fastest: f64x8<S>,
@@ -627,7 +638,7 @@ fn are_chords_low<S: Simd>(
     chord_error(fastest * period, curvature + between.curvature).simd_le(most)
 }
 
-/// The integral over the phase, its width being 1, and by how much each of three rules is in doubt of it.
+/// The integral over a phase of width 1, and three estimates of its error by lower rules.
 #[inline(always)]
 fn integral<T: Number>(f: &[T; PLACES]) -> (T, [T; 3]) {
     let (mut sums, mut odd) = ([f[0].filled(0.0); 3], f[0].filled(0.0));
@@ -725,8 +736,8 @@ mod tests {
         assert!((0.9 * GREATEST..GREATEST).contains(&most), "{most}");
     }
 
-    /// The answer where `worst` of each rate, of the feed and of the chord error have been found before, in parts of what the phase
-    /// uses; the time by the law; and what it uses of each rate.
+    /// What is found of a phase if uses of `worst` times its own greatest rates, feed and chord error were found before: its time
+    /// or None. Then its time by the law, and its greatest rates.
     fn look(
         control: &[f64],
         phase: [[f64; 2]; 3],
@@ -735,7 +746,7 @@ mod tests {
         look_of(control, phase, worst, false)
     }
 
-    /// The same of axes or of joints.
+    /// `look` for axes, or for joints with a polar kinematics.
     fn look_of(
         control: &[f64],
         [u, speeds, a]: [[f64; 2]; 3],
@@ -771,7 +782,7 @@ mod tests {
                 }
             }
         }
-        // One limit for both axes; the worst of each axis is what it uses of that, but for the part that is asked for.
+        // Both axes have one limit; the tally has the greatest use of each axis times `worst`.
         let limit = most.map(|row| [row[0].max(row[1]); 2]);
         let of = |limit: [f64; 2]| Sided { positive: limit, negative: limit };
         let mut limits = Limits { judges_jerk: true, jerk: limit[2], chord_tolerance: farthest, ..free };
@@ -793,7 +804,7 @@ mod tests {
         }
         let Columns { rates, per_least, .. } = &columns;
         let judge = Judge { rates, per_least, limits: &limits };
-        // Beside other phases and alone it has the same answer; halves are added in another order.
+        // Beside other phases a phase gets the same answer as alone, up to rounding: its halves are added in another order.
         let phase = Some(Phase { piece: 0, u, p, a, held_sq: None });
         let gentle = Some(Phase { piece: 1, u: [0.1, 0.11], p: [1e-9; 2], a: [0.0; 2], held_sq: None });
         let mut found_of = |phases: &[Option<Phase>]| {
@@ -814,7 +825,7 @@ mod tests {
     #[test]
     fn a_gentle_phase_that_uses_no_more_than_was_found_has_its_time() {
         let control = [0.0, 0.0, 1.0, 0.1, 2.0, 0.1, 3.0, 0.0];
-        // Speed and curvature are greatest at different ends of it.
+        // Speed and curvature are greatest at different ends of the phase.
         let worst = |check, _| if check == Check::Chord { 1.0 + 1e-3 } else { 1.0 + 1e-6 };
         let (found, time, _) = look(&control, [[0.5, 0.55], [1.0, 1.0012], [0.02, 0.028]], &worst);
         assert!((found.unwrap() / time - 1.0).abs() < 1e-12);

@@ -1,10 +1,9 @@
 //! Audits one phase whose speed is known by the length of the path, at as many places as its motion needs.
 //!
-//! Velocity, acceleration and jerk of every axis are taken at both ends. `PhaseByLength::bulge` bounds what they can be between
-//! two places:
-//! * where all of that is below what was found elsewhere, nothing else is measured;
-//! * where it is much above what the two places have the interval is halved;
-//! * elsewhere a parabola through three places tells where a rate is greatest, and it is measured there.
+//! The uses of all limits are evaluated at both ends. `PhaseByLength::bulge` bounds what they can be between two places:
+//! * if none of them can be above the greatest use found so far, nothing else is evaluated;
+//! * if they may be much above those of the two places, the interval is halved;
+//! * otherwise the vertex of a parabola through three places tells where a use is greatest, and it is evaluated there.
 
 use crate::chord::chord_error;
 use crate::columns::{Columns, RATES};
@@ -16,52 +15,53 @@ use crate::station::{Rounded, Roundings, Station};
 use crate::vectors::{times, vector_of};
 use crate::{Check, Limits, Tally, FEEDS, PASS_EXCESS};
 
-/// The next places are this part of the distance beside a vertex, and are taken so often at most.
+/// A vertex is refined by two places beside it, at this part of the distance to the places that are known; at most `MOST_REFINED`
+/// times.
 const CLOSER: f64 = 0.5;
 const MOST_REFINED: u32 = 3;
 
-/// Where more than this share of a limit may be used beyond what both ends use, a parabola is not trusted; an interval is halved
-/// so often at most.
+/// A parabola is trusted only where no use can be off the straight line between both ends by more than this part of the limit.
+/// Otherwise the interval is halved, at most `MOST_HALVINGS` times.
 pub const WIDE: f64 = 0.03;
 const MOST_HALVINGS: u32 = 6;
 
-/// Shares of the limits that a place uses: velocity, acceleration and jerk of each axis with their signs, then feeds and chord
-/// error. What may be rounding is taken off only where more is used than was found elsewhere.
+/// Uses of the limits at a place: velocity, acceleration and jerk of each axis with their signs, then feeds and chord error. The
+/// rounding of a rate is subtracted only if its use is greater than any found so far.
 #[derive(Clone, Copy)]
 struct Use<const M: usize> {
     rates: [[f64; M]; 3],
     tip: [f64; FEEDS + 1],
 }
 
-/// What a place shows.
+/// A place that has been evaluated, with its uses of the limits.
 #[derive(Clone, Copy)]
 pub struct Look<const M: usize> {
     pub place: Place,
     pub station: Station<M>,
-    /// What of the speed along the path may be rounding.
+    /// Rounding error bound of the speed along the path, in mm/s.
     speed_rounding: f64,
     used: Use<M>,
 }
 
 impl<const M: usize> Look<M> {
-    /// What of the velocities may be rounding, on this piece.
+    /// Rounding error bounds of the column velocities, on this piece.
     pub fn velocity_rounding(&self, piece: usize, columns: &mut Columns<M>) -> [f64; M] {
         let of_station = columns.roundings(piece, &self.station).velocity(self.place.pace.v);
         vector_of(|k| of_station[k] + self.speed_rounding * self.station.first[k].abs())
     }
 }
 
-/// What is known of all places between two.
+/// What a bound tells of all places between two.
 enum Between {
-    /// None of them can use more of a limit than some place that was found.
+    /// None of them can have a greater use of any limit than was found so far.
     Certain,
-    /// None of them can use much more of a limit than the two.
+    /// None of them can have a use that is much above those of the two places.
     Narrow,
     Wide,
     Unbounded,
 }
 
-/// Where and when a phase is, and the limits that hold there.
+/// A phase, and the limits that hold on it.
 pub struct Looker<'a, 'b, const M: usize> {
     pub columns: &'a mut Columns<'b, M>,
     pub piece: usize,
@@ -70,16 +70,16 @@ pub struct Looker<'a, 'b, const M: usize> {
     pub limits: &'a Limits<M>,
     pub feeds: [f64; FEEDS],
     pub feeds_along: [bool; FEEDS],
-    /// The part of its piece that the phase covers, in degrees of it.
+    /// The part of its piece that the phase covers, times `Curve::turns`.
     pub covered: f64,
     pub start: f64,
     pub line: i32,
 }
 
 impl<const M: usize> Looker<'_, '_, M> {
-    /// Looks at a phase between two parameters, at which it has been looked.
+    /// Audits the phase between the two parameters `u`; `ends` have been evaluated already.
     pub fn phase(&mut self, u: [f64; 2], ends: [Option<&Look<M>>; 2], tally: &mut Tally<M>) {
-        // At most 1, as speeds are positive; a profile of rubbish has any numbers.
+        // For positive speeds this is at most 1, but a wrong profile may have any speeds.
         let change = match ends {
             [Some(from), Some(to)] => {
                 let [from, to] = [from.place.pace.v, to.place.pace.v];
@@ -91,7 +91,7 @@ impl<const M: usize> Looker<'_, '_, M> {
         self.between(ends, u, (0, intervals), tally);
     }
 
-    /// Looks between two places where a bound leaves open what lies there.
+    /// Evaluates places between two if the bound does not rule out a greater use there.
     fn between(
         &mut self,
         ends: [Option<&Look<M>>; 2],
@@ -116,14 +116,14 @@ impl<const M: usize> Looker<'_, '_, M> {
             self.between([ends[0], here.as_ref()], [u[0], middle], (halvings + 1, intervals), tally);
             self.between([here.as_ref(), ends[1]], [middle, u[1]], (halvings + 1, intervals), tally);
         }
-        // Also over both halves: a peak next to the middle may be beyond it by the parabola of either.
+        // Also if both halves have been audited: a peak next to the middle may be outside of either by its parabola.
         if let ([Some(from), Some(to)], Some(here)) = (ends, &here) {
             self.refine([from, here, to], 0, tally);
         }
     }
 
-    /// Looks where parabolas through three even places say that a rate is greater than any so far, and beside it where the parabola
-    /// is not close enough: one rate after the other.
+    /// Evaluates, for one use after the other, the vertex of the parabola through three equally spaced places if that may be
+    /// above the greatest use so far, and places beside it where the parabola is not accurate enough.
     fn refine(&mut self, places: [&Look<M>; 3], depth: u32, tally: &mut Tally<M>) {
         for (row, check) in RATES.into_iter().enumerate() {
             if are_far_below(places.map(|look| &look.used.rates[row]), &tally.ratios(check)) {
@@ -145,7 +145,7 @@ impl<const M: usize> Looker<'_, '_, M> {
         }
     }
 
-    /// Looks at a peak of one rate beyond the `worst` so far, and beside it.
+    /// Evaluates a peak of one use that may be above the `worst` so far, and places beside it.
     fn climb(
         &mut self,
         places: [&Look<M>; 3],
@@ -168,25 +168,25 @@ impl<const M: usize> Looker<'_, '_, M> {
         }
     }
 
-    /// Looks at a place; none where the path has no direction.
+    /// Evaluates the place u; None where the path has no direction.
     fn look(&mut self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
         let station = self.columns.station(self.piece, u)?;
         Some(self.look_at(&station, tally))
     }
 
-    /// The same at an end of the phase.
+    /// Evaluates an end of the phase; None where the path has no direction.
     pub fn look_at_end(&mut self, u: f64, tally: &mut Tally<M>) -> Option<Look<M>> {
         let station = self.columns.station_at_end(self.piece, u)?;
         Some(self.look_at(&station, tally))
     }
 
-    /// Offers what a place shows.
+    /// Evaluates a station and offers its uses of the limits to the tally.
     pub fn look_at(&mut self, station: &Station<M>, tally: &mut Tally<M>) -> Look<M> {
         let (limits, line) = (self.limits, self.line);
         let place = self.motion.place(station.u);
         let pace = place.pace;
         let speed_rounding = self.motion.speed_rounding(pace, station.slope);
-        // Asked for where a limit is used more than before, which is seldom.
+        // Computed only if a use is greater than any found so far, which is seldom.
         let time = || self.start + self.motion.since(&place);
         let mut roundings: Option<Roundings<M>> = None;
         tally.samples += 1;
@@ -200,7 +200,7 @@ impl<const M: usize> Looker<'_, '_, M> {
             for k in 0..M {
                 are_passed &= used.rates[row][k].abs() <= known[k];
             }
-            // Most places use less of all limits than others that were found.
+            // Most places use less of all limits than was found before.
             if are_passed {
                 continue;
             }
@@ -221,7 +221,7 @@ impl<const M: usize> Looker<'_, '_, M> {
                 tally.offer_share(check, k, (certain, limit[k], ratio), line, time);
             }
         }
-        // A profile of rubbish may go back.
+        // In a wrong profile v may be negative.
         let speed = pace.v.abs();
         let tip = [speed, speed_rounding + ROUNDING * speed].map(|v| station.tip * v);
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
@@ -246,7 +246,7 @@ impl<const M: usize> Looker<'_, '_, M> {
         Look { place, station: *station, speed_rounding, used }
     }
 
-    /// What a bound says of the places between two beside what has been found so far.
+    /// What the bound tells of the places between two, compared with the greatest uses so far.
     fn bound(&self, from: &Look<M>, to: &Look<M>, tally: &Tally<M>) -> Between {
         let (limits, ends) = (self.limits, [&from.used, &to.used]);
         if !self.columns.are_axes() {
@@ -256,7 +256,8 @@ impl<const M: usize> Looker<'_, '_, M> {
             return Between::Unbounded;
         };
         let (mut is_certain, mut is_narrow) = (true, true);
-        // A use of a limit may be beyond both ends by so much, in parts of the limit, or off the straight line between them.
+        // `beyond`: by how much a use may be above those of both ends; `off`: how far off the straight line between them; in
+        // parts of the limit.
         let mut weigh = |worst: f64, known: f64, beyond: f64, off: f64| {
             is_certain &= beyond <= worst + PASS_EXCESS - known;
             is_narrow &= off <= WIDE;
@@ -275,7 +276,7 @@ impl<const M: usize> Looker<'_, '_, M> {
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
             let [near, far] = ends.map(|used| used.tip[feed]);
             let known = near.max(far);
-            // No share of the speed along the path is greater than that speed.
+            // The speed that a feed limits is at most that along the path.
             let [off, faster] = [bulge.rates[0] / limit, bulge.most_speed / limit - known];
             weigh(worst(Check::Feed), known, beyond([near, far], off).min(faster), off.min(faster));
         }
@@ -295,8 +296,9 @@ impl<const M: usize> Looker<'_, '_, M> {
     }
 }
 
-/// How far above both ends a function may be that is off the straight line between them by no more than `off`, less towards the
-/// ends: by 4 `off` x (1 − x) at the part x of the way. Where it changes by more than 4 `off` it is greatest at an end.
+/// By how much a function may be above its values at both ends, if it is off the straight line between them by at most
+/// 4·`off`·x·(1 − x) at the share x of the interval. If the two values differ by 4·`off` or more, the greater one is the
+/// maximum.
 #[inline(always)]
 fn beyond([near, far]: [f64; 2], off: f64) -> f64 {
     let steep = 4.0 * off - (far - near).abs();
@@ -319,8 +321,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
-        /// A thousandth at constant speed, a hundredth where the jerk along the path swings from one sign to the other. On up to a
-        /// fifth of a piece, at speeds up to a tenth apart: most phases of limited jerk have less of both.
+        /// The limit is a thousandth below the greatest use at constant speed, and a hundredth below it where the jerk along the
+        /// path changes its sign. The phases cover up to a fifth of a piece and change the speed by up to a tenth: most phases of
+        /// plans with limited jerk have less of both.
         #[test]
         fn a_limit_a_little_below_the_greatest_use_is_broken_wherever_that_is(
             bends in prop::array::uniform10(-1.0..1.0_f64),
