@@ -1,4 +1,6 @@
-//! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
+//! Checks each setpoint, and each step between two setpoints, against the plan: distance from the path and from the program,
+//! recorded velocity and acceleration against the profile, speed of the step against the feed, chord error, and corners of the
+//! path.
 
 mod at_once;
 
@@ -17,10 +19,11 @@ use super::tracking::{is_step, Plan};
 use super::vectors::{distance, from_to, length, vector_of, Segment};
 use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
-/// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
+/// A recorded velocity may differ from the profile's by this share of the velocity change that the acceleration limit allows in a
+/// period.
 pub const VELOCITY_SHARE: f64 = 1e-3;
 
-/// Looks at setpoints one after the other, with what belongs to their place at hand.
+/// Checks setpoints one after the other; keeps the pieces and moves near the last place.
 pub struct Comparison<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
@@ -38,7 +41,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         Self { plan, limits, columns, near: Neighbours::default(), piece: None, tool: Tool::default() }
     }
 
-    /// Which rows change nothing but by their distance from the program; see `at_once`.
+    /// Which rows need no further check except that of their distance from the program; see `at_once`.
     pub fn settled(&mut self, rows: &[Row<M>], unsure: &[f64; COUNT], tally: &Tally<M>) -> [bool; COUNT] {
         let Self { plan, limits, columns, tool: Tool { tip, feed }, .. } = self;
         let has_tool = !columns.are_axes();
@@ -54,7 +57,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         at_once::settled((plan, has_tool.then_some(&self.tool)), limits, rows, unsure, tally)
     }
 
-    /// What one setpoint shows: its distance from the path, and what it records.
+    /// Checks one setpoint: its distance from the path, its delay along the path, and its recorded velocity and acceleration.
     pub fn nearest(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
         let (nearest, time, line) = (&row.nearest, row.t, row.line);
         tally.offer(Check::Place, 0, nearest.off, PLACE_TOLERANCE, time, line);
@@ -64,13 +67,13 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
     }
 
-    /// The distance of one setpoint from the program.
+    /// Checks the distance of one setpoint from the program.
     pub fn deviation(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
         let Some(program) = &self.plan.program else { return };
         let (path, nearest, known) = (&self.plan.path, &row.nearest, self.plan.deviation);
         let piece = nearest.place.piece;
         let limit = path.tolerance[piece] + PLACE_TOLERANCE;
-        // A setpoint is no farther from the program than its place is, and it from that.
+        // Triangle inequality: the distance of the setpoint from its place on the path plus that of the place from the program.
         let most = known * allowed(path, piece) + nearest.off.max(0.0);
         if nearest.is_good() && most <= known * limit {
             return;
@@ -83,7 +86,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         tally.offer(Check::Deviation, 0, away - rounding, limit, row.t, row.line);
     }
 
-    /// Recorded velocity and acceleration against the profile's.
+    /// Checks the recorded velocity and acceleration against those of the profile.
     fn recorded(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
         let (limits, nearest) = (self.limits, &row.nearest);
         if self.plan.profile.is_none() {
@@ -98,7 +101,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 let off = (recorded[k] - velocity.value[k]).abs();
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
-                // Over a way of `away`, to a turn and back from it, no velocity changes by more than the root of this.
+                // Over a distance of `away`, even with a reversal in it, the velocity of an axis changes by at most the square
+                // root of this.
                 let unknown_sq = 4.0 * limits.acceleration.greatest(k) * away;
                 if off * off <= unknown_sq {
                     tally.offer(Check::RecordedVelocity, k, 0.0, limit, row.t, row.line);
@@ -123,7 +127,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
     }
 
-    /// What the step between two setpoints shows: its speed, and the path between them; `earlier` is the setpoint before both.
+    /// Checks the step between two setpoints: its speed, and the distance of the path from the chord. `earlier` is the setpoint
+    /// before both.
     pub fn step(
         &mut self,
         earlier: Option<&Row<M>>,
@@ -141,7 +146,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let columns = &mut self.columns;
         let tips = [before, row].map(|row| columns.tip(row.nearest.place.piece, row.nearest.place.u, &row.q));
         let (mut ways, mut least_times, mut error_sq) = ([0.0; FEEDS], [0.0; FEEDS], 0.0_f64);
-        // Where the tool of joints stands still from one run to the next, each side has a chord of its own.
+        // With joints, the tool stops between two runs: the path on each side of the stop is compared with a chord of its own.
         let are_axes = columns.are_axes();
         let stops = |piece: usize| !are_axes && path.runs.binary_search(&(piece as i64)).is_ok();
         let known = tally.get(Check::Feed, 0).ratio;
@@ -169,7 +174,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 }
             }
             for (feed, limit) in feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
-                // Most steps are on one piece, and no faster than what was found: their squares tell.
+                // Most steps are on one piece and not faster than the worst so far: comparing squares shows that without a root.
                 let most = known * limit * step + 2.0 * rounding;
                 if are_axes && is_first && is_last && known >= 0.0 {
                     let way = limits.counted(feed, &from_to(&last, &next));
@@ -183,7 +188,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
             }
         }
         for (way, least_time) in ways.into_iter().zip(least_times) {
-            // Most steps change nothing, and products are had sooner than quotients.
+            // Most steps do not raise the worst, which products show faster than quotients.
             let certain = way - 2.0 * rounding;
             let known = tally.get(Check::Feed, 0).ratio;
             let is_passed = known >= 0.0 && certain * least_time <= known * way * step;
@@ -205,8 +210,9 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
     }
 
-    /// Whether the path between two setpoints that are on one piece or on neighbours is no farther from the chord than was found: on
-    /// each piece it is no farther from its own chord than the sagitta, and that no farther than where both pieces meet.
+    /// Whether the path between two setpoints, on one piece or on two consecutive ones, is at most as far from the chord as the
+    /// worst so far. On one piece the bound is its sagitta, on two the greater sagitta plus the distance of their junction from
+    /// the chord.
     fn is_flat(&self, [before, row]: [&Row<M>; 2], tips: &[[f64; M]; 2], tally: &Tally<M>) -> bool {
         let (path, (from, to)) = (&self.plan.path, (before.nearest.place, row.nearest.place));
         let most = match to.piece.checked_sub(from.piece) {
@@ -221,8 +227,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
         tally.is_passed(Check::Chord, 0, most, self.limits.chord_tolerance)
     }
 
-    /// The part by which the chord error of the tool of joints may exceed the tolerance where it gains speed: the speed limit of the
-    /// circle is one at constant speed, and the error is greater on the faster side.
+    /// The part of the chord tolerance by which the chord error of the tool of joints may exceed it where the speed changes: the
+    /// speed limit by the osculating circle assumes constant speed, and the error is greater on the faster side.
     fn chord_beyond_steady(&mut self, earlier: Option<&Row<M>>, before: &Row<M>, tips: [[f64; M]; 2]) -> f64 {
         let axes = self.columns.chord_axes(before.nearest.place.piece);
         let counted = |a: &[f64; M], b: &[f64; M]| length::<M>(&vector_of(|k| axes[k] * (b[k] - a[k])));
@@ -239,11 +245,11 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
     }
 
-    /// What the chord error may exceed the tolerance by where the speed limit of the osculating circle holds.
+    /// The allowed excess of the chord error over the tolerance, in mm, where the speed is limited by the osculating circle.
     ///
-    /// That limit keeps the acceleration across the path at 8 δ/T², and so the distance from the chord, T²/8 times
-    /// the greatest acceleration across the chord, at δ. Where the path turns against the chord by θ, the
-    /// acceleration along the path adds T²/8 · a sin θ; all of it where the path runs back.
+    /// That limit keeps the acceleration across the path at 8 δ/T², so the distance from the chord, T²/8 times the greatest
+    /// acceleration across the chord, stays below δ. Where the path is at an angle θ to the chord, the acceleration a along the
+    /// path adds T²/8 · a sin θ, and T²/8 · a where the path runs backwards.
     fn chord_beyond_circle(&mut self, before: &Row<M>, row: &Row<M>, step: f64) -> f64 {
         let limits = self.limits;
         let (from, to) = (before.nearest.place, row.nearest.place);
@@ -266,7 +272,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
         0.125 * step * step * most
     }
 
-    /// Corners of the path in two steps, those included that the places at their ends cannot be told from.
+    /// Number of corners of the path within two steps, including those within `PLACE_TOLERANCE` of their ends; 0 where one of the
+    /// steps is no time step.
     pub fn corners(&mut self, rows: [&Row<M>; 3]) -> f64 {
         let period = self.limits.period;
         if rows.windows(2).any(|pair| !is_step(pair[0].t, pair[1].t, period)) {
@@ -285,7 +292,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         corners
     }
 
-    /// The pieces that begin between two rows, those included that the places there cannot be told from.
+    /// The pieces that begin between two rows, including those that begin within `PLACE_TOLERANCE` of them.
     fn begun(&self, [first, last]: [&Row<M>; 2]) -> std::ops::RangeInclusive<usize> {
         let path = &self.plan.path;
         let (from, to) = (first.nearest.place, last.nearest.place);

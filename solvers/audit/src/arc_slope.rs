@@ -1,9 +1,9 @@
-//! Where a point is nearest to an arc or helix: the zeros of the slope of its squared distance along the arc, each in an interval
-//! in which a rate of that slope only rises or only falls.
+//! Finds the places of an arc or helix nearest to a point: the zeros of the slope of the squared distance along the arc. Each
+//! zero is bracketed by an interval on which the slope is monotone, found from the zeros of its first and second rates.
 
 use std::f64::consts::{PI, TAU};
 
-/// What makes a move an arc: it turns in the plane of the axes `a` and `b`, all others move evenly.
+/// The geometry of an arc or helix: it turns in the plane of the axes `a` and `b`; all other axes move linearly.
 #[derive(Clone, Copy, Debug)]
 pub struct Arc {
     pub a: usize,
@@ -11,29 +11,31 @@ pub struct Arc {
     pub centre: [f64; 2],
     pub start_angle: f64,
     pub sweep: f64,
-    /// Radius at the start and its change to the end: programs round their numbers.
+    /// Radius at the start, and its change up to the end: the ends are rounded numbers of the program.
     pub radius: f64,
     pub widening: f64,
 }
 
-/// A Newton step of so many radians is the last one: its error is about the square of that.
+/// A Newton step below this angle, in rad, is the last one: the error after it is about its square.
 const CLOSE: f64 = 1e-8;
 
-/// Steps towards a root; halving alone needs some 55.
+/// Limit of the steps towards a root; bisection alone needs some 55.
 const MOST_STEPS: usize = 100;
 
-/// (P(t) − q)·P'(t) on an arc or helix P: where it turns from negative to positive the distance has a local minimum.
+/// The slope (P(t) − q)·P'(t) on an arc or helix P, t in [0, 1]: the distance has a local minimum where the slope changes from
+/// negative to positive.
 pub struct ArcSlope {
     arc: Arc,
-    /// From the centre to `q` in the plane, and the angle from there to the start, counted along the arc.
+    /// Vector from the centre to `q` in the plane, and the angle from it to the start point, counted along the arc.
     arm: [f64; 2],
     behind: f64,
-    /// Off the plane: the square of the way, and its product with the way from the start to `q`.
+    /// In the axes off the plane: the squared displacement of the arc, and its inner product with the vector from its start to
+    /// `q`.
     rise_sq: f64,
     risen: f64,
 }
 
-/// The slope and its rates at `t`.
+/// The slope and its first three rates at `t`.
 #[derive(Clone, Copy)]
 pub struct Rates {
     pub t: f64,
@@ -41,7 +43,7 @@ pub struct Rates {
 }
 
 impl ArcSlope {
-    /// Of a move from one point to another.
+    /// For an arc from `start` to `end` and the point `q`.
     pub fn new<const M: usize>([start, end]: [&[f64; M]; 2], arc: &Arc, q: &[f64; M]) -> Self {
         let arm = [q[arc.a] - arc.centre[0], q[arc.b] - arc.centre[1]];
         let behind = (arc.start_angle - arm[1].atan2(arm[0])) * arc.sweep.signum();
@@ -54,7 +56,7 @@ impl ArcSlope {
         Self { arc: *arc, arm, behind, rise_sq, risen }
     }
 
-    /// The place at the angle of `q` that is the nearest to its height.
+    /// The t at the angle of `q`, on the turn whose height is nearest to that of `q`.
     pub fn beside(&self) -> f64 {
         let level = if self.rise_sq > 0.0 { self.risen / self.rise_sq } else { 0.0 };
         let sweep = self.arc.sweep.abs();
@@ -62,7 +64,7 @@ impl ArcSlope {
         ((turn * TAU - self.behind) / sweep).clamp(0.0, 1.0)
     }
 
-    /// At least how far the places between two are from `q`: by their height alone.
+    /// Lower bound of the distance of `q` from the arc between two t, from the axes off the plane alone.
     pub fn off_height(&self, from: f64, to: f64) -> f64 {
         let outside = (from * self.rise_sq - self.risen).max(self.risen - to * self.rise_sq);
         if outside > 0.0 {
@@ -72,10 +74,10 @@ impl ArcSlope {
         }
     }
 
-    /// Calls `each` with the ends of the parts of the arc between angles square to that of `q`.
+    /// Cuts the arc at the angles square to that of `q`, and calls `each` with the ends of every part.
     ///
-    /// The second rate is 0 where the tangent of the angle from `q` is 3 widening / (sweep radius). That falls along the
-    /// arc, or is 0 all along, and the tangent rises, so it happens once in each part.
+    /// The second rate is 0 where tan φ = 3 widening / (|sweep| radius), φ the angle from `q` counted along the arc. In each part
+    /// tan φ rises from −∞ to ∞, and the right side falls or stays 0, so the second rate has at most one zero there.
     pub fn each_half_turn(&self, mut each: impl FnMut(&Rates, &Rates)) {
         let mut half_turn = (self.behind / PI - 0.5).floor() + 0.5;
         let mut from = self.at(0.0);
@@ -102,8 +104,8 @@ impl ArcSlope {
         Rates { t, rates: [slope, first, second, third] }
     }
 
-    /// Where rate `K`, which only rises or only falls between two places, is 0: by Newton's method, halved where it strays.
-    /// The second place where the rate does not change its sign.
+    /// The zero of rate `K`, which is monotone between two places: Newton's method, with bisection where a step leaves the
+    /// bracket. Returns `to` where the rate does not change its sign.
     pub fn root<const K: usize>(&self, from: &Rates, to: &Rates) -> Rates {
         let falls = from.rates[K] > 0.0;
         if from.rates[K] * to.rates[K] >= 0.0 {

@@ -1,18 +1,19 @@
-//! Places of a path or of programmed splines that are close enough to points, one point after the other.
+//! Finds places of a path or of programmed splines that are close enough to given points, one point after the other.
 //!
-//! By Newton's method from the place of the point before, on its piece or from piece to piece. The distance of a point from any
-//! place of the path is at least its distance from the path: where it is small enough, the nearest place need not be searched.
+//! Uses Newton's method from the place of the point before, on its piece or across pieces. The distance of a point from any place
+//! of the path is an upper bound of its distance from the path: where it is small enough, no search for the nearest place is
+//! needed.
 
 use super::curve::{Curves, Pieces};
 use super::nearest::{step_towards, Place};
 use super::vectors::{from_to, length};
 
-/// Steps towards the nearest place; points come mostly in the order of the path, so that two are usual.
+/// Limit of the Newton steps; points mostly come in the order of the path and need two.
 const MOST_STEPS: usize = 8;
 
 pub struct ClosePlaces<'a, const M: usize> {
     pub curves: Curves<'a, M>,
-    /// Of the point before.
+    /// The place of the point before.
     place: Place,
 }
 
@@ -36,8 +37,9 @@ impl<'a, const M: usize> ClosePlaces<'a, M> {
         (least..=most).contains(&self.place.piece)
     }
 
-    /// A place on the pieces from `least` to `most` that is close to `q`, and the distance: the first within the smaller of the
-    /// distances that count as close on that piece, or else the nearest of a few steps if that is within the greater one.
+    /// A place on the pieces from `least` to `most` that is close to `q`, and its distance in mm. `close` gives two distances for
+    /// a piece: the first place within the smaller one ends the search; else the nearest place of a few steps is returned if it
+    /// is within the greater one, and None if it is not.
     pub fn find(
         &mut self,
         q: &[f64; M],
@@ -58,7 +60,7 @@ impl<'a, const M: usize> ClosePlaces<'a, M> {
             }
             let mut next = place.moved(step_towards(&away, &slope), self.curves.pieces.width, [least, most]);
             if next.piece != place.piece {
-                // From one piece to another and back: where they meet is the nearest place.
+                // The steps go from one piece to the other and back: their junction is the nearest place.
                 if came_from == Some(next.piece) {
                     let u =
                         if next.piece < place.piece { 0.0 } else { self.curves.pieces.width[place.piece] };

@@ -1,6 +1,6 @@
-//! The followed geometry as the audit sees it: pieces by their control polygons.
+//! The followed path: pieces by their control polygons, their positions and derivatives at a parameter u in mm.
 //!
-//! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
+//! The kernels take `M` axes; where the machine has fewer, the last ones rest at 0 and cannot break a limit.
 
 use std::rc::Rc;
 
@@ -14,36 +14,37 @@ use super::FEEDS;
 /// Pieces joined end to end; see `feedplan.curves.composite.CompositeCurve`.
 #[derive(Clone, Copy)]
 pub struct Pieces<'a> {
-    /// At most as many as the kernels take.
+    /// At most `M`.
     pub axes: usize,
-    /// Coordinates of each control point in `control`: those of the axes, then zeros.
+    /// Numbers per control point in `control`: the coordinates of the axes, then zeros.
     pub stride: usize,
     /// Control points in mm.
     pub control: &'a [f64],
-    /// Of every control point; empty where all pieces are polynomial.
+    /// One of each control point; empty where all pieces are polynomial.
     pub weights: &'a [f64],
-    /// Of the pieces in the control points, one more than pieces; they grow by 2 to 10.
+    /// First control point of each piece, and the number of control points; a piece has 2 to 10.
     pub offsets: &'a [usize],
-    /// Parameter intervals, in mm.
+    /// Lengths of the parameter intervals, in mm.
     pub width: &'a [f64],
 }
 
-/// The path's arrays, one entry a piece; see `feedplan.Path`.
+/// The arrays of the path, one entry for each piece; see `feedplan.Path`.
 #[derive(Clone, Copy)]
 pub struct Followed<'a> {
     pub pieces: Pieces<'a>,
-    /// The greatest of each speed that a feed is about, in mm/s and degrees/s, `FEEDS` numbers a piece; infinite where
-    /// it is not limited.
+    /// The greatest speed of each kind of feed, in mm/s and degrees/s, `FEEDS` numbers for each piece; infinite where it is not
+    /// limited.
     pub feed: &'a [f64],
     /// Source line.
     pub line: &'a [i32],
-    /// First and last program move that the piece follows, two numbers a piece.
+    /// First and last program move that the piece follows, two numbers for each piece.
     pub moves: &'a [i64],
     /// Allowed distance from the programmed path, in mm.
     pub tolerance: &'a [f64],
-    /// Piece offsets of the runs.
+    /// First piece of each run, and the number of pieces.
     pub runs: &'a [i64],
-    /// Of each run: whether its axes mean something else than those of the run before, so that it begins elsewhere.
+    /// For each run: whether its axes have another meaning than in the run before, so that its first piece may start at another
+    /// point.
     pub new_words: &'a [bool],
     /// Pause before the first run, in s.
     pub start_dwell: f64,
@@ -88,7 +89,7 @@ impl Followed<'_> {
         self.line.get(i).copied().unwrap_or(0)
     }
 
-    /// Whether piece `i` begins a run whose axes mean something else than before.
+    /// Whether piece `i` begins a run whose axes have another meaning than in the run before.
     pub fn begins_elsewhere(&self, i: usize) -> bool {
         self.runs.binary_search(&(i as i64)).is_ok_and(|run| self.new_words.get(run) == Some(&true))
     }
@@ -105,7 +106,7 @@ impl Pieces<'_> {
         self.width.is_empty()
     }
 
-    /// Where the control points of piece `i` are in the table.
+    /// The rows of piece `i` in the table of control points.
     #[inline]
     pub fn rows(&self, i: usize) -> std::ops::Range<usize> {
         self.offsets[i]..self.offsets[i + 1]
@@ -127,14 +128,14 @@ impl Pieces<'_> {
         self.point(self.rows(i).end - 1)
     }
 
-    /// Whether piece `i` goes nowhere.
+    /// Whether all control points of piece `i` are the same.
     pub fn is_motionless(&self, i: usize) -> bool {
         let rows = self.rows(i);
         let row = |row: usize| &self.control[row * self.stride..(row + 1) * self.stride];
         rows.clone().all(|other| row(other) == row(rows.start))
     }
 
-    /// Piece `i` by its polygon.
+    /// The control polygon of piece `i`.
     #[inline]
     fn polygon<const M: usize>(&self, i: usize) -> Polygon<M> {
         let rows = self.rows(i);
@@ -147,7 +148,7 @@ impl Pieces<'_> {
         Curve::new(self.polygon(i), self.width[i])
     }
 
-    /// At least how far `q` is from piece `i`: from the box around its control points.
+    /// Lower bound of the distance of `q` from piece `i`, in mm: its distance from the bounding box of the control points.
     pub fn distance_at_least<const M: usize>(&self, i: usize, q: &[f64; M]) -> f64 {
         let (mut least, mut most) = ([f64::INFINITY; M], [f64::NEG_INFINITY; M]);
         for row in self.rows(i) {
@@ -160,10 +161,10 @@ impl Pieces<'_> {
     }
 }
 
-/// So many consecutive pieces are kept.
+/// Number of consecutive pieces that are kept.
 pub const KEPT: usize = 8;
 
-/// Pieces made ready one after the other: the last ones are kept, with their numbers.
+/// A cache of the last few pieces, prepared for evaluation.
 pub struct Curves<'a, const M: usize> {
     pub pieces: Pieces<'a>,
     kept: [(usize, Rc<Curve<M>>); KEPT],
@@ -178,14 +179,14 @@ impl<'a, const M: usize> Curves<'a, M> {
         let (number, curve) = &mut self.kept[i % KEPT];
         if *number != i {
             *number = i;
-            // In the memory of another piece, unless somebody still has that.
+            // Reuses the memory of the replaced piece, unless somebody still holds it.
             Rc::make_mut(curve).set(self.pieces.polygon(i), self.pieces.width[i]);
         }
         curve
     }
 }
 
-/// On so short a part of a piece, as a share of it, the trapezoid rule is as good as the slopes are known.
+/// On a part shorter than this share of the piece, the trapezoid rule is as accurate as the slopes.
 const SHORT: f64 = 1e-8;
 
 /// A piece, over u in [0, width].
@@ -195,7 +196,7 @@ pub struct Curve<const M: usize> {
     hodographs: Hodographs<M>,
     width: f64,
     per_width: f64,
-    /// What the rounding of the first three derivatives is relative to, and its length.
+    /// The magnitudes that the rounding errors of the first three derivatives are relative to, for each axis; and their lengths.
     sizes: [[f64; M]; 3],
     size_lengths: [f64; 3],
 }
@@ -220,7 +221,7 @@ impl<const M: usize> Curve<M> {
         curve
     }
 
-    /// Becomes another piece.
+    /// Replaces the piece by another one.
     fn set(&mut self, polygon: Polygon<M>, width: f64) {
         (self.polygon, self.width, self.per_width) = (polygon, width, 1.0 / width);
         self.hodographs.set(&self.polygon);
@@ -234,7 +235,7 @@ impl<const M: usize> Curve<M> {
         self.width
     }
 
-    /// u as parts of the width from both ends.
+    /// u from the start and from the end, both as parts of the width.
     #[inline(always)]
     fn parts<T: Number>(&self, u: T) -> (T, T) {
         (u * self.per_width, (u.filled(self.width) - u) * self.per_width)
@@ -252,12 +253,12 @@ impl<const M: usize> Curve<M> {
         self.polygon.part(from * self.per_width, (to - from) * self.per_width)
     }
 
-    /// The length between two parameters, or somewhat more: that of the control polygon of this part.
+    /// Upper bound of the length between two parameters, in mm: the length of the control polygon of this part.
     pub fn way_at_most(&self, from: f64, to: f64) -> f64 {
         self.part(from, to).way()
     }
 
-    /// From one place to another, where the first derivatives are known; short ways lose no digits.
+    /// The displacement from one parameter to another, where C' at both is known; accurate to all digits also for short parts.
     pub fn way(&self, [from, to]: [f64; 2], slopes: [&[f64; M]; 2]) -> [f64; M] {
         if self.has_linear_slope() || (to - from).abs() <= SHORT * self.width {
             return vector_of(|k| 0.5 * (to - from) * (slopes[0][k] + slopes[1][k]));
@@ -274,7 +275,7 @@ impl<const M: usize> Curve<M> {
         vector_of(|k| slope[k] * self.per_width)
     }
 
-    /// The length of C', each axis times its scale, at several u.
+    /// |C'| at several u, with each axis multiplied by its scale.
     #[inline]
     pub fn speeds<const K: usize>(&self, u: [f64; K], scale: &[f64; M]) -> [f64; K] {
         let (mut t, mut rest) = ([0.0; K], [0.0; K]);
@@ -334,7 +335,7 @@ impl<const M: usize> Curve<M> {
         [point, scaled(slope, self.per_width)]
     }
 
-    /// The length of C' on a piece without weights, at one u or at several; each axis times its scale, if there is one.
+    /// |C'| on a piece without weights, at one u or at several, with each axis multiplied by its scale if there is one.
     #[inline(always)]
     pub fn polynomial_speed<T: Number>(&self, u: T, scale: Option<&[f64; M]>) -> T {
         let (t, rest) = self.parts(u);
@@ -347,19 +348,19 @@ impl<const M: usize> Curve<M> {
         inner(&slope, &slope).root()
     }
 
-    /// What the rounding of the first three derivatives is relative to.
+    /// For each axis the magnitudes that the rounding errors of the first three derivatives are relative to.
     #[inline]
     pub fn derivative_sizes(&self) -> &[[f64; M]; 3] {
         &self.sizes
     }
 
-    /// The lengths of these.
+    /// The lengths of the vectors of `derivative_sizes`.
     #[inline]
     pub fn size_lengths(&self) -> [f64; 3] {
         self.size_lengths
     }
 
-    /// The greatest lengths of the second to the fifth derivative; infinite on pieces with weights.
+    /// Upper bounds of the lengths of the second to the fifth derivative; infinite on pieces with weights.
     pub fn bounds(&self) -> [f64; 4] {
         let mut scale = self.per_width;
         self.hodographs.bounds().map(|bound| {
@@ -368,18 +369,18 @@ impl<const M: usize> Curve<M> {
         })
     }
 
-    /// No part of the piece that is as long as a step of u is farther from its chord than this.
+    /// Upper bound of the distance of any part of the piece of parameter length `step` from its chord, in mm.
     pub fn sagitta(&self, step: f64) -> f64 {
         sagitta(self.bounds()[0], step)
     }
 
-    /// For each axis what the rounding of C' is relative to.
+    /// For each axis the magnitude that the rounding error of C' is relative to.
     #[inline]
     pub fn derivative_size(&self) -> [f64; M] {
         self.sizes[0]
     }
 
-    /// How much the rounding of the control points turns C' against that of a neighbour, per 1 mm/mm.
+    /// Factor from a rounding error of the control points, in mm, to the error of C' that it causes; in 1/mm.
     pub fn derivative_scale(&self) -> f64 {
         self.polygon.slope_scale() * self.per_width
     }
@@ -390,7 +391,7 @@ impl<const M: usize> Curve<M> {
         curvature(&tangent, &bend)
     }
 
-    /// Greatest coordinate: what rounding is relative to.
+    /// Greatest coordinate, in mm: rounding errors of positions are relative to it.
     #[inline]
     pub fn magnitude(&self) -> f64 {
         self.polygon.magnitude()
@@ -401,7 +402,7 @@ impl<const M: usize> Curve<M> {
         self.polygon.degree() <= 2 && !self.polygon.is_rational()
     }
 
-    /// How much shape the piece can have: 1 where C' is linear in u, more for each degree.
+    /// Factor of the number of places that show the shape of the piece: 1 where C' is linear in u, else the degree.
     pub fn turns(&self) -> usize {
         if self.has_linear_slope() {
             1
@@ -416,14 +417,13 @@ impl<const M: usize> Curve<M> {
     }
 }
 
-/// No part of a curve that is as long as a step of u is farther from its chord than this, where its second derivative is at most
-/// `bend`.
+/// Upper bound of the distance of a part of parameter length `step` from its chord, in mm, where |C''| is at most `bend`.
 #[inline(always)]
 pub fn sagitta(bend: f64, step: f64) -> f64 {
     0.125 * bend * step * step
 }
 
-/// Derivatives by t to those by u.
+/// Converts derivatives by t = u/width to derivatives by u.
 #[inline(always)]
 fn by_width<const M: usize, T: Number>([first, second, third]: [[T; M]; 3], per_width: f64) -> [[T; M]; 3] {
     let per_width_sq = per_width * per_width;

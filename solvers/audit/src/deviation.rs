@@ -1,9 +1,10 @@
-//! How far the followed path is from the programmed one, both ways, and whether it holds together.
+//! Measures how far the followed path and the programmed path are from each other, and whether the followed path is connected and
+//! within the travel of the axes.
 //!
-//! From the program: ends and inner places of every move against the pieces that follow it, one piece more on each
-//! side. From the path: places of every piece against the moves it says it follows, one move more on each side; but
-//! where the ends of a straight move tell that path and move are close enough all along it. Distances are those from true
-//! segments, circles, helices and parabolas. Where a piece comes near its tolerance it is looked at again, closer.
+//! From the program: ends and inner places of every move against the pieces that follow it and one more piece on each side. From
+//! the path: places of every piece against the moves that it follows and one more move on each side. Pieces along a straight move
+//! are skipped where the distances of its ends bound those between. Distances are exact: from segments, circles, helices and
+//! splines. Where a piece comes near its tolerance, it is sampled again at a finer spacing.
 
 use std::cmp::Ordering::Equal;
 use std::sync::{Mutex, PoisonError};
@@ -18,24 +19,24 @@ use super::phases::Phases;
 use super::vectors::distance;
 use super::{tell, Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
-/// Even places of a piece of degree 2, and as many again between two of them where it comes near its tolerance.
-/// Others have more: each degree is another turn.
+/// Intervals between the equally spaced places of a piece of degree 2, and subdivisions of an interval where the piece comes near
+/// its tolerance. Pieces of higher degree get more places, in proportion to the degree.
 const PLACES: usize = 8;
 
-/// Share of the tolerance from which a piece is looked at more closely: eight places of a parabola miss at most
+/// From this share of the tolerance on, a piece is sampled again at a finer spacing: eight intervals on a parabola miss at most
 /// 1.6 % of its greatest distance from a line.
 const NEAR: f64 = 0.95;
 
-/// Up to this share of the tolerance the distance from the nearest place of a few steps counts: it is never too small.
+/// Up to this share of the tolerance, the distance from the nearest place of a few Newton steps is used: it is an upper bound.
 const FAR_BELOW: f64 = 0.5;
 
-/// Where no more pieces follow a move they are all measured; of more, those whose boxes come near enough.
+/// If at most this many pieces follow a move, all are measured; of more, only those whose bounding boxes are near enough.
 const FEW: usize = 8;
 
-/// Pieces or moves a thread takes at a time.
+/// Pieces or moves that a thread takes at a time.
 const BLOCK: usize = 2048;
 
-/// The path on its own: finite numbers, piece on piece, within the travel of the axes.
+/// Audits the path on its own: finite numbers, no gaps between pieces, positions within the travel of the axes.
 pub(crate) fn audit_path<const M: usize>(
     path: &Followed,
     phases: Option<&Phases>,
@@ -70,7 +71,8 @@ pub(crate) fn audit_path<const M: usize>(
                 for q in [path.start::<M>(i)[k], path.end::<M>(i)[k]] {
                     offer_travel(tally, limits, k, q, time, line);
                 }
-                // The control points enclose the piece: where they are fine it is.
+                // The control points enclose the piece: its extremes are needed only if a control point exceeds the worst share
+                // so far.
                 let reach = control.iter().skip(k).step_by(path.stride);
                 let worst = tally.get(Check::Travel, k).ratio;
                 if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
@@ -84,7 +86,7 @@ pub(crate) fn audit_path<const M: usize>(
     })
 }
 
-/// The share of half the travel that a position is away from the middle.
+/// Distance of a position from the middle of the travel, as a share of half the travel.
 fn travel_share<const M: usize>(limits: &Limits<M>, axis: usize, q: f64) -> f64 {
     let [least, most] = limits.travel[axis];
     let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
@@ -97,7 +99,7 @@ fn travel_share<const M: usize>(limits: &Limits<M>, axis: usize, q: f64) -> f64 
     }
 }
 
-/// One position of an axis against its travel; the ratio is its share of half the travel, from the middle.
+/// Checks one position of an axis against its travel; the ratio is its distance from the middle as a share of half the travel.
 pub fn offer_travel<const M: usize>(
     tally: &mut Tally<M>,
     limits: &Limits<M>,
@@ -107,7 +109,7 @@ pub fn offer_travel<const M: usize>(
     line: i32,
 ) {
     let [least, most] = limits.travel[axis];
-    // Most positions change nothing, and a product is had sooner than a share.
+    // Most positions do not raise the worst, which a product shows faster than a quotient.
     let (middle, half, known) =
         (0.5 * (least + most), 0.5 * (most - least), tally.get(Check::Travel, axis).ratio);
     let is_passed = (q - middle).abs() < known * half || (half == f64::INFINITY && q >= least && q <= most);
@@ -119,7 +121,7 @@ pub fn offer_travel<const M: usize>(
     tally.offer_ratio(Check::Travel, axis, Worst { value: q, limit: bound, ratio, time, line });
 }
 
-/// The path against the program.
+/// Audits the distance between path and program.
 pub(crate) fn audit_deviation<const M: usize>(
     path: &Followed,
     program: &Programmed,
@@ -177,7 +179,7 @@ pub(crate) fn audit_deviation<const M: usize>(
     from_path.merge(from_program).merge(ends)
 }
 
-/// The moves that a piece may be compared with: those it follows, then one more on each side.
+/// The moves that a piece is compared with: those it follows, then one more on each side.
 pub fn window(path: &Followed, piece: usize, moves: usize) -> impl Iterator<Item = usize> {
     let [first, last] = [path.moves[2 * piece], path.moves[2 * piece + 1]];
     let first = first.clamp(0, moves as i64) as usize;
@@ -185,24 +187,25 @@ pub fn window(path: &Followed, piece: usize, moves: usize) -> impl Iterator<Item
     (first..last).chain(first.checked_sub(1)).chain(Some(last).filter(|&m| m < moves))
 }
 
-/// Whether a move is one of them.
+/// Whether the piece follows move `number` or one next to it.
 fn follows(path: &Followed, piece: usize, number: usize) -> bool {
     let [first, last] = [path.moves[2 * piece], path.moves[2 * piece + 1]];
     (first.saturating_sub(1)..=last.saturating_add(1)).contains(&(number as i64))
 }
 
-/// What a place may be off its nearest neighbour without changing the tally: no more than its worst so far. The first neighbour
-/// within it settles the place.
+/// The greatest share of the tolerance found so far. A place within this share of its tolerance cannot change the tally, so the
+/// first move or piece found within it ends the search for that place.
 pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
     tally.get(Check::Deviation, 0).ratio.max(0.0)
 }
 
-/// How far a piece may be from the program, in mm.
+/// Allowed distance of a piece from the program, in mm.
 pub fn allowed(path: &Followed, piece: usize) -> f64 {
     path.tolerance[piece].max(GAP_TOLERANCE)
 }
 
-/// Distances that count as close where so much is allowed: for the first place, and for the nearest of a few steps.
+/// The two distances that end a search (see `ClosePlaces::find`), in mm, where the distance `allowed` is allowed: for the first
+/// place found, and for the nearest place of a few steps.
 pub fn enough(settled: f64, allowed: f64, rounding: f64) -> [f64; 2] {
     [settled, settled.max(FAR_BELOW)].map(|share| share * allowed + rounding)
 }
@@ -231,14 +234,14 @@ fn piece_to_moves<'a, const M: usize>(
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
     let mut look = |i: usize, near: &mut Neighbours<M>, tally: &mut Tally<M>| {
         let t = i as f64 / places as f64;
-        // Where it comes near its tolerance the piece is looked at again.
+        // The search for the nearest move does not end above `NEAR` of the tolerance, from which the piece is sampled again.
         let found = off(t, NEAR * tolerance, near, tally);
         if found.0 > worst {
             (worst, worst_t) = (found.0, t);
         }
         found
     };
-    // Between two places neither the chords of piece and move are farther apart than those are, nor both from their chords than this.
+    // Between two places, piece and move are at most as far apart as at the farther of the two places, plus the sagittas of both.
     let sagitta = curve.sagitta(width / PLACES as f64);
     let mut before = look(0, near, tally);
     for i in (0..places).step_by(turns) {
@@ -259,7 +262,7 @@ fn piece_to_moves<'a, const M: usize>(
     }
 }
 
-/// The pieces near every move. A move that no piece names lies between those of the moves around it.
+/// First and last piece that follow each move. A move that no piece names lies between the pieces of the moves around it.
 fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
     let mut named: Vec<Option<Followers>> = vec![None; moves];
     for (piece, pair) in path.moves.chunks_exact(2).enumerate() {
@@ -287,18 +290,18 @@ fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
 /// A part of the path, from one place to another.
 type Part = [Place; 2];
 
-/// Measures places of moves, one after the other, against the pieces that follow them.
+/// Measures moves, one after the other, against the pieces that follow them.
 struct Follow<'a, const M: usize> {
     path: &'a Followed<'a>,
     places: ClosePlaces<'a, M>,
-    /// The point measured last, the place that is near it, and its distance from there, less rounding.
+    /// The point measured last, the place found near it, and the distance between them less rounding, in mm.
     last: Option<([f64; M], Place, f64)>,
-    /// Parts of the path whose distance from the program changes nothing.
+    /// Parts of the path whose distance from the program cannot raise the worst.
     close: Vec<Part>,
 }
 
 impl<const M: usize> Follow<'_, M> {
-    /// A move that the pieces from `first` to `last` follow.
+    /// Measures a move that the pieces from `first` to `last` follow.
     fn measure(
         &mut self,
         (number, programmed, line): (usize, &Move<M>, i32),
@@ -335,9 +338,9 @@ impl<const M: usize> Follow<'_, M> {
         tally.samples += places as u64 + 1;
     }
 
-    /// Whether a straight move and the path between two places near its ends, whose distances from them are known, are no farther
-    /// from each other than this share of what is allowed, and the pieces say that they follow it or one next to it: on each piece the
-    /// chord is no farther from the move than its ends are, and the piece no farther from the chord than its sagitta.
+    /// Whether a straight move and the path between the places `from` and `to` near its ends are within the given share of the
+    /// allowed distance, and each piece there names this move or one next to it. On each piece the bound is the greater distance
+    /// of its two ends from the move plus its sagitta.
     fn is_close(
         &mut self,
         (number, programmed): (usize, &Move<M>),
@@ -358,7 +361,7 @@ impl<const M: usize> Follow<'_, M> {
             })
     }
 
-    /// A place that is near a point of a move.
+    /// A place near the point `q` of a move, and its distance less rounding, in mm; adds the distance to the tally.
     fn place(
         &mut self,
         q: [f64; M],
@@ -366,7 +369,7 @@ impl<const M: usize> Follow<'_, M> {
         (time, line, rounding): (f64, i32, f64),
         tally: &mut Tally<M>,
     ) -> (Place, f64) {
-        // Most moves begin where one has ended.
+        // Most moves begin at the end of the move before.
         let known =
             self.last.filter(|(point, place, _)| *point == q && (least..=most).contains(&place.piece));
         if let Some((_, place, away)) = known {
@@ -378,7 +381,7 @@ impl<const M: usize> Follow<'_, M> {
         let (place, away) = match self.places.find(&q, [least, most], close) {
             Some((place, distance)) => (place, distance - rounding),
             None => {
-                // The nearest piece counts, measured by its own tolerance.
+                // The piece with the least distance relative to its own tolerance counts.
                 let mut nearest = (f64::INFINITY, Place { piece: least, u: 0.0 }, f64::INFINITY);
                 for piece in outwards(expected.clamp(least, most), least, most) {
                     let tolerance = allowed(path, piece);
@@ -406,7 +409,7 @@ impl<const M: usize> Follow<'_, M> {
     }
 }
 
-/// When the tool enters each piece, and when it leaves the last one, in s.
+/// The times at which the tool enters each piece and leaves the last one, in s.
 fn entry_times(path: &Followed, phases: Option<&Phases>) -> Vec<f64> {
     let mut times = vec![0.0; path.len() + 1];
     let Some(phases) = phases else { return times };
@@ -433,7 +436,7 @@ mod tests {
     use crate::moves::Shape;
     use crate::FEEDS;
 
-    /// Two pieces of degree 2 along X, with numbers that may be none.
+    /// Two pieces of degree 2 along X, one of whose numbers may not be finite.
     fn numbers(x: f64, weights: &[f64], width: f64) -> f64 {
         let path = Followed {
             pieces: Pieces {
@@ -492,7 +495,7 @@ mod tests {
 
     #[test]
     fn pieces_along_straight_moves_that_they_follow_are_measured_by_the_ends_of_these_alone() {
-        // Twice 1 mm along X, 0.1 mm beside the program at the start, and then less.
+        // Two pieces of 1 mm along X, 0.1 mm beside the program at its start, then mostly 0.08 mm beside it.
         let samples = |middle: [f64; 2], bend: f64, follows: &[i64; 4]| {
             let [before, after] = middle;
             let control = [0.0, 0.08, 0.5, 0.08, 1.0, before, 1.0, after, 1.5, bend, 2.0, 0.08];
@@ -504,7 +507,7 @@ mod tests {
             audit_deviation::<2>(&path, &program, None, &|_| ()).samples
         };
         assert_eq!(samples([0.08; 2], 0.08, &[0, 0, 1, 1]), 4);
-        // What the ends do not show is measured: a bend, a gap, and a piece that is said to follow another move.
+        // The ends do not bound these cases: a bend, a gap, and a piece that is said to follow another move.
         assert!(samples([0.08; 2], 0.3, &[0, 0, 1, 1]) > 8);
         assert!(samples([0.08, 0.2], 0.08, &[0, 0, 1, 1]) > 8);
         assert!(samples([0.08; 2], 0.08, &[0, 0, 7, 7]) > 8);
@@ -512,7 +515,7 @@ mod tests {
 
     #[test]
     fn places_between_others_are_measured_where_a_bound_leaves_open_what_is_there() {
-        // Along a straight move, up to 0.276 beside it, which the control points are 0.8 beside.
+        // A path along a straight move, up to 0.276 mm beside it; its control points are up to 0.8 mm beside it.
         let pieces = Pieces {
             axes: 2,
             stride: 2,

@@ -1,7 +1,7 @@
-//! Differences of setpoints over their times, and what rounding may have added to them.
+//! Difference quotients of setpoints and their rounding error bounds.
 //!
-//! A first difference over its time is a mean velocity, a second difference a mean acceleration: where one
-//! exceeds a limit the motion does. A position is known to `EPS` of its magnitude and a time to `EPS` of its own.
+//! A first difference quotient is a mean velocity, a second one a mean acceleration: where one exceeds a limit, the motion does.
+//! The relative error of stored positions and times is `EPS`.
 
 use super::number::inner;
 use super::rows::Row;
@@ -16,7 +16,7 @@ pub struct Differences<'a, const M: usize> {
     pub rows: &'a [Row<M>],
 }
 
-/// Mean accelerations, and what of them may be rounding, in mm/s².
+/// Mean accelerations and their rounding error bounds, in mm/s².
 #[derive(Clone, Copy, Debug)]
 pub struct Quotient<const M: usize> {
     pub value: [f64; M],
@@ -30,13 +30,13 @@ impl<const M: usize> Default for Quotient<M> {
 }
 
 impl<const M: usize> Differences<'_, M> {
-    /// How much a time step may differ from the period, in s.
+    /// Allowed deviation of a time step from the period, in s.
     pub fn uneven(&self) -> f64 {
         PASS_EXCESS * self.limits.period
     }
 
-    /// Least and greatest position of one axis that changes nothing where this share of half its travel was found; none where that is
-    /// not known, or where one end alone is.
+    /// Least and greatest position of one axis that do not raise the used share of its travel above `known`; NaN where nothing is
+    /// known yet (`known` < 0) or where the travel is limited on one side only.
     pub fn travel_of(&self, axis: usize, known: f64) -> [f64; 2] {
         let [least, most] = self.limits.travel[axis];
         let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
@@ -48,7 +48,8 @@ impl<const M: usize> Differences<'_, M> {
         }
     }
 
-    /// Time from row `n` − 1 to row `n`: the period itself where the times round to it. Row 0 has none.
+    /// Time from row `n` − 1 to row `n` in s: exactly the period where the difference of the times is within rounding of it. 0
+    /// for row 0.
     pub fn step(&self, n: usize) -> f64 {
         if n == 0 {
             return 0.0;
@@ -66,7 +67,8 @@ impl<const M: usize> Differences<'_, M> {
         (step - self.limits.period).abs() <= self.uneven() + ROUNDINGS * EPS * t.abs()
     }
 
-    /// Bound of the error of the position of each axis at row `n`, in mm: its rounding, and the way in the rounding of its time.
+    /// Bound of the position error of each axis at row `n`, in mm: rounding of the position, and velocity times the rounding of
+    /// the time.
     pub fn rounding(&self, n: usize) -> [f64; M] {
         let row = &self.rows[n];
         let before = &self.rows[n.saturating_sub(1)];
@@ -80,12 +82,13 @@ impl<const M: usize> Differences<'_, M> {
         rounding
     }
 
-    /// Mean accelerations over the two steps around row `c`, and what of them may be rounding.
+    /// Mean accelerations over the two steps around row `c`, and their rounding error bounds.
     pub fn acceleration(&self, c: usize) -> Quotient<M> {
         self.acceleration_by(c, self.step(c), self.step(c + 1), &self.rounding(c + 1))
     }
 
-    /// The same where the steps to and from row `c` and the rounding of the row after it are known.
+    /// The mean accelerations around row `c`, from the durations of the steps to and from it and the position error bound of the
+    /// row after it.
     #[inline]
     pub fn acceleration_by(&self, c: usize, h0: f64, h1: f64, rounding: &[f64; M]) -> Quotient<M> {
         let [q0, q1, q2] = [c - 1, c, c + 1].map(|n| &self.rows[n].q);
@@ -97,9 +100,10 @@ impl<const M: usize> Differences<'_, M> {
         }
     }
 
-    /// Mean jerk of each axis over three steps that take `span`, from the accelerations around the two rows inside them.
+    /// Mean jerk of each axis over three steps that take `span`, less its rounding error bound, in mm/s³; from the mean
+    /// accelerations around the two inner rows.
     ///
-    /// Each mean acceleration is weighted by a triangle over two steps; the centres of the two are a third of `span` apart.
+    /// Each mean acceleration has a triangular weight over two steps; the centres of the two triangles are `span`/3 apart.
     #[inline]
     pub fn jerk(&self, early: &Quotient<M>, late: &Quotient<M>, span: f64) -> [f64; M] {
         let per_third = 3.0 / span;
@@ -107,9 +111,9 @@ impl<const M: usize> Differences<'_, M> {
         vector_of(|k| change(k) * per_third)
     }
 
-    /// Whether an acceleration above its limit at row `c` can be a corner, where no path is known: at most two neighbouring
-    /// accelerations are above their limits, their excess makes no more than the allowed jump, and the velocities before and after
-    /// differ by no more than a turn at one speed and the acceleration limits explain.
+    /// Whether an acceleration above its limit at row `c` can be a corner, where no path is known. This is so if at most two
+    /// consecutive accelerations are above their limits, their total excess is at most the allowed jump, and the change of
+    /// velocity across them is explained by a turn at constant speed plus the acceleration limits.
     pub fn looks_like_a_corner(&self, c: usize) -> bool {
         let last = self.rows.len() - 1;
         let exceeds = |i: usize| i >= 1 && i < last && self.excess(i).iter().any(|&excess| excess > 0.0);
@@ -134,7 +138,7 @@ impl<const M: usize> Differences<'_, M> {
         if (0..M).any(|k| total[k] > self.limits.jump_beyond[k] * PASS_MARK) {
             return false;
         }
-        // Steps wholly before and wholly after the corner.
+        // The last step wholly before the corner, and the first one wholly after it.
         let (into, out) = (first.saturating_sub(1).max(1), (end + 1).min(last));
         let [before, after] = [into, out].map(|n| {
             let step = self.step(n);
@@ -152,7 +156,7 @@ impl<const M: usize> Differences<'_, M> {
         (speeds[1] - speeds[0]).abs() <= explained && length(&total) <= turned + explained
     }
 
-    /// By how much each acceleration around row `i` is above its limit.
+    /// By how much the mean acceleration of each axis around row `i` is above its limit, in mm/s²; negative if it is below.
     fn excess(&self, i: usize) -> [f64; M] {
         let acceleration = self.acceleration(i);
         std::array::from_fn(|k| {

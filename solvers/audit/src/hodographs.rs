@@ -1,7 +1,8 @@
-//! Position and derivatives of a piece of any degree at many places, by the Bernstein coefficients of all of them.
+//! Evaluates a piece of any degree and its derivatives at many places, from the Bernstein coefficients of all derivatives.
 //!
-//! C = P_0 + N/ω, polynomial where ω = 1. The coefficients of the derivatives of N and ω are differences of theirs; sums of
-//! positive weights of these lose no digits (scheme of Schumaker and Volk 1986). The quotient rule makes the derivatives of C.
+//! C = P_0 + N/ω, polynomial where ω = 1. The coefficients of the derivatives of N and ω are differences of those of N and ω;
+//! their sums with positive weights lose no digits (scheme of Schumaker and Volk 1986). The quotient rule gives the derivatives
+//! of C.
 
 use fearless_simd::{dispatch, Level};
 
@@ -9,10 +10,10 @@ use super::number::{inner, Number};
 use super::polygon::{Polygon, MOST};
 use super::vectors::{from_to, length, vector_of};
 
-/// Coefficients of a function of the piece, times binomials.
+/// Bernstein coefficients times binomial coefficients.
 type Rows<const M: usize> = [[f64; M]; MOST + 1];
 
-/// n over i.
+/// Binomial coefficients: row n, column i.
 const BINOMIALS: [[f64; MOST + 1]; MOST + 1] = {
     let mut rows = [[0.0; MOST + 1]; MOST + 1];
     let mut n = 0;
@@ -28,7 +29,8 @@ const BINOMIALS: [[f64; MOST + 1]; MOST + 1] = {
     rows
 };
 
-/// Evaluates an expression with the degree of a piece as a constant where it is that of most pieces, so that its loops are unrolled.
+/// Evaluates an expression with the degree of a piece as a constant if it is 5, the degree of most pieces, so that loops are
+/// unrolled.
 macro_rules! with_degree {
     ($degree:expr, $n:ident, $call:expr) => {
         match $degree {
@@ -45,23 +47,23 @@ macro_rules! with_degree {
 pub struct Hodographs<const M: usize> {
     start: [f64; M],
     degree: usize,
-    /// Of N and its first three derivatives by t; of ω and its own, on rational pieces.
+    /// Coefficients of N and its first three derivatives by t; and, on rational pieces, those of ω.
     rows: [Rows<M>; 4],
     weights: Option<Box<[Rows<1>; 4]>>,
-    /// What the rounding of the first three derivatives is relative to.
+    /// For each axis the magnitudes that the rounding errors of the first three derivatives are relative to.
     sizes: [[f64; M]; 3],
-    /// The greatest lengths of the second to the fifth derivative; infinite on rational pieces.
+    /// Upper bounds of the lengths of the second to the fifth derivative; infinite on rational pieces.
     bounds: [f64; 4],
 }
 
 impl<const M: usize> Hodographs<M> {
-    /// Of a point at the origin.
+    /// A point at the origin.
     pub fn none() -> Self {
         let (rows, bounds) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 4]);
         Self { start: [0.0; M], degree: 0, rows, weights: None, sizes: [[0.0; M]; 3], bounds }
     }
 
-    /// Becomes those of a polygon.
+    /// Takes the coefficients of another polygon.
     #[inline]
     pub fn set(&mut self, polygon: &Polygon<M>) {
         let (steps, weights) = (polygon.steps(), polygon.weights());
@@ -88,7 +90,7 @@ impl<const M: usize> Hodographs<M> {
             ratio = degree as f64 * weights.iter().fold(0.0_f64, |most, w| most.max(*w)) / least;
         } else {
             with_degree!(degree, n, derive(&mut ways, 1.0, n, 1, &mut self.rows[..1]));
-            // From the steps themselves: differences of sums of them lose digits.
+            // From the steps themselves: differences of their sums lose digits.
             ways[..degree].copy_from_slice(steps);
             self.bounds = with_degree!(degree, n, {
                 derive(&mut ways, n as f64, n.saturating_sub(1), 5, &mut self.rows[1..])
@@ -102,7 +104,7 @@ impl<const M: usize> Hodographs<M> {
         }
     }
 
-    /// C, counted from the start of the piece, and its first R − 1 derivatives by t, where `rest` is 1 − t.
+    /// C relative to the start of the piece, and its first R − 1 derivatives by t; `rest` is 1 − t.
     #[inline(always)]
     fn local<const R: usize>(&self, t: f64, rest: f64) -> [[f64; M]; R] {
         let mut c = [[0.0; M]; R];
@@ -149,7 +151,7 @@ impl<const M: usize> Hodographs<M> {
         }
     }
 
-    /// The length of dC/dt by u = t/`per`, each axis times its `scale`, at several t.
+    /// |dC/du| for u = t/`per` at several t, with each axis multiplied by its `scale`.
     pub fn speeds<const K: usize>(
         &self,
         t: [f64; K],
@@ -174,13 +176,13 @@ impl<const M: usize> Hodographs<M> {
         with_degree!(self.degree, n, sum(&self.rows[1][..n], t, rest))
     }
 
-    /// C and dC/dt of such a piece.
+    /// C and dC/dt of a piece without weights.
     #[inline(always)]
     pub fn polynomial_place<T: Number>(&self, t: T, rest: T) -> [[T; M]; 2] {
         [self.polynomial_point(t, rest), self.polynomial_slope(t, rest)]
     }
 
-    /// C of such a piece.
+    /// C of a piece without weights.
     #[inline(always)]
     pub fn polynomial_point<T: Number>(&self, t: T, rest: T) -> [T; M] {
         let mut point = with_degree!(self.degree, n, sum(&self.rows[0][..=n], t, rest));
@@ -200,10 +202,10 @@ impl<const M: usize> Hodographs<M> {
         self.polynomial_rates(t, rest)
     }
 
-    /// The same of a piece without weights, at one t or at several.
+    /// The first three derivatives by t of a piece without weights, at one t or at several.
     #[inline(always)]
     pub fn polynomial_rates<T: Number>(&self, t: T, rest: T) -> [[T; M]; 3] {
-        // Each in a place of its own: a place that is counted to is one in memory.
+        // Three variables: an array indexed by a loop counter would stay in memory.
         let (mut first, mut second, mut third) = ([t.filled(0.0); M], [t.filled(0.0); M], [t.filled(0.0); M]);
         with_degree!(self.degree, n, {
             if n >= 1 {
@@ -229,12 +231,12 @@ impl<const M: usize> Hodographs<M> {
         c
     }
 
-    /// What the rounding of the first three derivatives is relative to.
+    /// For each axis the magnitudes that the rounding errors of the first three derivatives are relative to.
     pub fn sizes(&self) -> &[[f64; M]; 3] {
         &self.sizes
     }
 
-    /// The greatest lengths of the second to the fifth derivative; infinite on rational pieces.
+    /// Upper bounds of the lengths of the second to the fifth derivative; infinite on rational pieces.
     pub fn bounds(&self) -> [f64; 4] {
         self.bounds
     }
@@ -256,7 +258,7 @@ fn sum<const M: usize, T: Number>(rows: &[[f64; M]], t: T, rest: T) -> [T; M] {
     value
 }
 
-/// The same of each axis at several t.
+/// Σ rows_i t^i rest^(n − i) of each axis at several t.
 #[inline(always)]
 fn sum_at_each<const M: usize, const K: usize>(
     rows: &[[f64; M]],
@@ -264,7 +266,7 @@ fn sum_at_each<const M: usize, const K: usize>(
     rest: &[f64; K],
 ) -> [[f64; K]; M] {
     let mut values = [[0.0; K]; M];
-    // One axis after the other: with all at once the compiler makes vectors of axes.
+    // One axis after the other: with all axes at once the compiler would make SIMD vectors of axes instead of places.
     for k in 0..M {
         let (mut value, mut power) = ([rows[0][k]; K], [1.0; K]);
         for row in &rows[1..] {
@@ -278,7 +280,7 @@ fn sum_at_each<const M: usize, const K: usize>(
     values
 }
 
-/// The lengths of Σ rows_i t^i rest^(n − i) at several t, each axis times these factors, in the vectors of the processor.
+/// The lengths of Σ rows_i t^i rest^(n − i) at several t in SIMD vectors, with each axis multiplied by `per` and its `scale`.
 #[inline(always)]
 fn lengths<const M: usize, const K: usize>(
     rows: &[[f64; M]],
@@ -300,8 +302,9 @@ fn lengths<const M: usize, const K: usize>(
     sum
 }
 
-/// The coefficients, times binomials and a factor, of a function of this degree and of its first derivatives up to so many orders,
-/// whose differences take the place of `rows`; returns the greatest lengths of those of the derivatives, times the factor.
+/// Writes to `found` the coefficients, times binomial coefficients and `factor`, of a function and of its derivatives, `orders`
+/// functions in all, from its Bernstein coefficients in `rows`, which are overwritten by their differences. Returns upper bounds
+/// of the lengths of the derivatives, times `factor`.
 #[inline(always)]
 fn derive<const M: usize>(
     rows: &mut Rows<M>,
@@ -328,7 +331,7 @@ fn derive<const M: usize>(
         }
         factor *= count as f64;
     }
-    // All roots together: each alone takes as long.
+    // All roots together: they take as long as one.
     for i in 0..4 {
         lengths[i] = factors[i] * f64::sqrt(squares[i]);
     }

@@ -1,5 +1,5 @@
-//! The audits for 3, 6 and 9 axes, compiled here, so that crates that call them compile nothing. Axes beyond the machine's own
-//! rest and change nothing.
+//! The audits for 3, 6 and 9 axes, compiled here so that the crates that call them need not compile them. Axes beyond those of
+//! the machine rest and do not affect the result.
 
 use crate::columns::Columns;
 use crate::curve::Followed;
@@ -13,13 +13,13 @@ use crate::setpoints::{Chunk, Stream};
 use crate::tracking::Plan;
 use crate::{Limits, Seen, Tally};
 
-/// What can be asked of limits of M axes or joints.
+/// Audits against limits of M axes or joints.
 pub trait PlanKernels<const M: usize> {
-    /// What the path shows.
+    /// Audits the path on its own.
     fn path(&self, path: &Followed, phases: Option<&Phases>, seen: Seen) -> Tally<M>;
-    /// What the profile shows.
+    /// Audits the profile of axes.
     fn profile(&self, path: &Followed, junction_speed: &[f64], phases: &Phases, seen: Seen) -> Tally<M>;
-    /// What the profile shows of joints that are not the path's axes.
+    /// Audits the profile of joints that are not the axes of the path.
     fn joint_profile(
         &self,
         joints: &JointPath,
@@ -27,7 +27,7 @@ pub trait PlanKernels<const M: usize> {
         phases: &Phases,
         seen: Seen,
     ) -> Tally<M>;
-    /// What path and program show.
+    /// Audits the distance between path and program.
     fn deviation(
         &self,
         path: &Followed,
@@ -37,11 +37,11 @@ pub trait PlanKernels<const M: usize> {
     ) -> Tally<M>;
 }
 
-/// What can be asked of setpoints.
+/// The audit of a stream of setpoints.
 pub trait SetpointKernels<const M: usize> {
-    /// Looks at the next ones.
+    /// Audits the next setpoints.
     fn take(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen);
-    /// What they have shown.
+    /// Ends the stream and returns what the audit found.
     fn verdict(self, plan: Option<&Plan>) -> Tally<M>;
 }
 
@@ -104,6 +104,6 @@ macro_rules! kernels {
 #[cfg(not(test))]
 kernels!(3 6 9);
 
-// Tests call the kernels directly; one instance shows that all are in use.
+// Tests call the kernels directly; one instance keeps them from being reported as unused.
 #[cfg(test)]
 kernels!(2);

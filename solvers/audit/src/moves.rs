@@ -1,4 +1,4 @@
-//! The programmed path as the audit sees it: straight moves, true arcs and helices, splines, and distances from them.
+//! The programmed path: straight moves, true arcs and helices, and splines; and distances of points from them.
 
 use std::f64::consts::TAU;
 
@@ -8,30 +8,31 @@ use super::curve::Pieces;
 use super::nearest::{nearest_on_piece, outwards, Place};
 use super::vectors::{distance, vector, Segment};
 
-/// The program's arrays, one entry a move; see `feedplan.Program`.
+/// The arrays of the program, one entry for each move; see `feedplan.Program`.
 #[derive(Clone, Copy)]
 pub struct Programmed<'a> {
-    /// At most as many as the kernels take.
+    /// At most `M`.
     pub axes: usize,
     /// Where the first move begins, in mm.
     pub start: &'a [f64],
-    /// Ends of the moves, axes numbers a move, in mm.
+    /// Ends of the moves, `axes` numbers for each move, in mm.
     pub target: &'a [f64],
     pub line: &'a [i32],
-    /// Arcs, in the order of their moves: the move, the centre in X, Y, Z, the normal axis 0, 1 or 2 among
-    /// these, the signed sweep in rad.
+    /// Arcs, in the order of their moves: the move; the centre in X, Y, Z in mm; the normal axis (0, 1 or 2 of X, Y, Z); the
+    /// signed sweep in rad.
     pub arc_move: &'a [i64],
     pub arc_centre: &'a [f64],
     pub arc_normal: &'a [u8],
     pub arc_angle: &'a [f64],
-    /// Splines, in the order of their moves: the move, and which of the pieces it takes, one more entry than moves.
+    /// Splines, in the order of their moves: the move; and the first piece of each spline in `splines`, then the number of
+    /// pieces.
     pub spline_move: &'a [i64],
     pub spline_pieces: &'a [i64],
     pub splines: Pieces<'a>,
-    /// Moves that begin elsewhere than the one before ends, in order, and where, axes numbers each.
+    /// Moves that do not begin at the end of the move before, in order; and where they begin, `axes` numbers for each.
     pub change_move: &'a [i64],
     pub change_start: &'a [f64],
-    /// Where X, Y, Z are among the axes.
+    /// The axes that are X, Y and Z.
     pub xyz: [Option<usize>; 3],
 }
 
@@ -57,7 +58,7 @@ pub(super) enum Shape<'a> {
 
 #[cfg(test)]
 impl<'a> Programmed<'a> {
-    /// Lines in X, Y and perhaps Z from a place to others, on these source lines.
+    /// Lines in X, Y and perhaps Z from one place through others, on the given source lines.
     pub const fn of_lines(start: &'a [f64], target: &'a [f64], line: &'a [i32]) -> Self {
         let axes = start.len();
         Self {
@@ -85,12 +86,12 @@ impl<'a> Programmed<'a> {
         self.line.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no moves.
     pub fn is_empty(&self) -> bool {
         self.line.is_empty()
     }
 
-    /// End of move `i`; of the move before the first: the start.
+    /// End of move `i`; the start of the program for None.
     pub fn end<const M: usize>(&self, i: Option<usize>) -> [f64; M] {
         match i {
             Some(i) => vector(self.target, self.axes, i),
@@ -140,7 +141,7 @@ impl<'a> Programmed<'a> {
 }
 
 impl<const M: usize> Move<'_, M> {
-    /// The place at the share `t` of the move.
+    /// The place at the parameter `t` of the move, in [0, 1].
     pub fn at(&self, t: f64) -> [f64; M] {
         match &self.shape {
             Shape::Line => self.straight(t),
@@ -176,7 +177,7 @@ impl<const M: usize> Move<'_, M> {
         matches!(self.shape, Shape::Line)
     }
 
-    /// How many even places show the shape of the move: more on arcs and splines.
+    /// Number of intervals between equally spaced places that show the shape of the move: more on arcs and splines.
     pub fn places(&self) -> usize {
         match &self.shape {
             // Every 7.5 degrees: between such places a circle is 0.2 % of the radius from its chord.
@@ -189,7 +190,7 @@ impl<const M: usize> Move<'_, M> {
         }
     }
 
-    /// Distance of `q` from the nearest place of the move, in mm, or from a place within `enough`.
+    /// Distance of `q` from the nearest place of the move, in mm, or from any place within `enough`.
     pub(super) fn distance(&self, q: &[f64; M], enough: f64) -> f64 {
         match &self.shape {
             Shape::Line => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
@@ -207,8 +208,9 @@ impl<const M: usize> Move<'_, M> {
         }
     }
 
-    /// The same, where a spline is searched from the last place on it, which becomes the next one, and the nearest place of a few
-    /// steps counts within the second distance of `enough`; what is beyond `least` need not be known.
+    /// Like `distance`, but on a spline the search starts at `last_place`, which is then replaced by the place found. The place
+    /// of a few Newton steps is good enough within the second distance of `enough`. Where the distance exceeds `least`, `least`
+    /// may be returned.
     pub(super) fn distance_from(
         &self,
         q: &[f64; M],
@@ -225,7 +227,7 @@ impl<const M: usize> Move<'_, M> {
         away
     }
 
-    /// Distance from the nearest of all local minima and both ends, or from a place within `enough`.
+    /// Distance from the nearest of all local minima and both ends, or from any place within `enough`.
     fn distance_to_arc(&self, arc: &Arc, q: &[f64; M], enough: f64) -> f64 {
         let slope = ArcSlope::new([&self.from, &self.to], arc, q);
         let off = |t: f64| distance(q, &self.on_arc(arc, t));
@@ -237,7 +239,7 @@ impl<const M: usize> Move<'_, M> {
             if slope.off_height(from.t, to.t) >= nearest {
                 return;
             }
-            // Between places where the next rate is 0 a rate only rises or only falls: it is 0 once at most.
+            // Between the zeros of the next rate a rate is monotone, so it has at most one zero there.
             let bend = slope.root::<2>(from, to);
             for [from, to] in [[from, &bend], [&bend, to]] {
                 let level = slope.root::<1>(from, to);
@@ -252,8 +254,8 @@ impl<const M: usize> Move<'_, M> {
     }
 }
 
-/// The place of some pieces that is nearest to `q`, or one within `enough`, and its distance, searched outwards from a place; that
-/// one, and `least`, where none is nearer than that.
+/// The place of the pieces from `first` to `last` that is nearest to `q`, or one within `enough`, and its distance; searched
+/// outwards from the place `from`. Returns `from` and `least` where no place is nearer than `least`.
 fn nearest_of<const M: usize>(
     pieces: &Pieces,
     q: &[f64; M],
@@ -322,8 +324,8 @@ mod tests {
         assert_eq!(spline.distance_from(&[7.0, 0.0], (&mut place, &mut close), [0.0; 2], 1.4), 1.4);
     }
 
-    /// Helices about Z from radius 10, a quarter of a turn more than two or none: 9 mm up, 100 mm, not at all; some turn
-    /// clockwise, some narrow or widen.
+    /// Helices about Z that start at radius 10, with 0.25 or 2.25 turns, up to 100 mm high or flat; some turn clockwise, some
+    /// narrow or widen.
     const HELICES: [([f64; 3], [f64; 1]); 9] = [
         ([0.0, 10.0, 9.0], [2.25 * TAU]),
         ([0.0, 10.0, 100.0], [2.25 * TAU]),
@@ -391,15 +393,16 @@ mod tests {
         }
     }
 
-    /// What a place of a helix among 20 000 is nearer than its distance, and more than such a place can be farther.
+    /// Errors of the distance of `q` from a helix, compared with the nearest of 20 000 places on it: how much it is too great,
+    /// and how much it is too small. Neither is positive if the distance is right.
     fn errors(which: usize, q: &[f64; 3]) -> [f64; 2] {
         let helix = helix(&HELICES[which]);
         let places: Vec<_> = (0..=20_000).map(|i| helix.at(f64::from(i) / 20_000.0)).collect();
         let dense = places.iter().map(|place| distance(q, place)).fold(f64::INFINITY, f64::min);
         let step = places.windows(2).map(|pair| distance(&pair[0], &pair[1])).fold(0.0, f64::max);
         let found = off(&helix, q);
-        // The nearest place is at most half a step from one of these, at right angles to the way to it; the curve
-        // bends away from `q` by less than its radius does.
+        // The nearest place is at most half a step from one of these, at right angles to the direction of `q`; the whole step
+        // also covers the curvature.
         [found - dense, dense - found.hypot(step)]
     }
 

@@ -1,13 +1,13 @@
-//! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
+//! Finds the place of a point on the path: the nearest place of a piece, or the next place along the path.
 
 use super::curve::{Curve, Followed};
 use super::number::inner;
 use super::vectors::distance;
 
-/// Pieces that one step passes: where a piece has no direction steps are of any length.
+/// Limit of the pieces that one step passes: where a piece has no direction, a Newton step may have any length.
 const MOST_PASSED: usize = 8;
 
-/// A place on the path; those ahead of it are greater.
+/// A place on the path; places are ordered along it.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Place {
     pub piece: usize,
@@ -16,8 +16,8 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place a step of u on, where pieces have these widths: what is left of the step on one goes on on the next one, in mm as
-    /// well, no farther than the pieces from `least` to `most` and the next few. A step that is not a number is none.
+    /// The place at a parameter step of `step` from here, in mm, on pieces of these widths. The step is continued over the ends
+    /// of pieces, but stays on the pieces from `least` to `most` and passes at most `MOST_PASSED`. A NaN counts as 0.
     #[inline]
     pub fn moved(self, step: f64, width: &[f64], [least, most]: [usize; 2]) -> Self {
         let Self { mut piece, mut u } = self;
@@ -35,14 +35,15 @@ impl Place {
     }
 }
 
-/// The step of u by Newton's method towards the place nearest to a point, from one that is `away` from it and has this slope.
+/// The Newton step of u towards the place nearest to a point; `away` is the vector to the point from the current place, `slope`
+/// is C'.
 #[inline]
 pub fn step_towards<const M: usize>(away: &[f64; M], slope: &[f64; M]) -> f64 {
     inner(away, slope) / inner(slope, slope)
 }
 
-/// The first local minimum of the distance at or after `from`: its parameter and distance, and whether the
-/// distance still falls at the end of the piece.
+/// The first local minimum of the distance of `q` at or after `from`: its parameter, its distance, and whether the distance still
+/// falls at the end of the piece.
 #[inline]
 pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) -> (f64, f64, bool) {
     let width = curve.width();
@@ -52,7 +53,7 @@ pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) 
     (u, distance(q, &curve.at(u)), falls)
 }
 
-/// Calls `found` with the local minima of the distance at or after `from` and with both ends: parameter and distance.
+/// Calls `found` with parameter and distance of each local minimum of the distance at or after `from`, and of both ends.
 pub fn all_minima<const M: usize>(
     curve: &Curve<M>,
     q: &[f64; M],
@@ -67,7 +68,7 @@ pub fn all_minima<const M: usize>(
     });
 }
 
-/// The parameter of the place of a piece that is nearest to `q`, and its distance.
+/// The parameter of the place of a piece that is nearest to `q`, and its distance in mm.
 pub fn nearest_on_piece<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> (f64, f64) {
     let mut nearest = (0.0, f64::INFINITY);
     all_minima(curve, q, 0.0, |u, distance| {
@@ -78,33 +79,33 @@ pub fn nearest_on_piece<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> (f64,
     nearest
 }
 
-/// A place found for a point.
+/// A place found for a point, and its errors.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     pub place: Place,
     /// Distance of the point from the place in mm.
     pub distance: f64,
-    /// What `judge` says of the place in mm.
+    /// The error of the place by `judge`, in mm.
     pub error: f64,
 }
 
-/// What the search may look at.
+/// A search along the path, and its tolerances.
 pub struct Search<'a, F> {
     pub path: &'a Followed<'a>,
     /// Length of path to look along after the first piece, in mm.
     pub reach: f64,
-    /// Distance at which a point is on the path, in mm.
+    /// Distance up to which a point counts as on the path, in mm.
     pub close: f64,
-    /// How wrong a place is for other reasons than its distance, in mm, and how wrong it may be.
+    /// The error of a place for other reasons than its distance, in mm; and how much of it is allowed.
     pub judge: F,
     pub allowed: f64,
 }
 
 impl<F: FnMut(Place) -> f64> Search<'_, F> {
-    /// The first place at or after `from` that is close and judged good; else the least bad within reach.
+    /// The first place at or after `from` that is close and whose error is allowed; else the best one within reach.
     ///
-    /// The second, thorough look takes all minima of every piece: where the path turns back within a step, the
-    /// first minimum may be a wrong one.
+    /// A second search takes all minima of every piece: where the path turns back within a step, the first minimum may be a wrong
+    /// one.
     pub fn next_place<const M: usize>(&mut self, from: Place, q: &[f64; M]) -> Found {
         let quick = self.look::<M>(from, q, false);
         if self.is_good(&quick) {
@@ -122,7 +123,7 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
         found.distance <= self.close && found.error <= self.allowed
     }
 
-    /// The order of places: those on the path by the greater of both errors, then those off it by their distance.
+    /// Ranks places: those on the path by the greater of both errors, before all others by their distance.
     fn badness(&self, found: &Found) -> f64 {
         if found.distance <= self.close {
             found.error.max(found.distance)
@@ -175,7 +176,7 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
     }
 }
 
-/// `from`, then its neighbours on both sides by turns, within `least` to `most`.
+/// `from`, then alternately the next one after and before it, within `least` to `most`.
 pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = usize> {
     let (mut after, mut before, mut turn) = (from + 1, from, false);
     let others = std::iter::from_fn(move || {

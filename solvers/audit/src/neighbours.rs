@@ -1,4 +1,4 @@
-//! The nearest of some moves to places along a path, one place after the other.
+//! Finds the move nearest to each place along a path, one place after the other.
 
 use super::close_places::ClosePlaces;
 use super::moves::{Move, Programmed, Shape};
@@ -7,24 +7,24 @@ use super::nearest::Place;
 /// First and last piece that follow a move.
 pub type Followers = (usize, usize);
 
-/// One of the moves by its row, and on splines the place on it.
+/// One of the moves by its index in `Neighbours`, and on splines the place on it.
 pub type Here = (usize, Option<Place>);
 
-/// A move, and on splines the place that was nearest last.
+/// The number of a move in the program, the move, and on splines the place that was nearest last.
 type Near<'a, const M: usize> = (usize, Move<'a, M>, Option<Place>);
 
-/// Some moves that places along a path are measured against, one after the other.
+/// Moves that places along a path are measured against, one place after the other.
 #[derive(Default)]
 pub struct Neighbours<'a, const M: usize> {
     moves: Vec<Near<'a, M>>,
-    /// The one nearest to the place before: mostly nearest to the next one too.
+    /// The move nearest to the place before: mostly also nearest to the next place.
     nearest: usize,
     /// Places on the splines, if there are any.
     close: Option<ClosePlaces<'a, M>>,
 }
 
 impl<'a, const M: usize> Neighbours<'a, M> {
-    /// Takes other moves.
+    /// Replaces the moves by others; keeps the known places on splines.
     pub fn replace(&mut self, program: &Programmed<'a>, numbers: impl Iterator<Item = usize>) {
         if self.close.is_none() && !program.splines.is_empty() {
             self.close = Some(ClosePlaces::new(program.splines));
@@ -37,8 +37,8 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         self.nearest = 0;
     }
 
-    /// Expects the nearest place of a spline to be as far along it as `piece` is along the pieces that follow it, where no place of
-    /// that spline is known.
+    /// Starts the search on a spline where no place is known, as far along the spline as `piece` is along the pieces that follow
+    /// it.
     pub fn start_at(&mut self, followers: &[Followers], piece: usize) {
         for (number, programmed, place) in &mut self.moves {
             if let (Shape::Spline { first, last, .. }, None) = (programmed.shape, &place) {
@@ -50,13 +50,13 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         }
     }
 
-    /// Where the distance found last is from.
+    /// The move that the last distance was measured from, and on a spline the place on it.
     pub fn here(&self) -> Here {
         (self.nearest, self.moves.get(self.nearest).and_then(|(_, _, place)| *place))
     }
 
-    /// How far the moves may be from the chord between two of these places; infinite where both are not on one straight move or one
-    /// piece of a spline.
+    /// Upper bound of the distance of the moves from the chord between two of these places, in mm; infinite unless both are on
+    /// the same straight move or the same piece of a spline.
     pub fn sagitta(&mut self, from: Here, to: Here) -> f64 {
         let on = self.moves.get(from.0).filter(|_| from.0 == to.0);
         match (on, from.1, to.1, &mut self.close) {
@@ -68,8 +68,8 @@ impl<'a, const M: usize> Neighbours<'a, M> {
         }
     }
 
-    /// Distance of `q` from the nearest move, or from the first that is within the first of `enough`; see `Move::distance_from` for
-    /// the second. A NaN if there is one.
+    /// Distance of `q` from the nearest move in mm, or from the first move found within the first distance of `enough`; for the
+    /// second one see `Move::distance_from`. NaN if any distance is NaN.
     pub fn distance(&mut self, q: &[f64; M], enough: [f64; 2]) -> f64 {
         let mut least = f64::INFINITY;
         let first = self.nearest;
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
     use crate::curve::Pieces;
 
-    /// Along X from 0 to 4, along Y to (4, 4), and back to the start of that by a half circle.
+    /// Along X from 0 to 4, along Y to (4, 4), and by a half circle back to (4, 0).
     const PROGRAM: Programmed = Programmed {
         arc_move: &[2],
         arc_centre: &[4.0, 2.0, 0.0],

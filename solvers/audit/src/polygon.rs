@@ -1,14 +1,14 @@
 //! A piece of any degree, polynomial or rational, by the steps of its control polygon.
 //!
-//! De Casteljau's algorithm on the steps d_i = P_(i+1) − P_i instead of the points: with w the weights,
-//! w_i ← (1 − t) w_i + t w_(i+1), τ_i = t w_(i+1) / (the new w_i), every level is
+//! De Casteljau's algorithm on the steps d_i = P_(i+1) − P_i instead of the points. With the weights w, each level is
+//! w_i ← (1 − t) w_i + t w_(i+1), τ_i = t w_(i+1) / (the new w_i), and
 //!
 //! ```text
 //! d_i ← (1 − τ_i) d_i + τ_(i+1) d_(i+1)
 //! ```
 //!
-//! Points far from the origin and short parts of a piece so lose no digit. The steps of the part up to t are the
-//! τ_0 d_0 of all levels, and C'(t) = n w_0 w_1 d_0 / w² of the last one (Floater 1992).
+//! So no digits are lost on short parts of a piece or far from the origin. The steps of the part up to t are the τ_0 d_0 of all
+//! levels, and C'(t) = n w_0 w_1 d_0 / w², with d_0 of the last level (Floater 1992).
 
 mod nearest;
 
@@ -17,7 +17,7 @@ use super::vectors::{length, vector_of};
 /// Greatest degree.
 pub const MOST: usize = 9;
 
-/// Below this share of the greatest step a derivative is nothing but rounding.
+/// A step shorter than this share of the longest step is only rounding.
 const STILL: f64 = 1e-10;
 
 /// The piece over t in [0, 1].
@@ -31,7 +31,7 @@ pub struct Polygon<const M: usize> {
     rational: bool,
 }
 
-/// A place of the piece: the way to it from the start, and dC/dt.
+/// A place of the piece: its vector from the start, and dC/dt.
 #[derive(Clone, Copy, Debug)]
 pub struct Local<const M: usize> {
     pub way: [f64; M],
@@ -39,7 +39,7 @@ pub struct Local<const M: usize> {
 }
 
 impl<const M: usize> Polygon<M> {
-    /// From 2 to 10 control points, and as many positive weights or none.
+    /// From 2 to 10 control points, and as many positive weights or an empty slice.
     pub fn new(points: impl ExactSizeIterator<Item = [f64; M]>, weights: &[f64]) -> Self {
         let degree = (points.len() - 1).min(MOST);
         let (mut start, mut end) = ([0.0; M], [0.0; M]);
@@ -70,7 +70,7 @@ impl<const M: usize> Polygon<M> {
         self.rational
     }
 
-    /// From each control point to the next.
+    /// The vectors from each control point to the next.
     pub fn steps(&self) -> &[[f64; M]] {
         &self.steps[..self.degree]
     }
@@ -79,17 +79,18 @@ impl<const M: usize> Polygon<M> {
         &self.weights[..=self.degree]
     }
 
-    /// De Casteljau's algorithm at t; calls `level` with steps, weights, τ of the first and 1 − τ of the last step.
+    /// De Casteljau's algorithm at t: calls `level` for each level with its steps and weights, τ of the first step and 1 − τ of
+    /// the last one.
     #[inline]
     fn levels(&self, t: f64, level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
-        // Most pieces with weights are of degree 2: room for more takes longer than the work.
+        // Most pieces with weights have degree 2, for which filling longer arrays would take longer than the computation.
         match self.degree {
             0..=2 => self.levels_in::<2>(t, level),
             _ => self.levels_in::<MOST>(t, level),
         }
     }
 
-    /// The same in the room of N steps.
+    /// De Casteljau's algorithm at t, in arrays of N steps.
     #[inline]
     fn levels_in<const N: usize>(&self, t: f64, mut level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
         let s = 1.0 - t;
@@ -164,14 +165,15 @@ impl<const M: usize> Polygon<M> {
         [left, right]
     }
 
-    /// The part of the piece from the share `from` on, as long as the share `share`.
+    /// The part of the piece that begins at t = `from` and is `share` long in t.
     pub fn part(&self, from: f64, share: f64) -> Self {
         let mut rest = if from > 0.0 { self.split(from)[1].clone() } else { self.clone() };
         let length = share / (1.0 - from);
         if length < 1.0 {
             return rest.split(length)[0].clone();
         }
-        // Of a sliver at the end rounding changes the share: the part is as long as was asked.
+        // For a very short part at the end, rounding may make `length` exceed 1: the steps are scaled, so that its length is as
+        // requested.
         for step in &mut rest.steps[..self.degree] {
             *step = step.map(|value| value * length);
         }
@@ -191,7 +193,7 @@ impl<const M: usize> Polygon<M> {
         other
     }
 
-    /// How much the rounding of the control points is enlarged in dC/dt.
+    /// Factor by which rounding errors of the control points are amplified in dC/dt.
     pub fn slope_scale(&self) -> f64 {
         let weights = &self.weights[..=self.degree];
         let most = weights.iter().fold(0.0_f64, |most, w| most.max(*w));
@@ -200,22 +202,22 @@ impl<const M: usize> Polygon<M> {
         degree * f64::max(1.0, 0.5 * degree) * most / least
     }
 
-    /// The unit direction of motion at the start, also where C' is 0 there.
+    /// Unit vector of the direction of motion at the start, also where C' = 0 there.
     pub fn direction(&self) -> [f64; M] {
         first_direction(self.steps[..self.degree].iter())
     }
 
-    /// The same at the end.
+    /// Unit vector of the direction of motion at the end, also where C' = 0 there.
     pub fn end_direction(&self) -> [f64; M] {
         first_direction(self.steps[..self.degree].iter().rev())
     }
 
-    /// Greatest coordinate of the ends.
+    /// Greatest coordinate of the two ends.
     pub fn magnitude(&self) -> f64 {
         self.start.iter().chain(&self.end).fold(0.0, |most, q| q.abs().max(most))
     }
 
-    /// Least and greatest position of an axis inside the piece, found among even places and refined.
+    /// Least and greatest position of an axis on the piece, found among equally spaced places and refined by ternary search.
     pub fn extremes(&self, axis: usize) -> [f64; 2] {
         let count = 8 * self.degree;
         let place = |i: usize| i as f64 / count as f64;
@@ -242,7 +244,7 @@ impl<const M: usize> Polygon<M> {
         })
     }
 
-    /// From the start to the end.
+    /// The vector from the start to the end.
     pub fn chord(&self) -> [f64; M] {
         let mut chord = [0.0; M];
         for step in &self.steps[..self.degree] {
@@ -253,13 +255,13 @@ impl<const M: usize> Polygon<M> {
         chord
     }
 
-    /// The length of the polygon.
+    /// The length of the control polygon.
     pub fn way(&self) -> f64 {
         self.steps[..self.degree].iter().map(length).sum()
     }
 }
 
-/// The unit direction of the first step that is more than rounding.
+/// Unit vector of the first step that is more than rounding; 0 if there is none.
 fn first_direction<'a, const M: usize>(mut steps: impl Iterator<Item = &'a [f64; M]> + Clone) -> [f64; M] {
     let longest = steps.clone().map(length).fold(0.0, f64::max);
     let step = steps.find(|step| length(step) > STILL * longest);

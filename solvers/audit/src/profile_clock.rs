@@ -1,6 +1,6 @@
-//! Finds the phase of a speed profile that a time of the setpoints falls into.
+//! Finds the phase of a speed profile in which the setpoints are at a given time.
 //!
-//! The clock starts every run anew: setpoints may wait at a stop for their next period.
+//! The clock is set anew at the start of every run, since setpoints may wait at a stop for their next period.
 
 use super::curve::Followed;
 use super::nearest::Place;
@@ -8,16 +8,17 @@ use super::phases::Phases;
 use super::rows::Row;
 use super::{EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
-/// So many phases are looked at one after the other for a later time.
+/// Number of phases that are tried one after the other for a later time, before a binary search.
 const NEXT: usize = 8;
 
-/// A profile of good numbers on the clock of the setpoints.
+/// A profile with valid numbers, on the clock of the setpoints.
 #[derive(Clone, Copy)]
 pub struct ProfileClock<'a> {
     pub phases: Phases<'a>,
-    /// When every phase begins and the last one ends, pauses included; see `Phases::starts`.
+    /// Start of each phase and end of the last one on the clock of the profile, in s, pauses included; see `Phases::starts`.
     pub starts: &'a [f64],
-    /// When every run begins, as far as the setpoints have shown: a stream may wait at a stop for its next period.
+    /// Starts of the runs on the clock of the setpoints, in s, as far as the setpoints have shown them: a stream may wait at a
+    /// stop for its next period.
     pub run_starts: &'a [f64],
 }
 
@@ -33,7 +34,8 @@ impl ProfileClock<'_> {
         })
     }
 
-    /// What has to be added to the profile's times in a run; without a clock for it, the run is never reached.
+    /// What to add to the times of the profile in a run to get those of the setpoints, in s; infinite where the start of the run
+    /// is not known yet.
     pub fn shift(&self, run: usize) -> f64 {
         self.run_starts.get(run).map_or(f64::INFINITY, |start| start - self.starts[self.phases_of(run).start])
     }
@@ -43,7 +45,8 @@ impl ProfileClock<'_> {
         self.run_starts.partition_point(|&start| start <= time).saturating_sub(1)
     }
 
-    /// The phase of a run that `time` falls into, the first one before them all, and the time since it began.
+    /// The phase of a run that `time` falls into, and the time since it began, in s; the first phase for earlier times (then that
+    /// time is negative). None for a run without phases.
     pub fn phase_of(&self, run: usize, time: f64) -> Option<(usize, f64)> {
         let (phases, time) = (self.phases_of(run), time - self.shift(run));
         let passed = self.starts[phases.clone()].partition_point(|&start| start <= time);
@@ -51,7 +54,7 @@ impl ProfileClock<'_> {
         (!phases.is_empty()).then(|| (phase, time - self.starts[phase]))
     }
 
-    /// The phase that `time` falls into, looked for from another one on.
+    /// The phase that `time` falls into, searched forwards from the phase `from`.
     pub fn phase_from(&self, from: usize, time: f64) -> Option<usize> {
         let run = self.run_of(time);
         let (here, since) = (self.phases_of(run), time - self.shift(run));
@@ -61,7 +64,8 @@ impl ProfileClock<'_> {
         found.or_else(|| self.phase_of(run, time).map(|(phase, _)| phase))
     }
 
-    /// About where the profile is at a time, on this phase: u as a cubic of the time, by its ends.
+    /// Approximate place of the profile at `time` on this phase: u as the cubic of the time that has the positions and speeds of
+    /// both ends.
     pub fn place_about(&self, phase: usize, time: f64) -> Place {
         let phases = &self.phases;
         let since = time - self.shift(self.run_of(time)) - self.starts[phase];
@@ -82,9 +86,9 @@ impl ProfileClock<'_> {
         }
     }
 
-    /// Adds the starts of the runs that setpoints reach. A run starts when the pause before it is over or, where the
-    /// setpoints stand still on the stop for it, at the next of them. `away` is the distance of a setpoint from the
-    /// stop before a run, less rounding.
+    /// Adds to `clock` the starts of the runs that the setpoints reach. A run starts when the pause before it is over, or at the
+    /// next setpoint after that if it still stands on the stop. `away` gives the distance of a setpoint from the stop before a
+    /// run, less rounding, in mm.
     pub fn extend<const M: usize>(
         &self,
         path: &Followed,
@@ -108,7 +112,8 @@ impl ProfileClock<'_> {
                 [row] if on_time(row) => break,
                 [row, rest @ ..] => {
                     let (here, later) = (away(run, row), rest.first().filter(|_| on_time(row)));
-                    // A run may begin slowly: a stream that waits, or has not quite arrived, does not move away from the stop.
+                    // A run may begin slowly. The stream waits, or has not quite arrived, as long as it does not move away from
+                    // the stop.
                     match later.map(|later| (later, away(run, later))) {
                         Some((later, there)) if there <= GAP_TOLERANCE && there <= here => later.t,
                         _ if here <= GAP_TOLERANCE => row.t,

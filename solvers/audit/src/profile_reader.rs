@@ -1,4 +1,5 @@
-//! Reads a speed profile along setpoints: when it is at a place, and what it does there. `at_once` reads it at several places.
+//! Evaluates a speed profile at the places of setpoints: its time, velocity and acceleration there. `at_once` does so for eight
+//! places at once.
 
 mod at_once;
 
@@ -16,34 +17,34 @@ use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
 /// A recorded acceleration may differ from the profile's by this share of its limit.
 pub const ACCELERATION_SHARE: f64 = 1e-2;
 
-/// A switch of the acceleration this share of a period away counts as at the setpoint.
+/// A switch of the acceleration within this share of a period counts as simultaneous with the setpoint.
 const SWITCH_SHARE: f64 = 1e-4;
 
-/// Switches on each side that are looked at; right profiles have a few at most in so short a time.
+/// Limit of the switches examined on each side; a correct profile has only a few in so short a time.
 const MOST_SWITCHES: usize = 64;
 
-/// So many phases are looked at one after the other for a place that is ahead.
+/// Number of phases that are tried one after the other for a place ahead, before a binary search.
 const NEXT: usize = 4;
 
-/// Reads a profile along the setpoints; keeps the phase it is on, since the next place is mostly on it too.
+/// Evaluates a profile at one setpoint after the other. Remembers the current phase, since the next place is mostly on it too.
 pub struct Reader<'a, const M: usize> {
     clock: ProfileClock<'a>,
     phase: usize,
     run: usize,
     pub columns: Columns<'a, M>,
-    /// A phase, not always the one that it is on, and the motion on it.
+    /// The motion on one phase, with the number of the phase, which may differ from the current one.
     motion: (usize, Motion<M>),
-    /// Where it was last.
+    /// The last place, and the profile there.
     last: Option<(Place, Passage<M>)>,
-    /// The places that come next, the last one first; the phase of each, and what the profile does there.
+    /// Places expected next, the last one first; with the phase of each and the profile there.
     ahead: Vec<(Place, usize, Passage<M>)>,
-    /// Places on phases of other kinds among them.
+    /// Among the places expected next, the u of those on other kinds of phases than `SPEED_CUBIC`.
     others: Vec<f64>,
     room: Vec<Lanes>,
 }
 
 impl<'a, const M: usize> Reader<'a, M> {
-    /// On the first phase; there must be one, and a run of the path for it.
+    /// Starts on the first phase; there must be one, and a run of the path for it.
     pub fn new(clock: &ProfileClock<'a>, mut columns: Columns<'a, M>) -> Self {
         let motion = (0, Motion::new(&clock.phases, 0, &mut columns));
         let room = columns.room();
@@ -69,7 +70,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
     }
 
-    /// The motion on the phase that it is on.
+    /// The motion on the current phase.
     fn motion(&mut self) -> (&Motion<M>, &mut Columns<'a, M>) {
         if self.motion.0 != self.phase {
             self.motion = (self.phase, self.motion_of(self.phase));
@@ -85,8 +86,8 @@ impl<'a, const M: usize> Reader<'a, M> {
         [self.clock.phases.u0[phase], self.clock.phases.u1[phase]]
     }
 
-    /// Goes to the phase that holds a place, the earlier one of two that meet there. A place on a motionless piece
-    /// is the start of what comes next.
+    /// Goes to the phase that holds a place, the earlier one of two that meet there, and evaluates the profile at the place. A
+    /// place on a motionless piece counts as the start of the next phase.
     pub fn go_to(&mut self, place: Place) -> Passage<M> {
         if let Some((_, passage)) = self.last.filter(|(last, _)| *last == place) {
             return passage;
@@ -107,7 +108,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         passage
     }
 
-    /// Reads the profile at once at places of one piece, in their order, which it will be asked for.
+    /// Evaluates the profile at once at places of one piece that `go_to` will be called with in this order.
     pub fn look_ahead(&mut self, on: &Together<M>, piece: usize, places: &[f64]) {
         self.ahead.clear();
         self.others.clear();
@@ -126,19 +127,19 @@ impl<'a, const M: usize> Reader<'a, M> {
         self.columns.look_ahead(on, &self.others, &mut self.room);
     }
 
-    /// The phase that holds a place; as a rule this one or one of the next.
+    /// The phase that holds a place; mostly `phase` itself or one of the next few.
     fn phase_from(&self, phase: usize, place: Place) -> usize {
         let mut next = phase..self.clock.phases.len().min(phase + NEXT);
         next.find(|&phase| self.holds(phase, place)).unwrap_or_else(|| self.find(place))
     }
 
-    /// When the profile is at a place, pauses of runs included, in s.
+    /// When the profile is at a place, on the clock of the profile with pauses of runs included, in s.
     pub fn time_of(&mut self, place: Place) -> f64 {
         let here = self.go_to(place);
         self.clock.starts[self.phase] + here.since
     }
 
-    /// Where the profile is at a time on the clock of setpoints: piece, ends of the phase, u.
+    /// Where the profile is at a time on the clock of the setpoints: piece, parameters of both ends of the phase, u.
     pub fn phase_at(&mut self, time: f64) -> (usize, [f64; 2], f64) {
         let found = self.clock.phase_of(self.clock.run_of(time), time);
         let (phase, since) = found.unwrap_or((self.phase, 0.0));
@@ -165,8 +166,8 @@ impl<'a, const M: usize> Reader<'a, M> {
         first + passed.min(count.saturating_sub(1))
     }
 
-    /// When the profile arrives at a place of the reader's phase and when it leaves, in s: at stops it pauses, and the
-    /// setpoints may wait for their next period.
+    /// When the profile arrives at a place of the current phase and when it leaves it, on the clock of the setpoints, in s. Both
+    /// differ only at stops, where the profile pauses and setpoints may wait for their next period.
     fn times(&self, here: &Passage<M>, period: f64) -> [f64; 2] {
         let (clock, phase, run) = (&self.clock, self.phase, self.run);
         let phases = &clock.phases;
@@ -186,12 +187,13 @@ impl<'a, const M: usize> Reader<'a, M> {
         [from, until]
     }
 
-    /// At most how far the profile gets between `time` and being at `place`, in mm, less what may be rounding.
+    /// Upper bound of the distance that the profile moves between `time` and the time it is at `place`, in mm, less its rounding
+    /// error bound.
     pub fn late(&mut self, place: Place, time: f64, limits: &Limits<M>) -> f64 {
         let here = self.go_to(place);
         let [from, until] = self.times(&here, limits.period);
         let wait = (from - time).max(time - until).max(0.0);
-        // Summing the durations of all phases before has rounded once for each.
+        // The start time of a phase is a sum of durations, with one rounding for each phase before.
         let doubt = if here.doubt.is_nan() { 0.0 } else { here.doubt };
         let rounding = EPS * time.abs() * (self.phase as f64 + ROUNDINGS) + doubt;
         if wait <= rounding {
@@ -200,7 +202,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         let speed = length(&here.velocity.value);
         let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration.greater()));
         let most = reach(wait) - reach(rounding);
-        // A profile that creeps through a turn gets nowhere near as far.
+        // Where the profile turns slowly, the length of the path in between is a much smaller bound.
         if most > PLACE_TOLERANCE && self.columns.are_axes() {
             most.min(self.way_from(place, time).unwrap_or(most))
         } else {
@@ -208,8 +210,8 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
     }
 
-    /// At most the way along the path between a place and the profile's own place at `time`, in mm, on the piece of the
-    /// place or one beside it.
+    /// Upper bound of the length of the path between a place and the place of the profile at `time`, in mm; None unless both are
+    /// on the same piece or on consecutive ones.
     fn way_from(&mut self, place: Place, time: f64) -> Option<f64> {
         let (_, here, phase) = self.motion_at(self.run, time)?;
         let there = Place { piece: self.clock.phases.piece[phase] as usize, u: here.u };
@@ -226,11 +228,11 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
     }
 
-    /// The motion on the phase of a run that `time` falls into, where on it the profile is then, and the phase.
+    /// The motion on the phase of a run that `time` falls into, the profile at that time, and the phase. None outside the phase.
     fn motion_at(&mut self, run: usize, time: f64) -> Option<(Motion<M>, Passage<M>, usize)> {
         let (phase, since) = self.clock.phase_of(run, time)?;
         let (duration, ends) = (self.clock.phases.duration[phase], self.ends(phase));
-        // Of a profile of rubbish nothing is known.
+        // Nothing is known of a profile whose numbers are wrong.
         if !(0.0 <= since && since <= duration && ends[0] < ends[1]) {
             return None;
         }
@@ -240,15 +242,16 @@ impl<'a, const M: usize> Reader<'a, M> {
         Some((motion, here, phase))
     }
 
-    /// The acceleration of each axis at `time` in a run.
+    /// The acceleration of each axis at `time` in a run; None outside the phases of the run.
     fn acceleration_at(&mut self, run: usize, time: f64) -> Option<[f64; M]> {
         let (motion, here, _) = self.motion_at(run, time)?;
         Some(motion.acceleration(&here, &mut self.columns).value)
     }
 
-    /// How far recorded accelerations are from those of the profile, at a place of the reader's phase or, where they are not
-    /// those, at the time: where the tool creeps back from a turn, the place of a setpoint does not tell the ways to and from
-    /// it apart, which are in two runs if the tool stops there.
+    /// How far recorded accelerations are from those of the profile, for each axis; not positive within their range. They are
+    /// compared at a place of the current phase and, where that does not explain them, also at their time: where the tool creeps
+    /// back from a turn, the place does not tell whether it is before or after the turn. If the tool stops there, these are in
+    /// two runs.
     pub fn acceleration_off(
         &mut self,
         here: &Passage<M>,
@@ -270,7 +273,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         })
     }
 
-    /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's phase.
+    /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the current phase.
     fn accelerations(&mut self, here: &Passage<M>, time: f64, period: f64) -> [[f64; 2]; M] {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
         let mut include = |Rounded { value, rounding }: Rounded<M>| {
@@ -303,7 +306,7 @@ impl<'a, const M: usize> Reader<'a, M> {
             last += 1;
             neighbour(last, false);
         }
-        // At a stop the tool may stand, or already start the next run.
+        // At a stop the tool may be at rest, or may already start the next run.
         let at_start = time - starts[run.start] < switch;
         let at_end = starts[run.end - 1] + phases.duration[run.end - 1] - time < switch;
         if at_start && run.start > 0 {

@@ -4,7 +4,7 @@ use super::nearest::Place;
 use super::station::Rounded;
 use super::PLACE_TOLERANCE;
 
-/// One setpoint.
+/// One setpoint: time in s, positions in mm, and what is recorded with it.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<const M: usize> {
     pub t: f64,
@@ -12,38 +12,39 @@ pub struct Row<const M: usize> {
     pub velocity: Option<[f64; M]>,
     pub acceleration: Option<[f64; M]>,
     pub line: i32,
-    /// Its place on the path, where there is a path.
+    /// Its place on the path, where a path is known.
     pub nearest: Nearest<M>,
 }
 
 impl<const M: usize> Row<M> {
     pub fn is_finite(&self) -> bool {
-        // 0 times what is not finite is no number.
+        // 0 times a number that is not finite is NaN.
         let nothing = |of: &[f64; M]| of.iter().fold(0.0, |sum, number| sum + 0.0 * number);
         let recorded = |of: &Option<[f64; M]>| of.as_ref().map_or(0.0, nothing);
         0.0 * self.t + nothing(&self.q) + recorded(&self.velocity) + recorded(&self.acceleration) == 0.0
     }
 }
 
-/// Where a setpoint is.
+/// The place of a setpoint on the path, and the profile there.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest<const M: usize> {
     pub place: Place,
-    /// How far u went to it from the place of the setpoint before, and how far it goes to the next one if that step changes as this one.
+    /// Step of u to this place from that of the setpoint before, and the expected step to the next one (linear extrapolation of
+    /// the steps).
     pub step: f64,
     pub next_step: f64,
-    /// Greatest coordinate of the piece that the search began on, in mm, and the greatest second derivative by u of the tool's path on
-    /// that of the place, in 1/mm.
+    /// Greatest coordinate of the piece on which the search began, in mm; and an upper bound of |C''| of the tool's path on the
+    /// piece of the place, in 1/mm.
     pub magnitude: f64,
     pub bend: f64,
-    /// Distance from the path, and along it from where the profile is at that time, in mm.
+    /// Distance of the setpoint from the path, and how far along the path the profile is from the place at that time, in mm.
     pub off: f64,
     pub late: f64,
-    /// How much of `late` is allowed, in mm.
+    /// Allowed value of `late`, in mm.
     pub allowed: f64,
-    /// Of the profile there; not a number where that is not known.
+    /// Velocity of the profile at the place; NaN where it is not known.
     pub velocity: Rounded<M>,
-    /// How far a recorded acceleration is from the profile's.
+    /// Difference of the recorded acceleration from that of the profile.
     pub acceleration_off: [f64; M],
 }
 
@@ -65,7 +66,7 @@ impl<const M: usize> Default for Nearest<M> {
 }
 
 impl<const M: usize> Nearest<M> {
-    /// Whether the setpoint is on the path, where the profile is at its time.
+    /// Whether the setpoint is on the path, at the place where the profile is at its time.
     pub fn is_good(&self) -> bool {
         self.off <= PLACE_TOLERANCE && self.late <= self.allowed
     }

@@ -1,6 +1,7 @@
-//! Audits a stream of setpoints: difference quotients against the limits, and each setpoint's place on the path.
+//! Audits a stream of setpoints: difference quotients against the limits, and each setpoint against its plan.
 //!
-//! Between chunks the last few setpoints are kept, nothing else. Most setpoints change nothing that was found: `at_once` tells which.
+//! Between chunks only the last few setpoints are kept. Most setpoints cannot raise the use of any limit: `at_once` finds these
+//! quickly.
 
 pub mod at_once;
 
@@ -18,16 +19,16 @@ use super::{Check, Limits, Seen, Tally, PLACE_TOLERANCE};
 /// Setpoints before and after the one at which an acceleration is judged.
 const AROUND: usize = 3;
 
-/// Setpoints that a new one may be compared with.
+/// Number of setpoints that a new one may be compared with.
 const KEPT: usize = 2 * AROUND + 1;
 
-/// Setpoints a thread takes at a time.
+/// Setpoints that a thread takes at a time.
 const BLOCK: usize = 2048;
 
-/// Setpoints in order: times, positions of all axes, and what else is recorded.
+/// Consecutive setpoints: times in s, positions of all axes in mm, and what else is recorded.
 #[derive(Clone, Copy)]
 pub struct Chunk<'a> {
-    /// At most as many as the kernels take.
+    /// At most `M`.
     pub axes: usize,
     pub t: &'a [f64],
     pub position: &'a [f64],
@@ -49,7 +50,7 @@ impl<'a> Chunk<'a> {
         }
     }
 
-    /// Setpoint `i`, its place not yet known.
+    /// Setpoint `i`; its place on the path is not set yet.
     pub(crate) fn row<const M: usize>(&self, i: usize) -> Row<M> {
         let of = |table| vector(table, self.axes, i);
         Row {
@@ -63,14 +64,14 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// The audit of a stream.
+/// The audit of a stream; its state between chunks.
 pub struct Stream<const M: usize> {
     limits: Limits<M>,
-    /// What writing a position to a file may have changed, in mm.
+    /// Last digit of positions that were written as text, in mm.
     resolution: f64,
     kept: Vec<Row<M>>,
     count: u64,
-    /// When the runs of the plan began.
+    /// Starts of the runs of the plan on the clock of the setpoints, in s.
     clock: Vec<f64>,
     tally: Tally<M>,
 }
@@ -84,16 +85,18 @@ impl<const M: usize> Stream<M> {
         self.limits.axes
     }
 
-    /// The next setpoints; `plan` must be the same every time. What `seen` ends is of no more use.
+    /// Audits the next setpoints; `plan` must be the same in every call. After a panic of `seen` the stream must not be used
+    /// further.
     pub(crate) fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
-        // One block for each thread at a time: the rows are read twice, and stay in the caches of the processors.
+        // One block for each thread at a time: the rows are read twice and stay in the caches.
         let (count, most) = (chunk.t.len(), tracking::BLOCK * parallel::threads());
         for start in (0..count).step_by(most) {
             self.push_part(plan, &chunk.part(start..count.min(start + most)), start == 0, seen);
         }
     }
 
-    /// Where the part is not the first one of a chunk, the blocks of setpoints begin as they do inside of it, whatever their number.
+    /// Only in the first part of a chunk the search for places continues from the row before. Every other part begins like any
+    /// block of setpoints, so that the result does not depend on the number of threads.
     fn push_part(&mut self, plan: Option<&Plan>, chunk: &Chunk, is_first: bool, seen: Seen) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
@@ -121,7 +124,7 @@ impl<const M: usize> Stream<M> {
         self.kept = rows;
     }
 
-    /// The end of the stream: what the last setpoints alone can show.
+    /// Ends the stream: checks what only the last setpoints can show.
     pub(crate) fn finish(self, plan: Option<&Plan>) -> Tally<M> {
         let plan = plan.map(|plan| plan.with_clock(&self.clock));
         let plan = plan.as_ref();
@@ -141,13 +144,13 @@ impl<const M: usize> Stream<M> {
     }
 }
 
-/// Rows that can be compared with each other, and with the plan.
+/// Rows that are compared with each other and with the plan.
 struct View<'a, const M: usize> {
     differences: Differences<'a, M>,
     plan: Option<&'a Plan<'a>>,
 }
 
-/// What row `n` and those before it have in common with the next row.
+/// What is known after the check of row `n` and used for the next row.
 struct Recent<const M: usize> {
     /// The steps to rows `n` − 2, `n` − 1 and `n`.
     steps: [f64; 3],
@@ -178,7 +181,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// All that some rows show, together with those before them.
+    /// Checks a range of rows, together with the rows before them.
     fn block(&self, rows: Range<usize>, tally: &mut Tally<M>) {
         let mut comparison = self.plan.map(|plan| Comparison::new(plan, self.differences.limits));
         for start in rows.clone().step_by(at_once::COUNT) {
@@ -186,7 +189,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// The same of so many rows as are looked at at once.
+    /// Checks at most `at_once::COUNT` rows.
     fn rows(&self, rows: Range<usize>, mut comparison: Option<&mut Comparison<M>>, tally: &mut Tally<M>) {
         let unsure = match rows.start >= at_once::BEFORE {
             true => at_once::settled(&self.differences, &rows, tally),
@@ -215,7 +218,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// All that row `n` shows, together with those before it.
+    /// Fully checks row `n`, together with the rows before it.
     fn row(
         &self,
         n: usize,
@@ -237,7 +240,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// What row `n` − 1 leaves for row `n`.
+    /// The state before the check of row `n`.
     fn recent(&self, n: usize) -> Recent<M> {
         let step = |back: usize| n.checked_sub(back).map_or(0.0, |row| self.differences.step(row));
         let around = |back: usize| match n.checked_sub(back) {
@@ -247,7 +250,7 @@ impl<const M: usize> View<'_, M> {
         Recent { steps: [step(3), step(2), step(1)], accelerations: [around(4), around(3), around(2)] }
     }
 
-    /// What row `n` shows beside its plan; so long is the step to it, and so much of its distance may be rounding.
+    /// Checks row `n` against the plan; `step` is the time to it in s, `rounding` the error bound of its position in mm.
     fn compare(
         &self,
         n: usize,
@@ -264,7 +267,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// What row `n` shows together with the rows before it.
+    /// Checks the difference quotients of row `n` and the rows before it.
     fn arrival(&self, n: usize, recent: &Recent<M>, rounding: &[f64; M], tally: &mut Tally<M>) {
         let (limits, rows) = (self.differences.limits, self.differences.rows);
         let row = &rows[n];
@@ -291,7 +294,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// Every step is one period long; only the very last may be shorter.
+    /// Every step must be one period long; only the very last one may be shorter.
     fn grid(&self, n: usize, tally: &mut Tally<M>) {
         let (differences, rows) = (&self.differences, self.differences.rows);
         let (row, before, period) = (&rows[n], &rows[n - 1], differences.limits.period);
@@ -311,8 +314,8 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// Recorded velocities: their mean over a step differs from the mean velocity by at most a quarter of what
-    /// the acceleration can change in it. Recorded accelerations: within the limit.
+    /// Recorded velocities: their mean over a step may differ from the mean velocity by what the acceleration limits and a jump
+    /// explain (`mean_velocity_off`). Recorded accelerations must be within the limit.
     fn recorded(&self, n: usize, [step, per_step]: [f64; 2], rounding: &[f64; M], tally: &mut Tally<M>) {
         let (limits, rows) = (self.differences.limits, self.differences.rows);
         let (row, before) = (&rows[n], &rows[n - 1]);
@@ -332,7 +335,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// Mean jerk over three steps.
+    /// Mean jerk over three steps against its limit.
     fn jerk(&self, n: usize, recent: &Recent<M>, tally: &mut Tally<M>) {
         let (row, limits) = (&self.differences.rows[n], self.differences.limits);
         let span: f64 = recent.steps.iter().sum();
@@ -343,7 +346,7 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// The accelerations around row `c` against their limits, the jumps of velocity at corners allowed for.
+    /// The mean accelerations around row `c` against their limits, plus the allowed jumps of velocity at corners.
     fn centre(
         &self,
         c: usize,
@@ -390,7 +393,7 @@ mod tests {
             broken in 0..600_usize, what in 0..14_u8, by in -1.0..1.0_f64,
             travels: bool, records: bool, has_plan: bool, has_joints: bool, has_chord: bool,
         ) {
-            // Two axes that swing, one row broken in some way or none; from row 300 on they are on the next piece.
+            // Two axes that oscillate; one row may be changed in some way. From row 300 on, the rows are on the next piece.
             let mut rows: Vec<Row<3>> = (0..600)
                 .map(|i| {
                     let t = 1e-3 * f64::from(i);

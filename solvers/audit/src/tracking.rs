@@ -1,8 +1,8 @@
-//! Finds the place of each setpoint on the path of its plan, and when the profile is there.
+//! Finds the place of each setpoint on the path of its plan, and the time at which the profile is there.
 //!
-//! The place of a setpoint is searched along the path from the place of the one before, never backwards. Where
-//! the speed profile is known, the audit integrates when the profile reaches that place. The error along the path of a setpoint
-//! that is early or late is the way that the profile moves in that time.
+//! The place of a setpoint is searched along the path from the place of the setpoint before, never backwards. Where the speed
+//! profile is known, the audit computes by integration when the profile reaches that place; the error along the path of a
+//! setpoint that is early or late is the distance that the profile moves in the time between.
 
 mod at_once;
 
@@ -21,45 +21,45 @@ use super::rows::{Nearest, Row};
 use super::vectors::length;
 use super::{tell, Limits, Seen, PLACE_TOLERANCE};
 
-/// Setpoints a thread takes at a time.
+/// Setpoints that a thread takes at a time.
 pub const BLOCK: usize = 2048;
 
-/// After so many consecutive setpoints off the path the others of their block get the place of the last one: the verdict is
+/// After this many consecutive setpoints off the path, the rest of their block get the place of the last one: the verdict is
 /// clear, and a search for each would take very long.
 const MOST_ASTRAY: u32 = 64;
 
-/// Steps of Newton's method from a guess, and the length of the last one, in mm, where nothing is known of C''. Where that is
-/// bounded the error of the place after a step of du is no more than 3/2 |C''| du², which may be so much, in mm.
+/// Limit of the Newton steps from a guess. The last step is at most `SETTLED` mm long or, where |C''| is bounded, leaves an error
+/// of at most `MOST_ERROR` mm: after a step of du it is at most 3/2 |C''| du².
 const MOST_GUESSES: usize = 6;
 const SETTLED: f64 = 1e-7;
 const MOST_ERROR: f64 = 1e-3 * PLACE_TOLERANCE;
 
-/// Steps towards the nearest place of a phase.
+/// Limit of the steps towards the nearest place of a phase.
 const MOST_STEPS: usize = 12;
 
-/// A setpoint may lie this share of its step from its place on the path: what sampling promises.
+/// A setpoint may be this share of its step off its place along the path: the accuracy that sampling promises.
 pub const STEP_SHARE: f64 = 1e-6;
 
-/// What the setpoints of a plan follow.
+/// The plan that setpoints follow.
 #[derive(Clone, Copy)]
 pub struct Plan<'a> {
     /// At least one piece.
     pub path: Followed<'a>,
     pub profile: Option<ProfileClock<'a>>,
     pub program: Option<Programmed<'a>>,
-    /// The greatest share of its tolerance that the path has been found off the program.
+    /// The greatest distance of the path from the program that was found, as a share of the tolerance.
     pub deviation: f64,
-    /// On the same path, where the setpoints are those of joints that are not its axes.
+    /// The joints on the same path, where the setpoints are positions of joints instead of axes.
     pub joints: Option<&'a JointPath<'a>>,
 }
 
 impl<'a> Plan<'a> {
-    /// What the setpoints are of.
+    /// The axes or joints whose positions the setpoints are.
     pub fn columns<const M: usize>(&self, limits: &'a Limits<M>) -> Columns<'a, M> {
         Columns::new(&self.path, limits, self.joints)
     }
 
-    /// Distance of a setpoint from the start or the end of a piece, less rounding.
+    /// Distance of a setpoint from the start or the end of a piece, less rounding, in mm.
     pub fn distance_from_end<const M: usize>(
         &self,
         columns: &mut Columns<M>,
@@ -70,7 +70,7 @@ impl<'a> Plan<'a> {
         length(&away) - rounding(columns.count(), columns.magnitude(piece), q)
     }
 
-    /// The same plan with the starts of the runs on the clock of the setpoints.
+    /// This plan with the starts of the runs on the clock of the setpoints.
     pub fn with_clock<'b>(&self, run_starts: &'b [f64]) -> Plan<'b>
     where
         'a: 'b,
@@ -78,7 +78,7 @@ impl<'a> Plan<'a> {
         Plan { profile: self.profile.map(|profile| ProfileClock { run_starts, ..profile }), ..*self }
     }
 
-    /// Adds to the clock the starts of the runs that the rows reach.
+    /// Adds to `clock` the starts of the runs that the rows reach.
     pub fn extend_clock<const M: usize>(&self, limits: &Limits<M>, rows: &[Row<M>], clock: &mut Vec<f64>) {
         let Some(profile) = &self.profile else { return };
         let mut columns = self.columns(limits);
@@ -89,7 +89,8 @@ impl<'a> Plan<'a> {
         profile.extend(&self.path, limits.period, rows, away, clock);
     }
 
-    /// Finds the places of the rows from `old` on; `continues`: from the place of the row before them.
+    /// Finds the places of the rows from index `old` on; `continues` tells whether the first search starts from the place of the
+    /// row before.
     pub fn find_nearest<const M: usize>(
         &self,
         limits: &Limits<M>,
@@ -98,7 +99,7 @@ impl<'a> Plan<'a> {
         seen: Seen,
     ) {
         let (known, fresh) = rows.split_at_mut(old);
-        // Without a profile every search starts from the place before; with one its time says where to start.
+        // Without a profile every search starts from the place before; with one, the time of a setpoint gives the start.
         let continues = continues || self.profile.is_none();
         let block = if self.profile.is_some() { BLOCK } else { fresh.len().max(1) };
         parallel::each_part(fresh, block, &|number, rows| {
@@ -120,13 +121,14 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Rounding of the distance of a setpoint from a place, by the greatest coordinate of both.
+/// Rounding error bound of the distance of a setpoint from a place, in mm, from the greatest coordinate of both.
 fn rounding<const M: usize>(count: usize, magnitude: f64, q: &[f64; M]) -> f64 {
     let most = q.iter().fold(magnitude, |most, q| q.abs().max(most));
     ROUNDING * most * (count as f64).sqrt()
 }
 
-/// A place on a path, at such a distance from a setpoint and with such a slope, where it is not before `from`, and close.
+/// The place found for a setpoint, and its distance from it, if it is close and not before `from`, else None; `distance` is in
+/// mm, `slope` is |C'| there.
 fn good_guess(
     path: &Followed,
     from: Place,
@@ -141,38 +143,39 @@ fn good_guess(
     good.then_some((Place { piece, u }, distance))
 }
 
-/// By how much a step du of Newton's method is too great to be the last one, in mm: its length, where |C'| is `size`, and the error that
-/// it leaves, where |C''| is at most `bend`. The step is the last one where one of both is not positive.
+/// How much a Newton step du exceeds the criteria of a last step, in mm: by its length, where |C'| is `size`, and by the error
+/// that it leaves, where |C''| is at most `bend`. A step that meets one of both (not positive) is the last one.
 #[inline(always)]
 fn beyond_last<T: Number>(du: T, size: T, bend: f64) -> [T; 2] {
     [du.size() * size + -SETTLED, du * du * (1.5 * bend) + -MOST_ERROR]
 }
 
-/// The place u of a piece, or its end where rounding does not tell it from there: the profile may pause at ends.
+/// The place u of a piece, or an end of the piece within rounding of u: the profile may pause at ends.
 fn settled(u: f64, ends: [f64; 2], rounding: f64) -> f64 {
     ends.into_iter().find(|end| (end - u).abs() <= rounding).unwrap_or(u)
 }
 
-/// Finds the places of setpoints one after the other.
+/// Finds the places of setpoints, one after the other.
 struct Finder<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
-    /// Where there is no profile that has them.
+    /// The columns, where no profile holds them.
     columns: Option<Columns<'a, M>>,
     /// Greatest distance that the velocity limits allow in two periods, in mm.
     reach: f64,
-    /// Whether places are guessed at once: on phases on which v² is a cubic of the length, of joints on all. On others the places of axes
-    /// follow each other so evenly that each leads to the next one.
+    /// Whether the places of several setpoints are guessed at once: on phases where v² is a cubic of the length, and, with
+    /// joints, on all phases. On other phases the places of axes are spaced so evenly that each one predicts the next.
     guesses_cubics: bool,
     guesses_all: bool,
-    /// Guesses of the places of the next setpoints, the last one first, and the phase of the last one.
+    /// Guesses of the places of the next setpoints, the last one first; and the phase of the last guess.
     guesses: Vec<Guess>,
     phase: usize,
     room: Vec<Lanes>,
 }
 
-/// The place of the first one of so many setpoints that are `left`, its distance from there, and |C'| there.
+/// The guessed place of a setpoint, the distance of the setpoint from it in mm, and |C'| there; `left` is the number of setpoints
+/// of the block from this one on.
 struct Guess {
     left: usize,
     place: Place,
@@ -202,10 +205,11 @@ impl<'a, const M: usize> Finder<'a, M> {
         }
     }
 
-    /// The place of the first one of some setpoints, which follow `previous`.
+    /// The place of the first one of `rows`, which follow `previous`.
     fn find(&mut self, previous: Option<&Row<M>>, rows: &[Row<M>]) -> Nearest<M> {
         let (path, limits, row) = (&self.plan.path, self.limits, &rows[0]);
-        // From the place of the setpoint before; where that is not good, from the profile's place one period earlier.
+        // Starts from the place of the setpoint before or, where that is not good, from the place of the profile one period
+        // earlier.
         let known = previous.filter(|before| {
             self.profile.is_none()
                 || (before.nearest.is_good() && (row.t - before.t).abs() <= 2.0 * limits.period)
@@ -249,7 +253,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         if let Some(profile) = &mut self.profile {
             let here = profile.go_to(place);
             nearest.velocity = here.velocity;
-            // Quotients of joints take as long as all else.
+            // Accelerations of joints would take as long as all the rest: they are used only if they are known.
             let is_known = (are_axes || here.acceleration.is_some()) && nearest.is_good();
             if let Some(recorded) = row.acceleration.filter(|_| is_known) {
                 nearest.acceleration_off = profile.acceleration_off(&here, row.t, &recorded, limits);
@@ -258,8 +262,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         nearest
     }
 
-    /// The step of u from one place to the next, and how far it goes on from there if that step changes as this one did from the step
-    /// before.
+    /// The step of u from one place to the next, and the expected next step: the change of the steps is extrapolated.
     fn steps(&self, from: Place, place: Place, before: f64) -> [f64; 2] {
         // The parameter of every piece is in mm.
         let passed = if place.piece == from.piece { 0.0 } else { self.plan.path.width[from.piece] };
@@ -267,8 +270,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         [step, if before > 0.0 { (2.0 * step - before).max(0.0) } else { step }]
     }
 
-    /// The place of the first one of some setpoints and its distance: from about where the profile is at its time or, where that leads
-    /// nowhere, from the place one more step ahead.
+    /// The place of the first one of `rows` and the distance from it in mm, by Newton's method from the approximate place of the
+    /// profile at its time or, if that fails, from the place `step` ahead of `from`.
     fn next_guess(&mut self, from: Place, step: f64, rows: &[Row<M>], rounding: f64) -> Option<(Place, f64)> {
         if self.guesses.last().is_none_or(|guess| guess.left != rows.len()) {
             self.guess_at_once(rows);
@@ -280,8 +283,8 @@ impl<'a, const M: usize> Finder<'a, M> {
             .or_else(|| self.guess(from, step, &rows[0].q, rounding))
     }
 
-    /// Guesses the places of those of some setpoints that are on one piece with the first one, and reads the profile there. What is
-    /// guessed of one does not depend on the others.
+    /// Guesses the places of those of `rows` that are on the same piece as the first one, and evaluates the profile there. Each
+    /// guess is independent of the others.
     fn guess_at_once(&mut self, rows: &[Row<M>]) {
         self.guesses.clear();
         let guesses = self.guesses_cubics || self.guesses_all;
@@ -328,8 +331,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         row.t.is_finite() && row.q.iter().all(|q| q.is_finite())
     }
 
-    /// The place of a setpoint and its distance, by Newton's method from the place one more step ahead; none where that does not
-    /// converge ahead of `from` or is not close.
+    /// The place of a setpoint and its distance in mm, by Newton's method from the place `step` ahead of `from`; None where that
+    /// does not converge, or leads to a place before `from` or not close.
     fn guess(&mut self, from: Place, step: f64, q: &[f64; M], rounding: f64) -> Option<(Place, f64)> {
         let (path, columns) = (&self.plan.path, self.columns());
         let pieces = [from.piece, path.len() - 1];
@@ -354,7 +357,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         None
     }
 
-    /// The place nearest to a setpoint on the phase that the profile is on at its time, where nothing else leads to one.
+    /// The place nearest to a setpoint on the phase of the profile at its time: used for joints where no guess succeeds.
     fn by_time(&mut self, from: Place, row: &Row<M>, rounding: f64) -> Found {
         let Some(profile) = &mut self.profile else {
             return Found { place: from, distance: f64::INFINITY, error: f64::INFINITY };
@@ -365,7 +368,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         for _ in 0..MOST_STEPS {
             let step = step_towards(&away, &slope);
             let next = (u + if step.is_nan() { 0.0 } else { step }).clamp(ends[0], ends[1]);
-            // Steps below the rounding of the place would change the time next to rest.
+            // Steps below the rounding error of the place would change the time considerably near rest.
             if step.abs() * length(&slope) <= rounding || next == u {
                 break;
             }
@@ -383,7 +386,7 @@ impl<'a, const M: usize> Finder<'a, M> {
     }
 }
 
-/// Whether two setpoints are one time step apart. Others are judged by their times alone.
+/// Whether two setpoints are one time step apart, at most two periods. For others only the times are checked.
 pub fn is_step(from: f64, to: f64, period: f64) -> bool {
     to > from && to - from <= 2.0 * period
 }

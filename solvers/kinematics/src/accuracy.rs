@@ -1,40 +1,40 @@
-//! The error that the stand-ins of q'' may have on a part of a piece, from the limits of the machine and the feed.
+//! The allowed error of the interpolants of q'' on a part of a piece, from the limits of the machine and the feed.
 //!
-//! Three things must be met within their tolerances: the acceleration of each joint, at every speed that the other limits
-//! allow; the positions; and the squares of the tool's speeds that are interpolated.
+//! Three quantities must be accurate within their tolerances: the acceleration of each joint, at every speed that the other
+//! limits allow; the positions; and the interpolated squares of speeds of the tool.
 
 use super::expression::Table;
 use super::path_derivatives::PointWork;
 use super::tip::{Polygons, Tips};
 use super::tolerance::{ACCELERATION, MARGIN, POSITION, ROUNDING, SAMPLES, SPEED_NOISE};
 
-/// The error that q'' may have.
+/// The allowed error of q''.
 #[derive(Clone)]
 pub enum Tolerance<'a> {
-    /// This for each joint.
+    /// A given error for each joint.
     Given(&'a [f64]),
-    /// What the limits of a machine allow.
+    /// The error that follows from the limits of a machine.
     Limited(Box<Accuracy<'a>>),
 }
 
-/// Limits of the joints, the feed, and the squares of speeds that must be met.
+/// Limits of the joints, the feed, and the squares of speeds to be interpolated.
 #[derive(Clone)]
 pub struct Accuracy<'a> {
-    /// For each joint the lesser limit of both directions.
+    /// For each joint the smaller limit of both directions.
     pub acceleration: &'a [f64],
     /// For each joint the least and the greatest velocity.
     pub velocity: [&'a [f64]; 2],
     /// For each piece, in mm/s.
     pub feed: &'a [f64],
-    /// The tool in X, Y, Z, and true for the pieces that move it there.
+    /// The path of the tool in X, Y, Z; and for each piece whether the tool moves on it.
     pub linear: Motion<'a>,
     pub moves: &'a [bool],
     pub squares: Vec<Square<'a>>,
     pub speed_nodes: SpeedNodes<'a>,
 }
 
-/// Interpolation of squares of speeds: the nodes in [0, 1]; the points between them where the interpolant is compared; the
-/// matrix from the values at the nodes to those at the points, row by row; and the relative error that is allowed.
+/// The interpolation of squares of speeds: the nodes in [0, 1]; the points between them where the interpolant is checked; the
+/// matrix from the values at the nodes to those at the points, row by row; and the allowed relative error.
 #[derive(Clone, Copy)]
 pub struct SpeedNodes<'a> {
     pub at: &'a [f64],
@@ -43,18 +43,18 @@ pub struct SpeedNodes<'a> {
     pub share: f64,
 }
 
-/// The square of a speed by u that is interpolated on some pieces: |C'|², or the square of the rate, in degrees, at which
-/// the direction of a vector turns.
+/// The square of a speed by u that is interpolated on some pieces: |C'|², or the square of the rate at which the direction of a
+/// vector turns, in degrees by u.
 #[derive(Clone)]
 pub struct Square<'a> {
     pub motion: Motion<'a>,
     pub turning: bool,
     pub pieces: &'a [bool],
-    /// A piece, and about the greatest value on it; kept for the parts of that piece.
+    /// A piece and the approximate greatest value on it; kept for all parts of the piece.
     pub greatest: Option<(usize, f64)>,
 }
 
-/// Position and slope of curves with any number of axes.
+/// Position and first derivative of curves with any number of axes.
 pub struct Motion<'a> {
     tips: Tips<'a>,
     polygons: Polygons<f64>,
@@ -93,7 +93,8 @@ impl Clone for Motion<'_> {
 }
 
 impl Tolerance<'_> {
-    /// The error that q'' of each joint may have on a part; 0 where the square of a speed is not met.
+    /// The allowed error of q'' of each joint on a part; 0 where the square of a speed is not accurate enough, so that the part
+    /// is halved.
     pub fn allowed(&mut self, points: &mut PointWork, piece: usize, part: [f64; 2], allowed: &mut [f64]) {
         match self {
             Tolerance::Given(tolerance) => allowed.copy_from_slice(tolerance),
@@ -109,7 +110,7 @@ impl Accuracy<'_> {
             allowed.fill(0.0);
             return;
         }
-        // About the greatest u̇² that feed and joint velocities allow, and |q''| as `allowed`.
+        // The approximate greatest u̇² that feed and joint velocities allow; meanwhile `allowed` holds the greatest |q''|.
         let mut greatest = 0.0f64;
         allowed.fill(0.0);
         for t in SAMPLES {
@@ -135,7 +136,7 @@ impl Accuracy<'_> {
         for (joint, allowed) in allowed.iter_mut().enumerate() {
             let wanted =
                 (ACCELERATION * self.acceleration[joint] / rate_sq).min(POSITION / (length * length));
-            // Near a cusp u̇² is not bounded, and no stand-in is better than rounding.
+            // Near a cusp u̇² is unbounded, and no interpolant is more accurate than rounding.
             *allowed = wanted.max(ROUNDING * *allowed);
         }
     }
@@ -150,7 +151,7 @@ impl Square<'_> {
         }
     }
 
-    /// True where the interpolant on a part is met between its nodes, where its error is greatest.
+    /// Whether the interpolant on a part is accurate enough between its nodes, where its error is greatest.
     fn is_met(&mut self, piece: usize, part: [f64; 2], nodes: SpeedNodes) -> bool {
         if !self.pieces[piece] {
             return true;
@@ -158,7 +159,7 @@ impl Square<'_> {
         let mut along = |t: f64| self.at(piece, part[0] + t * (part[1] - part[0]));
         let found: Vec<f64> = nodes.at.iter().map(|&t| along(t)).collect();
         let truth: Vec<f64> = nodes.between.iter().map(|&t| along(t)).collect();
-        // Near a cusp the speed is nothing but rounding, and the feed does not limit it.
+        // Near a cusp the computed speed is only rounding, and the feed does not limit it.
         let floor = SPEED_NOISE * self.greatest(piece, nodes.at);
         let rows = nodes.interpolation.chunks_exact(found.len());
         rows.zip(truth).all(|(row, truth)| {
@@ -167,7 +168,7 @@ impl Square<'_> {
         })
     }
 
-    /// About the greatest value on a piece.
+    /// The approximate greatest value on a piece, from the nodes.
     fn greatest(&mut self, piece: usize, nodes: &[f64]) -> f64 {
         match self.greatest {
             Some((known, value)) if known == piece => value,

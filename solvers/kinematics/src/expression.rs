@@ -37,8 +37,8 @@ pub struct Expression {
 }
 
 impl Expression {
-    /// From a row (code, first operand, second operand) and a constant for each operation. None where an operand is not an
-    /// earlier result, or a code is not known.
+    /// From one row (code, first operand, second operand) and one constant for each operation. None where an operand is not an
+    /// earlier result or a code is unknown.
     pub fn new(inputs: usize, rows: &[[i32; 3]], constants: &[f64], outputs: &[i32]) -> Option<Self> {
         let mut operations = Vec::with_capacity(rows.len());
         for (i, (row, &constant)) in rows.iter().zip(constants).enumerate() {
@@ -83,12 +83,12 @@ impl Expression {
         self.outputs.len()
     }
 
-    /// A table for the series of all results to an order.
+    /// A table for the series of all results up to an order.
     pub fn table<T: Number>(&self, order: usize) -> Table<T> {
         Table::new(self.inputs + self.operations.len(), order)
     }
 
-    /// Evaluates all operations on the inputs that are in the table.
+    /// Evaluates all operations on the inputs in the table.
     pub fn evaluate<T: Number>(&self, table: &mut Table<T>) {
         let n = table.terms;
         for (i, &operation) in self.operations.iter().enumerate() {
@@ -132,7 +132,7 @@ impl Expression {
 
 /// The series of the inputs and of all results, one after another.
 pub struct Table<T> {
-    /// Terms of a series.
+    /// Number of terms of each series.
     pub terms: usize,
     values: Vec<T>,
 }

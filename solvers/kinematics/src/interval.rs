@@ -1,6 +1,6 @@
-//! The elementary functions of intervals, and the sum of products with one bound of its rounding.
+//! The elementary functions of intervals, and sums of products with a single rounding bound.
 //!
-//! A result that is not defined, as the angle of a box with the origin in it, is the whole line.
+//! An undefined result, such as the angle of a box that contains the origin, is the whole line.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use super::tolerance::{ELEMENTARY_ULPS, STRAIGHT};
 use feedplan_geometry::interval::{greater, Interval};
 use feedplan_geometry::tolerance::UNDERFLOW;
 
-/// π/180 and 180/π between neighbouring floating-point numbers.
+/// π/180 and 180/π, between neighbouring floating-point numbers.
 const RADIAN: Interval = Interval { lo: 0.017453292519943295, hi: 0.0174532925199433 };
 const DEGREE: Interval = Interval { lo: 57.295779513082316, hi: 57.29577951308232 };
 
@@ -36,8 +36,8 @@ impl Number for Interval {
 
     /// The angle at the origin of all points of the box x × y, continuous over the box.
     ///
-    /// The angle of the middle of the box is in (−π, π]; the ends may be outside. The angles of a box without the origin
-    /// span less than π, from one of its corners to another.
+    /// The angle of the middle of the box is in (−π, π]; the ends may be outside that range. The angles of a box without the
+    /// origin span less than π, from one of its corners to another.
     fn atan2(y: Self, x: Self) -> Self {
         if x.lo <= 0.0 && x.hi >= 0.0 && y.lo <= 0.0 && y.hi >= 0.0 {
             return Interval::WHOLE;
@@ -64,9 +64,9 @@ impl Number for Interval {
         self * DEGREE
     }
 
-    /// With one rounding bound for the whole sum: n products and their sum in any order have an error of at most
-    /// n u Σ|products| to first order, u = ε/2 (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section
-    /// 3.1); twice that covers the higher orders.
+    /// Uses one rounding bound for the whole sum: n products and their sum in any order have an error of at most n u Σ|products|
+    /// to first order, u = ε/2 (Higham, Accuracy and Stability of Numerical Algorithms, 2002, section 3.1); twice that covers the
+    /// higher orders.
     fn dot(pairs: impl Iterator<Item = (Self, Self)>) -> Self {
         let (mut lo, mut hi, mut size, mut sum, mut terms) = (0.0, 0.0, 0.0, 0.0, 2.0);
         for (a, b) in pairs {
@@ -85,13 +85,13 @@ impl Number for Interval {
     }
 }
 
-/// The range of a sine wave with its crests at `crest` + whole turns, and with these values at both ends.
+/// The range on an interval of a sine wave with its crests at `crest` plus whole turns; its values at both ends are known.
 fn wave(angle: Interval, crest: f64, at_lo: f64, at_hi: f64) -> Interval {
     if !angle.is_bounded() {
         return Interval { lo: -1.0, hi: 1.0 };
     }
     let found = Interval::rounded(at_lo.min(at_hi), at_lo.max(at_hi), ELEMENTARY_ULPS, UNDERFLOW);
-    // The angles in turns, widened by more than their rounding: a crest that is counted by mistake costs only width.
+    // The angles in turns, widened by more than their rounding: a crest that is counted by mistake only makes the result wider.
     let [first, last] = [angle.lo, angle.hi].map(|end| end / TAU - crest);
     let slack = 4.0 * f64::EPSILON * (1.0 + first.abs().max(last.abs()));
     let (first, last) = (first - slack, last + slack);

@@ -1,13 +1,13 @@
-//! The stand-ins of joint motion: polynomials for q'(u), with a proven bound of their error.
+//! Polynomials that approximate q'(u) of each joint, with a proven error bound.
 //!
-//! q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
-//! c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u, by the interpolation error formula
+//! q'' is interpolated at n Chebyshev points and integrated from the exact q' at the start of the part. Over a part of width h in
+//! u, with c ≥ |q^(n+2)|/(n + 1)!, the interpolation error formula gives
 //! ```text
 //! |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
 //! ```
-//! so a joint's acceleration q' s + q'' p is met within ε₁ |s| + ε₂ p. q'' is interpolated rather than q', because the
-//! derivative of an interpolant has an error n² times as large. Parts are halved until ε₂ is small enough. Rounding, which
-//! is not in ε, adds some 1e-14 of the largest |q''| of the part.
+//! so the error of a joint's acceleration q' s + q'' p is at most ε₁ |s| + ε₂ p. q'' is interpolated rather than q', because the
+//! error of the derivative of an interpolant is n² times as large. Parts are halved until ε₂ is small enough. Rounding errors,
+//! some 1e-14 of the greatest |q''| of the part, are not included in ε.
 
 use rayon::prelude::*;
 
@@ -25,18 +25,18 @@ pub struct Interpolants {
     pub part: Vec<[f64; 2]>,
     /// Bernstein coefficients of q', of degree n: part by part, coefficient by coefficient, joint by joint.
     pub slope: Vec<f64>,
-    /// ε₂, part by part, joint by joint; infinite on parts near a singular place.
+    /// ε₂, part by part, joint by joint; infinite on parts near a singular place, where halving has not made it small enough.
     pub curvature_error: Vec<f64>,
 }
 
-/// The nodes in [0, 1] where q'' is interpolated, and the matrix from values there to Bernstein coefficients, row by row.
+/// The nodes in [0, 1] where q'' is interpolated, and the matrix from the values there to Bernstein coefficients, row by row.
 #[derive(Clone, Copy)]
 pub struct Nodes<'a> {
     pub at: &'a [f64],
     pub to_bernstein: &'a [f64],
 }
 
-/// Interpolants with ε₂ within a tolerance.
+/// Interpolants whose ε₂ is within the tolerance.
 pub fn interpolants(machine: Machine, tips: Tips, nodes: Nodes, tolerance: &Tolerance) -> Interpolants {
     let blocks: Vec<Interpolants> = (0..tips.len().div_ceil(BLOCK))
         .into_par_iter()
@@ -76,7 +76,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Adds the parts of one piece.
+    /// Adds the interpolants on one piece.
     fn piece(&mut self, piece: usize, found: &mut Interpolants) {
         let joints = self.machine.joints.outputs();
         let nodes = self.nodes.at.len();

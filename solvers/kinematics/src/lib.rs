@@ -1,4 +1,4 @@
-//! The motion of joints that follow the tool's tip, q = K(P), from the recorded operations of K and the path of the tip.
+//! The motion q = K(P) of joints that follow the path P of the tool tip, from the recorded operations of K and the pieces of P.
 //!
 //! Sources: Griewank and Walther, Evaluating Derivatives (2008); Moore, Kearfott and Cloud, Introduction to Interval
 //! Analysis (2009).
@@ -8,8 +8,8 @@
 //! | `expression` | K on series of numbers or of intervals (`number`, `interval`, `series`) |
 //! | `tip` | Taylor series of the tip's path, at a point or over a part of a piece |
 //! | `path_derivatives` | joint positions and derivatives at points, and proven bounds of them over parts |
-//! | `singularities` | the joints along a whole path, the places that they cannot pass, the ends of their travel |
-//! | `joint_interpolants` | polynomials that stand in for joint motion, with a proven error (`accuracy`) |
+//! | `singularities` | the joints along a whole path, the singular places, the places where joints leave their travel |
+//! | `joint_interpolants` | polynomials that approximate the joint motion, with a proven error (`accuracy`) |
 //! | `tolerance` | every tolerance, with its reason |
 
 pub mod accuracy;

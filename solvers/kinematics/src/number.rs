@@ -1,4 +1,4 @@
-//! The coefficients of a series: numbers, or intervals that hold them.
+//! The type of the coefficients of a series: numbers, or intervals that contain them.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -22,9 +22,9 @@ pub trait Number:
     fn sin_cos(self) -> (Self, Self);
     /// The angle in radians of the vector (x, y).
     fn atan2(y: Self, x: Self) -> Self;
-    /// Degrees as radians.
+    /// Converts degrees to radians.
     fn radians(self) -> Self;
-    /// Radians as degrees.
+    /// Converts radians to degrees.
     fn degrees(self) -> Self;
     /// Σ a b.
     fn dot(pairs: impl Iterator<Item = (Self, Self)>) -> Self;

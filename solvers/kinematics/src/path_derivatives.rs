@@ -1,7 +1,7 @@
 //! Joint motion along the pieces of a tip path: exact derivatives at points, proven bounds over parts.
 //!
-//! The series t_k over a part bounds each coefficient alone. Taylor's theorem about the middle u_m of the part makes the
-//! bounds of all orders below the highest, m, nearly as narrow as the range:
+//! The series over a part bounds each coefficient t_k alone. Taylor's theorem about the middle u_m of the part makes the bounds
+//! of all orders below the highest, m, nearly as narrow as the true range:
 //! ```text
 //! t_k(u) ∈ Σ_{j<m−k} C(k+j, j) t_{k+j}(u_m) [−r, r]^j + C(m, k) T_m [−r, r]^{m−k},   T_m ∋ t_m, r half the width
 //! ```
@@ -16,17 +16,17 @@ use feedplan_geometry::interval::Interval;
 
 pub const TURN: f64 = 360.0;
 const HALF_TURN: f64 = 180.0;
-/// The number of points or pieces that one thread takes at a time.
+/// Number of points or pieces that a thread takes at a time.
 pub const BLOCK: usize = 64;
 
-/// A machine: its joints by tip coordinates, and true for joints that are angles, known up to whole turns.
+/// A machine: its joints as functions of tip coordinates, and for each joint whether it is an angle, known up to whole turns.
 #[derive(Clone, Copy)]
 pub struct Machine<'a> {
     pub joints: &'a Expression,
     pub turning: &'a [bool],
 }
 
-/// Derivatives at points of pieces.
+/// Derivatives of joints at points of pieces.
 pub struct PointWork<'a> {
     machine: Machine<'a>,
     tips: Tips<'a>,
@@ -40,7 +40,7 @@ impl<'a> PointWork<'a> {
         Self { machine, tips, polygons: Polygons::new(&tips, order), table }
     }
 
-    /// The parameter interval of a piece.
+    /// The length of the parameter interval of a piece.
     pub fn width(&self, piece: usize) -> f64 {
         self.tips.width[piece]
     }
@@ -51,7 +51,7 @@ impl<'a> PointWork<'a> {
         self.machine.joints.evaluate(&mut self.table);
     }
 
-    /// A derivative q^(order) of a joint there.
+    /// A derivative q^(order) of a joint at the point evaluated last.
     pub fn derivative(&self, joint: usize, order: usize) -> f64 {
         let factorial: f64 = (1..=order).map(|k| k as f64).product();
         self.machine.joints.output(&self.table, joint)[order] * factorial
@@ -80,7 +80,7 @@ pub fn derivatives(machine: Machine, tips: Tips, fraction: &[f64], order: usize)
     result
 }
 
-/// Positions at tips (n, axes): tip by tip, joint by joint.
+/// Joint positions at tips of shape (n, axes): tip by tip, joint by joint.
 pub fn positions(joints: &Expression, tips: &[f64]) -> Vec<f64> {
     let (axes, outputs) = (joints.inputs(), joints.outputs());
     let mut result = vec![0.0; tips.len() / axes * outputs];
@@ -100,7 +100,7 @@ pub fn positions(joints: &Expression, tips: &[f64]) -> Vec<f64> {
     result
 }
 
-/// Bounds over parts of pieces.
+/// Bounds of joint derivatives over parts of pieces.
 pub struct PartWork<'a> {
     machine: Machine<'a>,
     tips: Tips<'a>,
@@ -142,7 +142,7 @@ impl<'a> PartWork<'a> {
     /// c ≥ |q^(n+2)|/(n + 1)! of all joints over a part, where n + 2 is the order; infinite where K may be singular on the
     /// part.
     ///
-    /// From the series over the part alone: Taylor's theorem would need higher orders, at twice the cost for a third fewer
+    /// From the series over the part alone: using Taylor's theorem would need higher orders, at twice the cost, for a third fewer
     /// parts.
     pub fn constants(&mut self, piece: usize, part: [f64; 2], result: &mut [f64]) {
         let expression = self.machine.joints;
@@ -184,7 +184,7 @@ fn powers(radius: f64, order: usize) -> [Interval; MOST_ORDER + 1] {
     powers
 }
 
-/// The bound of coefficient k by both the series over the part and Taylor's theorem about its middle.
+/// The bound of coefficient k: the intersection of those by the series over the part and by Taylor's theorem about its middle.
 fn narrowed(
     whole: &[Interval],
     middle: &[Interval],
@@ -203,7 +203,7 @@ fn narrowed(
     whole[k].meet(value)
 }
 
-/// An angle moved by whole turns to the turn of `like`; unbounded where the widths leave the turn open.
+/// Moves an angle by whole turns to the turn of `like`; unbounded where the widths do not determine the turn.
 fn on_turn_of(value: Interval, like: Interval) -> Interval {
     if value.width() + like.width() >= 2.0 * HALF_TURN {
         return Interval::WHOLE;
@@ -225,7 +225,7 @@ pub fn turns_between(difference: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// 220 degrees is in [100, 250], and as −140 in [−150, 150]: their meeting would lose it.
+    /// 220 degrees is in [100, 250] and, as −140, in [−150, 150]: the intersection of these ranges would lose it.
     #[test]
     fn two_wide_ranges_of_an_angle_are_not_put_on_one_turn() {
         let range = |lo, hi| Interval { lo, hi };

@@ -9,8 +9,8 @@
 //! s_k = (1/k) Σ_{0<j≤k} j f_j c_{k−j},   c_k = −(1/k) Σ_{0<j≤k} j f_j s_{k−j}      (sine, cosine of f)
 //! a_k = (n_{k−1} − Σ_{0<j<k} j a_j d_{k−j}) / (k d_0),   d = x² + y²,  n = x y' − y x'      (atan2(y, x))
 //! ```
-//! Over intervals that hold f_k for every u of a piece, the result holds q_k for every u of the piece (Moore 1966;
-//! Tucker, Validated Numerics, 2011, chapter 6). A slice is a series to the order of its length less one.
+//! Over intervals that contain f_k for every u of a piece, each result contains its coefficient for every u of the piece (Moore
+//! 1966; Tucker, Validated Numerics, 2011, chapter 6). A slice of length n is a series of order n − 1.
 
 use super::number::Number;
 
@@ -39,7 +39,7 @@ pub fn product<T: Number>(f: &[T], g: &[T], out: &mut [T]) {
     }
 }
 
-/// Coefficient k of f², with half the products; an interval that is squared never becomes negative.
+/// Coefficient k of f², from half of the products; the square of an interval is never negative.
 #[inline]
 fn square_term<T: Number>(f: &[T], k: usize) -> T {
     let half = k.div_ceil(2);
@@ -86,7 +86,7 @@ pub fn sin_cos<T: Number>(f: &[T], sine: &mut [T], cosine: &mut [T]) {
     }
 }
 
-/// The angle of the vector (x, y); over intervals it is continuous on the whole part.
+/// The angle of the vector (x, y) in radians; over intervals it is continuous on the whole part.
 pub fn atan2<T: Number>(y: &[T], x: &[T], out: &mut [T]) {
     let (x_slope, y_slope) = (slopes(x), slopes(y));
     let mut distance = [T::exactly(0.0); MOST_ORDER + 1];

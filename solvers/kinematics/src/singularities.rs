@@ -1,9 +1,10 @@
-//! Joint positions along a whole tip path, with continuous angles, singular places and ends of travel.
+//! Joint positions along a whole tip path, with continuous angles, singular places, and the places where joints leave their
+//! travel.
 //!
-//! Pieces are halved until interval arithmetic proves on each part that K is differentiable and that no angle changes by
-//! half a turn or more. Then the angle at any point of the part is known up to one number of turns, and parts are joined at
-//! their ends. A part of 2⁻³⁰ of a piece on which this is not proven is a singular place: K is singular within that
-//! distance. A joint leaves its travel where its whole range on a part is outside.
+//! Pieces are halved until interval arithmetic proves on each part that K is differentiable and that no angle changes by half a
+//! turn or more. Then the angle at any point of the part is known up to one number of turns, which is found by joining the ends
+//! of the parts. A part of 2⁻³⁰ of a piece on which this is not proven is a singular place: K is singular within that distance. A
+//! joint leaves its travel where its whole range on a part is outside.
 
 use std::ops::Range;
 
@@ -14,10 +15,10 @@ use super::tip::Tips;
 use super::tolerance::{DEEPEST, INTERVAL_DEPTH, INTERVAL_PARTS, TRAVEL};
 use feedplan_geometry::interval::Interval;
 
-/// The order of the series over parts: the second makes the bounds of positions and slopes narrow.
+/// The order of the series over parts: second derivatives make the bounds of positions and slopes narrow.
 const ORDER: usize = 2;
 
-/// The first place in a piece where a joint leaves its travel, and its farthest position in the piece.
+/// The first place in a piece where a joint leaves its travel, its farthest position in the piece, and the limit that it passes.
 #[derive(Clone, Copy, Debug)]
 pub struct Overrun {
     pub piece: usize,
@@ -27,15 +28,15 @@ pub struct Overrun {
     pub limit: f64,
 }
 
-/// The parts of a path on which the joints are smooth, in order; the singular places; the overruns.
+/// All parts of a path in order, each with smooth joints or else singular; the singular places; and the overruns of travel.
 #[derive(Debug, Default)]
 pub struct JointPath {
     pub piece: Vec<usize>,
     /// Fractions of the pieces.
     pub part: Vec<[f64; 2]>,
-    /// The range of each joint on each part, angles with their turns: part by part, joint by joint.
+    /// The range of each joint on each part, angles with their whole turns: part by part, joint by joint.
     pub range: Vec<Interval>,
-    /// Piece and fraction of singular places, one for each row of neighbours.
+    /// Piece and fraction of the singular places, one for each group of neighbouring parts.
     pub singular: Vec<(usize, f64)>,
     pub overruns: Vec<Overrun>,
 }
@@ -54,8 +55,9 @@ pub fn halves([a, b]: [f64; 2]) -> [[f64; 2]; 2] {
 
 /// The joints along pieces joined end to end.
 ///
-/// Angles begin on the turn nearest to `start`, the joints before the path. Without it they begin on a turn that keeps the
-/// whole path within `travel`, the least and the greatest position of each joint; if there is no such turn, as K has them.
+/// Angles begin on the turn nearest to `start`, the joint positions before the path. Without `start` they begin on a turn that
+/// keeps the whole path within `travel`, the least and the greatest position of each joint; if there is none, with the angle that
+/// K gives.
 pub fn joint_path(
     machine: Machine,
     tips: Tips,
@@ -80,7 +82,7 @@ pub fn joint_path(
     path.join(machine, tips);
     path.begin_on_turn(machine, travel, start);
     if let Some(travel) = travel {
-        // Rows of a piece follow each other.
+        // The rows of a piece are consecutive.
         let rows: Vec<Range<usize>> = path
             .piece
             .chunk_by(|a, b| a == b)
@@ -101,8 +103,8 @@ pub fn joint_path(
     path
 }
 
-/// The parts of a piece on which K and K' are bounded and angles change by less than half a turn, and the middles of parts
-/// for which this is not proven, one for each row of neighbours.
+/// Divides a piece into parts on which K and K' are bounded and angles change by less than half a turn, and smallest parts for
+/// which this is not proven. Returns all parts in order, and the middles of the unproven ones, one for each group of neighbours.
 fn smooth_parts(machine: Machine, work: &mut PartWork, piece: usize) -> (Vec<Part>, Vec<f64>) {
     let joints = machine.joints.outputs();
     let mut bounds = vec![Interval::WHOLE; (ORDER + 1) * joints];
@@ -151,7 +153,7 @@ impl JointPath {
     fn join(&mut self, machine: Machine, tips: Tips) {
         let joints = machine.joints.outputs();
         let mut points = PointWork::new(machine, tips, 0);
-        // The end of the part before, not yet moved, and the turns so far.
+        // The end of the part before, without the turns of joining; and these turns so far.
         let mut ended = vec![f64::NAN; joints];
         let mut turns = vec![0.0; joints];
         for (row, (&piece, part)) in self.piece.iter().zip(&self.part).enumerate() {
@@ -161,7 +163,7 @@ impl JointPath {
                 points.at(piece, fraction);
                 for joint in 0..joints {
                     let principal = points.derivative(joint, 0);
-                    // The range of a singular part may have no middle: its ends are those of K.
+                    // The range of a singular part may be unbounded and have no middle: its ends are the angles of K.
                     let is_moved = machine.turning[joint] && range[joint].is_bounded();
                     let away = if is_moved { range[joint].middle() - principal } else { 0.0 };
                     end[joint] = principal + turns_between(away) * TURN;
@@ -178,7 +180,7 @@ impl JointPath {
         }
     }
 
-    /// Moves all angles together: near `start`, or else into the travel.
+    /// Moves all angles of a joint by the same number of turns: near `start`, or else into the travel.
     fn begin_on_turn(&mut self, machine: Machine, travel: Option<&[[f64; 2]]>, start: Option<&[f64]>) {
         let joints = machine.joints.outputs();
         for joint in (0..joints).filter(|&joint| machine.turning[joint]) {
@@ -201,7 +203,7 @@ fn moved(range: Interval, turns: f64) -> Interval {
     range + Interval::exactly(turns * TURN)
 }
 
-/// The least number of turns that brings all bounded ranges into the travel; 0 where none does.
+/// The number of turns nearest to 0 that brings all bounded ranges into the travel; 0 if there is none.
 fn turns_into<'a>([lo, hi]: [f64; 2], ranges: impl Iterator<Item = &'a Interval>) -> f64 {
     let known = ranges.filter(|range| range.is_bounded()).copied().reduce(Interval::hull);
     let Some(Interval { lo: least, hi: most }) = known else { return 0.0 };
@@ -216,7 +218,7 @@ fn turns_into<'a>([lo, hi]: [f64; 2], ranges: impl Iterator<Item = &'a Interval>
     }
 }
 
-/// The first overrun of each joint in a piece, with the farthest value found in the piece.
+/// The first overrun of each joint in a piece, with the farthest position found in the piece.
 fn overruns(
     machine: Machine,
     work: &mut PartWork,
@@ -228,7 +230,7 @@ fn overruns(
     let joints = machine.joints.outputs();
     let limits = |joint: usize| [travel[joint][0] - TRAVEL, travel[joint][1] + TRAVEL];
     let mut bounds = vec![Interval::WHOLE; (ORDER + 1) * joints];
-    // For each joint: the first place, the farthest position, and its distance from the travel.
+    // For each joint the first place, the farthest position, and its distance beyond the travel.
     let mut found: Vec<Option<(f64, f64, f64)>> = vec![None; joints];
     for _ in 0..DEEPEST {
         let mut halved = Vec::new();
@@ -288,7 +290,7 @@ mod tests {
     use super::*;
     use crate::expression::Expression;
 
-    /// An angle in degrees about the origin, and the distance from it.
+    /// The angle of a point about the origin in degrees, and its distance from the origin.
     fn column() -> Expression {
         let rows = [[12, 1, 0], [14, 2, 0], [8, 0, 0], [8, 1, 0], [2, 4, 5], [9, 6, 0]];
         Expression::new(2, &rows, &[0.0; 6], &[3, 7]).expect("a list in order")

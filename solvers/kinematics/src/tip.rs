@@ -11,19 +11,19 @@ pub const MOST_POINTS: usize = 16;
 /// The pieces of a path, all with the same number of control points.
 #[derive(Clone, Copy)]
 pub struct Tips<'a> {
-    /// Coordinates of a point.
+    /// Coordinates of each point.
     pub axes: usize,
-    /// Control points of a piece.
+    /// Control points of each piece.
     pub points: usize,
     /// Piece by piece, point by point.
     pub control: &'a [f64],
-    /// Of every control point; empty where all pieces are polynomial.
+    /// One of every control point; empty where all pieces are polynomial.
     pub weights: &'a [f64],
-    /// Parameter intervals.
+    /// Lengths of the parameter intervals.
     pub width: &'a [f64],
 }
 
-/// The control polygons of one piece, axis by axis, and a row more for the weights.
+/// The control polygons of one piece, axis by axis, and one more row for the weights.
 pub struct Polygons<T> {
     values: Vec<T>,
     origin: Vec<T>,
@@ -31,7 +31,7 @@ pub struct Polygons<T> {
 }
 
 impl<T: Number> Polygons<T> {
-    /// Memory for pieces like these, to an order.
+    /// Memory for pieces like these and series up to an order.
     pub fn new(tips: &Tips, order: usize) -> Self {
         let zero = T::exactly(0.0);
         Self {
@@ -41,7 +41,7 @@ impl<T: Number> Polygons<T> {
         }
     }
 
-    /// Writes the series of all axes; `value` takes the polygon of a derivative to the value of that.
+    /// Writes the series of all axes; `value` evaluates the control polygon of a derivative.
     fn write(&mut self, tips: &Tips, width: T, value: impl Fn(&[T]) -> T, out: &mut Table<T>) {
         let (own, weights) = self.values.split_at_mut(tips.axes * tips.points);
         if tips.weights.is_empty() {
@@ -62,7 +62,7 @@ impl<T: Number> Polygons<T> {
     }
 }
 
-/// Coefficients of a polygon over its width: C(d, k) Δ^k / width^k.
+/// Taylor coefficients of a Bézier polygon over its width: C(d, k) Δ^k / width^k.
 fn polygon_series<T: Number>(polygon: &mut [T], width: T, value: impl Fn(&[T]) -> T, out: &mut [T]) {
     let degree = polygon.len() - 1;
     let mut scale = T::exactly(1.0);
@@ -77,12 +77,12 @@ fn polygon_series<T: Number>(polygon: &mut [T], width: T, value: impl Fn(&[T]) -
     }
 }
 
-/// n over k.
+/// Binomial coefficient n over k.
 pub fn binomial(n: usize, k: usize) -> f64 {
     (0..k).fold(1.0, |value, i| value * (n - i) as f64 / (i + 1) as f64).round()
 }
 
-/// The value of a polygon at a fraction, by de Casteljau.
+/// The value of a Bézier polygon at a fraction of its width, by de Casteljau's algorithm.
 fn at<T: Number>(polygon: &[T], fraction: T) -> T {
     let mut level = [T::exactly(0.0); MOST_POINTS];
     level[..polygon.len()].copy_from_slice(polygon);
@@ -101,7 +101,7 @@ impl Tips<'_> {
         self.width.len()
     }
 
-    /// True where there are no pieces.
+    /// Whether there are no pieces.
     pub fn is_empty(&self) -> bool {
         self.width.is_empty()
     }
@@ -110,10 +110,10 @@ impl Tips<'_> {
         self.control[(piece * self.points + point) * self.axes + axis]
     }
 
-    /// Series at a fraction of a piece, into the inputs of a table.
+    /// Writes the series at a fraction of a piece into the inputs of a table.
     ///
-    /// With weights, points are relative to the nearer end: derivatives near a cusp there are so small that the position
-    /// of the end would cancel their digits.
+    /// With weights, points are taken relative to the nearer end: near a cusp derivatives are so small that they would lose their
+    /// digits beside the position of the end.
     pub fn at_point(&self, piece: usize, fraction: f64, work: &mut Polygons<f64>, out: &mut Table<f64>) {
         let rational = !self.weights.is_empty();
         let near = if fraction < 0.5 { 0 } else { self.points - 1 };
@@ -133,7 +133,8 @@ impl Tips<'_> {
         work.write(self, self.width[piece], |polygon| at(polygon, fraction), out);
     }
 
-    /// Bounds of the series over a part of a piece, by the hull of its Bézier points; or at its middle.
+    /// Writes bounds of the series over a part of a piece, from the hull of its Bézier points, into the inputs of a table; or, if
+    /// `middle`, the series at the middle of the part.
     pub fn over_part(
         &self,
         piece: usize,
@@ -165,7 +166,7 @@ impl Tips<'_> {
     }
 }
 
-/// The polygon of a part, by the blossom b_i = B(a^(d−i), b^i).
+/// Replaces a Bézier polygon by that of a part [a, b] of it, by the blossom b_i = B(a^(d−i), b^i).
 fn restrict(polygon: &mut [Interval], part: [f64; 2]) {
     if part == [0.0, 1.0] {
         return;

@@ -1,13 +1,13 @@
-//! Rows of numbers as comma-separated text, each number the shortest that reads back the same.
+//! Writes rows of numbers as comma-separated text, with as few digits as are needed to read back the same number.
 
 use std::fmt::Write;
 
 use rayon::prelude::*;
 
-/// Rows handed to one thread at a time: long enough to hide the hand-over, short enough to share evenly.
+/// Rows that a thread takes at a time: enough to hide the cost of the hand-over, few enough to share evenly.
 const BLOCK: usize = 4096;
 
-/// One line for each `width` values, closed by the integer of its row and a line feed.
+/// One line for each row of `width` values, with the integer of the row as the last field.
 ///
 /// Numbers that are not finite become `nan`, `inf` and `-inf`, which numpy and pandas read.
 pub fn rows(values: &[f64], width: usize, last: &[i32]) -> Vec<u8> {
@@ -30,7 +30,7 @@ pub fn rows(values: &[f64], width: usize, last: &[i32]) -> Vec<u8> {
     blocks.concat().into_bytes()
 }
 
-/// Debug rather than Display: it turns to exponents where Display would print hundreds of zeros.
+/// Uses Debug instead of Display: it writes exponents where Display would write hundreds of zeros.
 fn push(text: &mut String, value: f64) {
     if value == 0.0 {
         text.push('0');

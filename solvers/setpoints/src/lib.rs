@@ -1,4 +1,4 @@
-//! From a speed profile to the motion at any time: setpoints, their text, and the few of them that a chart shows.
+//! Computes the motion of a speed profile at any time: setpoints, their text, and the reduction of setpoints for charts.
 
 pub mod csv;
 pub mod phase_motion;
@@ -17,15 +17,15 @@ use sampling::{Chunk, Interpolator, Resume, Sampler};
 instances! {
     /// Setpoints of a path.
     pub trait Sampled for [3, 6, 9] Arc<sampling::PathData<M>> = {
-        /// Lays the times of the setpoints of a profile: its phases, the phase offsets of its runs, and the period in s. The
-        /// error is a sentence for the user.
+        /// Computes the times of the setpoints of a profile from its phases, the phase offsets of its runs, and the period in s.
+        /// The error is a sentence for the user.
         fn sampled(&self, phases: &Arc<Phases>, runs: &[usize], period: f64, watch: Watch)
             -> Result<Sampler<M>, String> = Sampler::on;
     }
 }
 
 instances! {
-    /// The states of a profile; see the methods of `Sampler` that are named here.
+    /// The motion of a profile at setpoints, at times and at places; see the methods of `Sampler` that are named here.
     pub trait States for [3, 6, 9] Sampler<M> = {
         fn setpoints(&self, range: Range<usize>, interpolator: Interpolator, resume: &mut Option<Resume>, watch: Watch)
             -> Chunk<M> = Sampler::chunk;

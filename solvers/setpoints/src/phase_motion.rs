@@ -1,25 +1,25 @@
-//! The motion on one phase of a speed profile: position, velocity, acceleration and jerk of every axis at a time or at a
-//! place, from the phase's law.
+//! The motion on one phase of a speed profile: position, velocity, acceleration and jerk of every axis at a time or at a place,
+//! computed from the law of the phase.
 //!
-//! All laws are one: a measure m of the path has a speed v = dm/dt that is known, so p = u̇² = v²/m'(u)² with ' = d/du.
+//! All laws have one form: a measure m of the path has a known speed v = dm/dt, so p = u̇² = v²/m'(u)² with ' = d/du.
 //!
 //! | law | measure m | v |
 //! |---|---|---|
-//! | axis acceleration, axis velocity | way of axis k | linear in time |
+//! | axis acceleration, axis velocity | displacement of axis k | linear in time |
 //! | parameter acceleration | u | linear in time |
 //! | feed | length that the feed counts | constant |
-//! | speed line | length that the feed counts | v² linear in u |
+//! | speed line | length that the feed counts, without shares of axes | v² linear in u |
 //! | path jerk | length of the path | quadratic in time |
 //! | speed cubic | length of the path | v² cubic in m |
 //!
-//! `clock` has v and the part of m that is done at a time, `axis_way` and `lengths` find the place from that part. With
-//! a = v̇, j = ä and g = m': g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³. Then velocity is q' u̇, acceleration
-//! q' ü + q'' u̇², and jerk q' u⃛ + 3 q'' u̇ ü + q''' u̇³.
+//! `clock` computes v and the share of m that is done at a time; `axis_way` and `lengths` find the place at that share.
+//! With a = v̇, j = ä and g = m': g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³.
+//! Then velocity is q' u̇, acceleration q' ü + q'' u̇², and jerk q' u⃛ + 3 q'' u̇ ü + q''' u̇³.
 //!
-//! These quotients are 0/0 at rest where m' vanishes, which is always at an end of the phase. Nearer to it than rounding
-//! allows they are taken at a place a little farther off, and continued from there.
+//! These quotients are 0/0 at rest where m' vanishes, which happens only at the ends of a phase. Closer to such an end than
+//! rounding allows, they are evaluated at a place a little farther off and extrapolated from there.
 //!
-//! `at_once` has the motion at several times together, where v² is a cubic of the length.
+//! `at_once` computes the motion at several times together, where v² is a cubic of the length.
 
 pub mod at_once;
 mod axis_way;
@@ -46,18 +46,18 @@ use pace::Pace;
 use part::Part;
 pub use rate::{TipSpeed, MAX_TIP};
 
-/// A step's length is met within this part of the step. 1e-6 would do for the length; four digits more keep the second
-/// differences of the positions quiet, which divide by the period squared.
+/// Allowed length error as a share of the step. 1e-6 would do for the length; four digits more keep rounding noise out of the
+/// second difference quotients of the positions, which divide by the square of the period.
 const STEP_ERROR: f64 = 1e-10;
-/// The same where the jerk is limited, for the third differences.
+/// Allowed length error as a share of the step where the jerk is limited, for the third difference quotients.
 const JERK_STEP_ERROR: f64 = 1e-13;
 
-/// How far from an end, in parts of the phase, the quotients are taken where an axis turns there. Continued from there ü is
-/// off by the square of this part; ü and u⃛ lose as many digits as the part and its square have.
+/// Where an axis turns at an end of the phase, the quotients are evaluated at this distance from it, as a share of the phase. The
+/// extrapolation error of ü is about its square; rounding errors grow by its inverse in ü, and by the square of that in u⃛.
 const OFF_TURN: f64 = 3e-5;
-/// The same where C' vanishes; the length grows with the square of the part at least.
+/// This distance where C' vanishes at an end; the length grows at least with its square.
 const OFF_CUSP: f64 = 1e-3;
-/// Tangents of a straight line differ from it by at most this part of the longest one (rounding).
+/// Tangents of a straight line deviate from its direction by at most this share of the longest one (rounding).
 const OFF_LINE: f64 = 1e-14;
 
 /// Velocity, acceleration and jerk of every axis.
@@ -68,37 +68,37 @@ pub struct Rates<const M: usize> {
     pub jerk: [f64; M],
 }
 
-/// A place on the phase, and the motion of its measure there.
+/// A place on the phase, and the motion of the measure there.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct State {
     pub u: f64,
     pub pace: Pace,
-    /// Rounds that an inversion took, 0 for closed forms.
+    /// Iterations of the inversion; 0 for closed forms.
     pub iterations: u32,
-    /// Bound of its error in parts of the phase's whole measure.
+    /// Error bound of the place, as a share of the whole measure of the phase.
     pub error: f64,
 }
 
-/// What the speed of a phase is about.
+/// The measure whose speed the law of a phase gives.
 enum Measure {
     Parameter,
     Axis(Box<AxisWay>),
-    /// The lengths up to both ends of the phase, and on it.
+    /// The lengths up to both ends of the phase, and the length of the phase.
     Length {
         ends: [Node; 2],
         total: f64,
     },
 }
 
-/// A phase with all that its evaluation needs.
+/// A phase with everything that its evaluation needs.
 pub struct PhaseMotion<'a, const M: usize> {
     path: Rc<PiecePath<'a, M>>,
     phase: Phase,
     measure: Measure,
     clock: Clock,
-    /// The quotients are taken between these places.
+    /// The quotients are evaluated only between these u.
     safe: [f64; 2],
-    /// The direction of travel, where the phase is straight and begins or ends where the quotients are 0/0.
+    /// The direction of travel, if the phase is straight and the quotients are 0/0 at an end.
     straight: Option<[f64; M]>,
 }
 
@@ -128,7 +128,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         let (measure, clock) = match phase.law {
             PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity => match AxisWay::new(path.piece(), phase) {
                 Some((way, even)) => (Measure::Axis(Box::new(way)), Clock::Even(even)),
-                // As short as a rounding error: the axis shows no motion, the duration tells the pace.
+                // As short as a rounding error: the axis shows no motion, so the speed is the mean over the duration.
                 None => mean_pace(),
             },
             PhaseLaw::ParameterAcceleration if phase.p0 + phase.p1 > 0.0 => {
@@ -153,7 +153,8 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         motion
     }
 
-    /// How far from the ends, where the lengths per u have these squares, the quotients have to be taken.
+    /// Distance in u from both ends at which the quotients must be evaluated; `squares` are the squares of the length per u at
+    /// the ends.
     fn off_ends(&self, squares: [f64; 2]) -> [f64; 2] {
         let Phase { law, u0, u1, .. } = self.phase;
         let of_length = || {
@@ -170,8 +171,8 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         }
     }
 
-    /// The direction of all tangents on the phase, if they have one but for rounding and the measure is a share of the way
-    /// in that direction.
+    /// The common direction of all tangents on the phase, if they agree up to rounding and the measure is proportional to the
+    /// displacement in that direction.
     fn direction(&self) -> Option<[f64; M]> {
         if self.path.is_tip(self.phase.law) && !matches!(self.measure, Measure::Axis(_)) {
             return None;
@@ -190,7 +191,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         straight.then_some(direction)
     }
 
-    /// The place `t` seconds after the start of the phase. `period` is the step whose length is to be met.
+    /// The place `t` seconds after the start of the phase. Tolerances are shares of the step in one `period`.
     pub fn at_time(&self, t: f64, period: f64) -> State {
         let phase = &self.phase;
         // 0/0 on a phase without duration.
@@ -221,7 +222,8 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         State { pace, error: found.miss + error, ..state_of(found) }
     }
 
-    /// Whether the part of the measure is counted from the start of the phase: always from the side where it grows slower.
+    /// Whether the share of the measure is counted from the start: for the displacement of an axis the end with the smaller
+    /// |q'_k| is used, for other measures the end that is nearer in time.
     fn counts_from_start(&self, done: f64) -> bool {
         match &self.measure {
             Measure::Axis(way) => way.from_start,
@@ -229,7 +231,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         }
     }
 
-    /// Where a part of the measure is done.
+    /// The place at a share of the measure; `step` is the period as a share of the duration.
     fn place(&self, part: Part, step: f64) -> Located {
         let Phase { law, u0, u1, .. } = self.phase;
         match &self.measure {
@@ -247,7 +249,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         }
     }
 
-    /// The part of the measure at u, from the end that is nearer.
+    /// The share of the measure at u, counted from the nearer end.
     fn part(&self, u: f64) -> Part {
         let Phase { law, u0, u1, .. } = self.phase;
         match &self.measure {
@@ -280,7 +282,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         line.pace(u, at, g, dg, t)
     }
 
-    /// Position, and velocity, acceleration and jerk at a place.
+    /// Position, velocity, acceleration and jerk at a place.
     pub fn sample(&self, state: &State) -> ([f64; M], Rates<M>) {
         let q = derivatives(self.path.piece(), state.u);
         let Pace { v, a, j, .. } = state.pace;
@@ -308,7 +310,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         let ddu = (near.a - dg * du * du) / g;
         let dddu = (near.j - du * (3.0 * dg * ddu + ddg * du * du)) / g;
         let mut rates = if turns {
-            // p is continued by its derivatives 2 ü and 2 u⃛/u̇, and the place itself has the other ones.
+            // p is extrapolated by its derivatives 2 ü and 2 u⃛/u̇ by u; the derivatives of q are those at the place itself.
             let (off, ds) = (state.u - at, dddu / du);
             let root = (du * du + off * (2.0 * ddu + off * ds)).max(0.0).sqrt();
             rates_of(&q, root, ddu + off * ds, root * ds)
@@ -319,7 +321,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         (q[0], rates)
     }
 
-    /// The axis that the law is about moves exactly by it.
+    /// The axis that the law is about moves exactly by the law.
     fn set_own(&self, rates: &mut Rates<M>, pace: &Pace) {
         if let Measure::Axis(way) = &self.measure {
             rates.velocity[way.k] = way.sign * pace.v;
@@ -338,7 +340,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         (self.phase.u0, self.phase.u1)
     }
 
-    /// How closely a step's length is to be met, in parts of the step.
+    /// Allowed length error, as a share of the step.
     pub fn step_error(&self) -> f64 {
         if self.phase.law.is_along() {
             JERK_STEP_ERROR
@@ -347,7 +349,7 @@ impl<'a, const M: usize> PhaseMotion<'a, M> {
         }
     }
 
-    /// The piece of the phase with its table of lengths.
+    /// The piece of the phase with its tables of lengths.
     pub fn path(&self) -> &PiecePath<'a, M> {
         &self.path
     }
@@ -357,7 +359,7 @@ fn state_of(found: Located) -> State {
     State { u: found.u, iterations: found.iterations, error: found.miss, ..State::default() }
 }
 
-/// Velocity, acceleration and jerk from q and its derivatives by u, and those of u by time.
+/// Velocity, acceleration and jerk from q and its derivatives by u, and from the time derivatives of u.
 #[inline(always)]
 fn rates_of<const M: usize>(q: &[[f64; M]; 4], du: f64, ddu: f64, dddu: f64) -> Rates<M> {
     let p = du * du;
@@ -370,7 +372,7 @@ fn rates_of<const M: usize>(q: &[[f64; M]; 4], du: f64, ddu: f64, dddu: f64) -> 
     rates
 }
 
-/// Why nothing can follow a phase whose numbers are finite.
+/// Why a phase with finite numbers cannot be followed; None if it can.
 pub fn flaw<const M: usize>(path: &PiecePath<M>, phase: &Phase) -> Option<&'static str> {
     let speeds = || phase.end_speeds(path.end_squares(phase));
     match phase.law {

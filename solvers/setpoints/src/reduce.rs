@@ -1,15 +1,15 @@
-//! Millions of samples as the few points that a chart shows.
+//! Reduces millions of samples to the few points that a chart shows.
 
 use feedplan_geometry::quadratic::Segment;
 
-/// The columns of the points of a line.
+/// Numbers of each point of a line.
 const D: usize = 4;
-/// A pass over the points of a line is idle where it removes no more than one in so many.
+/// Thinning ends after two consecutive passes that each remove at most one point for every `FEW` that stay.
 const FEW: usize = 50;
 
-/// The extremes and the mean of each bucket of `width` consecutive rows of `values`, column by column: the rows of the least and
-/// the greatest value, in order, and the sum of `weight` times value. A value that is not a number is an extreme only where the
-/// bucket has no other.
+/// The extremes and the weighted sum of each bucket of `width` consecutive rows of `values`, column by column: the indices of the
+/// rows with the least and the greatest value, in ascending order, and the sum of `weight` times value. NaN is never an extreme,
+/// except in a bucket without other values.
 pub fn buckets(values: &[f64], columns: usize, weight: &[f64], width: usize) -> (Vec<[i64; 2]>, Vec<f64>) {
     let (mut extremes, mut sums) = (Vec::new(), Vec::new());
     for column in 0..columns {
@@ -33,8 +33,9 @@ pub fn buckets(values: &[f64], columns: usize, weight: &[f64], width: usize) -> 
     (extremes, sums)
 }
 
-/// Leaves out points of a line that are within `tolerance` of the segment between their neighbours. `cost` is the part of the
-/// tolerance that is used between each point and the next; returned are the rows of the points that stay, and theirs.
+/// Removes points of a line that are within `tolerance` of the segment between their neighbours. `cost` holds for each point the
+/// part of the tolerance, in its unit, that is already used up between this point and the next. Returns the indices and costs of
+/// the points that stay.
 pub fn thin(points: &[[f64; D]], cost: &[f64], tolerance: f64) -> (Vec<i64>, Vec<f64>) {
     let mut left: Vec<(usize, f64)> = cost.iter().copied().enumerate().collect();
     let (mut idle, mut first) = (0, 1);

@@ -1,13 +1,13 @@
 //! Setpoints at the servo period: positions, velocities, accelerations and jerks of a profile on its path.
 //!
-//! Every run starts on a setpoint and its end is hit exactly: run r with time T_r and pause D_r takes
-//! ceil((T_r + D_r)/period) periods, so the stream waits less than one period at a stop; a pause before the first run takes
-//! whole periods as well. A setpoint is found from its index alone (run, time in the run, phase, place on the phase), so any
-//! part of the stream can be computed on its own, in parallel and with the same digits. The Newton–Raphson interpolator goes
-//! step by step instead.
+//! Every run starts on a setpoint, and its end is hit exactly: run r with time T_r and pause D_r takes ceil((T_r + D_r)/period)
+//! periods, so the stream waits less than one period at a stop; a pause before the first run takes whole periods as well. A
+//! setpoint is computed from its index alone (run, time in the run, phase, place on the phase), so any part of the stream can be
+//! computed separately, in parallel and with identical results. The Newton–Raphson interpolator instead goes from setpoint to
+//! setpoint.
 //!
-//! At a stop velocity, acceleration and jerk are 0. At a switch, where the acceleration jumps, a setpoint has the values of
-//! the phase that begins there.
+//! At a stop velocity, acceleration and jerk are 0. At a switch, where the acceleration jumps, a setpoint has the values of the
+//! phase that begins there.
 //!
 //! | file | content |
 //! |---|---|
@@ -40,11 +40,11 @@ use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::{Phase, Phases};
 
-/// An end is at rest when its p is 0, whatever the phase's law, because a ramp may be too short for its places to show it;
-/// and when its speed is this part of the speed at the other end of its phase: a rounding error of p leaves its square root.
+/// A path begins or ends at rest if p is 0 there, for any law, because on a very short ramp the computed speed may not show it;
+/// or if the speed there is below this share of that at the other end of the phase: a rounding error of p leaves its square root.
 const STANDSTILL: f64 = 1e-6;
 
-/// Setpoints computed by one task.
+/// Number of setpoints computed by one task.
 const BLOCK: usize = 1024;
 
 /// How the place at the next setpoint is found.
@@ -52,7 +52,7 @@ const BLOCK: usize = 1024;
 pub enum Interpolator {
     /// Closed forms where a law has them; length table and Sarfraz predictor-corrector elsewhere.
     Sarfraz,
-    /// Zhang 4.2: step length from speed and tangential acceleration, then Newton–Raphson.
+    /// Zhang 4.2, corrected: step length from speed, acceleration and jerk, then Newton–Raphson.
     Newton,
 }
 
@@ -60,17 +60,17 @@ pub enum Interpolator {
 #[derive(Clone, Debug)]
 struct Run {
     phases: Range<usize>,
-    /// Setpoint on which the run starts.
+    /// Index of the setpoint on which the run starts.
     first: usize,
     periods: usize,
-    /// Seconds from the start of the plan, pauses counted, to the start of the run.
+    /// Time from the start of the plan to the start of the run, pauses included, in s.
     begin: f64,
-    /// Time in motion in seconds.
+    /// Time in motion in s.
     time: f64,
     last_piece: usize,
 }
 
-/// Where the Newton–Raphson interpolator stands: the setpoint that it found last, with its phase and its parameter.
+/// The state of the Newton–Raphson interpolator: index, phase and parameter of the last setpoint found.
 #[derive(Clone, Copy, Debug)]
 pub struct Resume {
     index: usize,
@@ -78,36 +78,36 @@ pub struct Resume {
     u: f64,
 }
 
-/// A profile on its path, ready to be read at any setpoint.
+/// A profile on its path, ready to be evaluated at any setpoint.
 pub struct Sampler<const M: usize> {
     path: Arc<PathData<M>>,
     phases: Arc<Phases>,
-    /// Time from the start of the phase's run.
+    /// Start of each phase, from the start of its run, in s.
     starts: Vec<f64>,
     runs: Vec<Run>,
     period: f64,
     count: usize,
-    /// The path ends at a speed: the last setpoint has its true time.
+    /// The path ends at a speed above 0: the last setpoint has the exact end time.
     ends_moving: bool,
 }
 
 impl<const M: usize> Sampler<M> {
-    /// Number of setpoints, the start of the path included.
+    /// Number of setpoints, including the start of the path.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Time of the last setpoint in seconds.
+    /// Time of the last setpoint in s.
     pub fn duration(&self) -> f64 {
         self.time(self.count - 1)
     }
 
-    /// Each run: when it starts on the plan's own clock, when on that of the setpoints, and its time in motion.
+    /// For each run its start on the clock of the plan, its start on that of the setpoints, and its time in motion, all in s.
     pub fn runs(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.runs.iter().map(|run| [run.begin, run.first as f64 * self.period, run.time])
     }
 
-    /// Time of a setpoint in seconds.
+    /// Time of a setpoint in s.
     fn time(&self, index: usize) -> f64 {
         match self.runs.last() {
             Some(run) if self.ends_moving && index == self.count - 1 => {
@@ -117,8 +117,8 @@ impl<const M: usize> Sampler<M> {
         }
     }
 
-    /// The setpoints in a range. `resume` carries the state of the Newton–Raphson interpolator from one range to
-    /// the next; without it, or going back, a run is followed again from its start.
+    /// The setpoints in a range. `resume` carries the state of the Newton–Raphson interpolator from one range to the next;
+    /// without it, or for an earlier range, a run is computed again from its start.
     pub fn chunk(
         &self,
         range: Range<usize>,
@@ -144,8 +144,8 @@ impl<const M: usize> Sampler<M> {
         chunk
     }
 
-    /// The states at times of the plan's own clock, in seconds: runs and pauses follow each other without waiting
-    /// for whole periods. At the moment of a stop the tool rests; a time beyond an end gives that end.
+    /// The motion at times on the clock of the plan, in s: there runs and pauses follow each other without waiting for whole
+    /// periods. At a stop the tool is at rest; a time before the start or after the end gives that end.
     pub fn at(&self, times: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(times.len());
         let cuts: Vec<usize> = (0..times.len()).step_by(BLOCK).skip(1).collect();
@@ -175,13 +175,13 @@ impl<const M: usize> Sampler<M> {
         chunk
     }
 
-    /// The states at places of the path, with their times on the plan's own clock. In the last place of a piece
-    /// the phase that ends there counts.
+    /// The motion at places of the path, and their times on the clock of the plan. At the end of a piece it is that of the phase
+    /// that ends there.
     pub fn along(&self, pieces: &[u32], u: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(pieces.len());
         let cuts: Vec<usize> = (0..pieces.len()).step_by(BLOCK).skip(1).collect();
         chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
-            // Places come mostly in the order of the path, many on one phase.
+            // Places mostly come in the order of the path, many on one phase.
             let mut kept = None;
             for i in 0..part.t.len() {
                 watch.check_at(i);
@@ -206,7 +206,7 @@ impl<const M: usize> Sampler<M> {
         chunk
     }
 
-    /// Where a range is cut into tasks: anywhere, or between runs where the steps depend on each other.
+    /// Setpoints at which a range is cut into tasks: anywhere, or only between runs if each setpoint depends on the one before.
     fn cuts(&self, range: &Range<usize>, interpolator: Interpolator) -> Vec<usize> {
         match interpolator {
             Interpolator::Sarfraz => range.clone().step_by(BLOCK).skip(1).collect(),
@@ -226,12 +226,12 @@ impl<const M: usize> Sampler<M> {
         Cursor::new(&self.path, &self.phases, &self.starts)
     }
 
-    /// The run that leads to a setpoint other than the first.
+    /// The run that contains a setpoint other than the first one.
     fn run_of(&self, index: usize) -> &Run {
         &self.runs[self.runs.partition_point(|run| run.first < index) - 1]
     }
 
-    /// Time in the run of its j-th setpoint; None where the tool has arrived.
+    /// Time of the j-th setpoint of a run, from the start of the run in s; None where the tool has arrived.
     fn run_time(&self, run: &Run, j: usize) -> Option<f64> {
         let time = j as f64 * self.period;
         (j < run.periods && time < run.time).then_some(time)
@@ -240,7 +240,8 @@ impl<const M: usize> Sampler<M> {
     fn fill_by_time(&self, mut part: Slices<M>, watch: Watch) -> Effort {
         let mut effort = Effort::default();
         let mut cursor = self.cursor();
-        // Setpoints on one piece where v² is a cubic of the length: their numbers, their phases, and the times since these began.
+        // Setpoints on one piece where v² is a cubic of the length: their indices, phases, and times since the start of the
+        // phase.
         let mut moving: Vec<(usize, usize, f64)> = Vec::with_capacity(TIMES);
         let mut i = 0;
         while i < part.t.len() {
@@ -280,7 +281,7 @@ impl<const M: usize> Sampler<M> {
         effort
     }
 
-    /// Fills in a setpoint in motion.
+    /// Computes one setpoint in motion.
     fn fill_alone(
         &self,
         part: &mut Slices<M>,
@@ -294,7 +295,7 @@ impl<const M: usize> Sampler<M> {
         self.set(part, i, phase, cursor.motion(), &state);
     }
 
-    /// Fills in setpoints in motion on one piece, no more than are looked at at once.
+    /// Computes at most `TIMES` setpoints in motion on one piece.
     fn fill_at_once(
         &self,
         part: &mut Slices<M>,
@@ -342,7 +343,7 @@ impl<const M: usize> Sampler<M> {
         part.u[i] = u;
     }
 
-    /// Speed, first phase and its motion where the path begins; a speed of 0 is exact.
+    /// Speed, first phase and its motion at the start of the path; a speed of exactly 0 means rest.
     fn start(&self) -> Option<(f64, usize, PhaseMotion<'_, M>)> {
         let first = self.runs[0].phases.clone().next()?;
         let phase = self.phase(first);
@@ -364,7 +365,7 @@ impl<const M: usize> Sampler<M> {
         part.u[i] = 0.0;
     }
 
-    /// The end of a run; `moving` where the path ends there at a speed.
+    /// Sets the end of a run; `moving` where the path ends there at a speed above 0.
     fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize, moving: bool) {
         let curve = &self.path.curve;
         if let (true, Some(last)) = (moving, run.phases.clone().last()) {

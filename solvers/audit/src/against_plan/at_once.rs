@@ -1,8 +1,8 @@
-//! Which of some setpoints cannot change what was found by what they show beside their plan: all of them at once in the vectors of the
-//! processor.
+//! Finds, for 256 consecutive setpoints at once, those that cannot raise the greatest use of any limit checked by `against_plan`;
+//! only the others need the full check. Works on all setpoints in SIMD vectors.
 //!
-//! The values are those that `against_plan` offers of a setpoint that is one period after the one before, on the same piece. Its
-//! distance from the program is not among them.
+//! Computes the same values as `against_plan` for a setpoint one period after the one before and on the same piece, except the
+//! distance from the program, which is left to `against_plan`.
 
 use fearless_simd::{dispatch, Level};
 
@@ -13,16 +13,17 @@ use crate::setpoints::at_once::{fill, judge, ALL, BEFORE, COUNT};
 use crate::tracking::Plan;
 use crate::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
-/// The tool at some rows, where the columns are joints: its position in the axes whose motion the feed limits there, and that feed, not a
-/// number where the feed limits a turn.
+/// The tool at some rows, where the columns are joints: its position in the axes whose motion the feed limits there, and that
+/// feed in mm/s, NaN where the feed limits a rotation.
 #[derive(Default)]
 pub struct Tool<const M: usize> {
     pub tip: Vec<[f64; M]>,
     pub feed: Vec<f64>,
 }
 
-/// Which rows change nothing; so much of the distance of each may be rounding, or it is not a number and the row does. There
-/// are as many rows before them as for `setpoints::at_once`.
+/// Whether each row can be left unchecked, except for its distance from the program. `unsure` is the rounding error bound of the
+/// position of each row in mm; where it is NaN the result is false. `rows` begins with `BEFORE` earlier rows, as in
+/// `setpoints::at_once`.
 pub fn settled<const M: usize>(
     (plan, tool): (&Plan, Option<&Tool<M>>),
     limits: &Limits<M>,
@@ -44,7 +45,7 @@ fn settled_in_vectors<const M: usize>(
     let (path, period) = (&plan.path, limits.period);
     let (mut is_open, mut off, mut late, mut here) = ([0.0; ALL], [0.0; ALL], [0.0; ALL], [0.0; ALL]);
     let (mut there, mut way_sq, mut away) = ([0.0; ALL], [0.0; ALL], [0.0; ALL]);
-    // The place, and the piece.
+    // Distance from the path, delay, and change of piece.
     fill(&mut off, rows, |row| row.nearest.off);
     fill(&mut late, rows, |row| row.nearest.late);
     let known = tally.most(Check::Place, 0, 1.0);
@@ -54,7 +55,7 @@ fn settled_in_vectors<const M: usize>(
     judge(&mut is_open, |i| late[i], |i| share * here[i]);
     fill(&mut here, rows, |row| row.nearest.place.piece as f64);
     judge(&mut is_open, |i| (here[i] - here[i - 1]).abs(), |_| 0.0);
-    // What is recorded.
+    // Recorded velocity and acceleration.
     let records = |is_some: fn(&Row<M>) -> bool| plan.profile.is_some() && rows.iter().any(is_some);
     if records(|row| row.velocity.is_some()) {
         for i in BEFORE..ALL {
@@ -77,7 +78,7 @@ fn settled_in_vectors<const M: usize>(
             judge(&mut is_open, |i| here[i], |_| most);
         }
     }
-    // The step.
+    // Speed of the step.
     for feed in 0..FEEDS {
         match tool {
             None => fill(&mut here, rows, |row| path.feed[FEEDS * row.nearest.place.piece + feed]),

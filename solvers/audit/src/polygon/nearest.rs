@@ -1,27 +1,29 @@
-//! The places of a piece nearest to a point: local minima of the distance, first or all, on parts so short that they are
-//! nearly straight.
+//! Finds the first or all local minima of the distance of a point from a piece: cuts the piece into nearly straight parts, and
+//! solves (C − q)·C' = 0 on each by Newton's method with bisection.
 
 use super::{Local, Polygon};
 use crate::number::inner;
 use crate::vectors::{distance, length};
 
-/// Halvings of a piece, at most, until its parts are nearly straight: in a sharp turn the distance from a place that is
-/// passed twice falls, rises and falls again. Parts shorter than this, in mm or as a part of the whole, are not halved.
+/// Greatest depth of halving a piece until its parts are nearly straight: in a sharp turn, the distance from a place that is
+/// passed twice falls, rises and falls again. Parts shorter than `SHORT` mm, or than the share `ROUNDING` of the whole, are not
+/// halved.
 const MOST_HALVINGS: u32 = 30;
 const SHORT: f64 = 1e-7;
 const ROUNDING: f64 = 1e-12;
 
-/// Cosine of the greatest angle between the steps of a nearly straight part and the line between its ends.
+/// Cosine of the greatest angle between the steps of a nearly straight part and its chord.
 const NEARLY_STRAIGHT: f64 = 0.9;
 
-/// A Newton step of this share of the piece is the last one: its error is about the square of that.
+/// A Newton step below this share of the piece is the last one: the error after it is about its square. Also the distance in mm
+/// up to which `q` counts as on the piece.
 const CLOSE: f64 = 1e-7;
 
-/// Steps towards a local minimum; halving alone needs some 55.
+/// Limit of the steps towards a local minimum; bisection alone needs some 55.
 const MOST_STEPS: usize = 100;
 
 impl<const M: usize> Polygon<M> {
-    /// Calls `each` with the ends of parts of [from, 1] that are nearly straight, in order, until it returns false.
+    /// Calls `each` with the ends of consecutive, nearly straight parts of [from, 1], until it returns false.
     fn straight_parts(&self, from: f64, each: &mut impl FnMut(f64, f64) -> bool) {
         if from >= 1.0 {
             return;
@@ -37,7 +39,7 @@ impl<const M: usize> Polygon<M> {
         short: f64,
         each: &mut impl FnMut(f64, f64) -> bool,
     ) -> bool {
-        // What is not a number is not halved.
+        // NaN and infinite values are not halved further.
         let halves = depth < MOST_HALVINGS && self.way() > short && !self.is_nearly_straight();
         if !halves {
             return each(from, to);
@@ -57,8 +59,8 @@ impl<const M: usize> Polygon<M> {
         self.steps[..self.degree].iter().all(|step| inner(step, &chord) >= size * length(step))
     }
 
-    /// (C − q)·C' at t, and |C'|², up to a factor. At both ends the direction of motion tells which way C' goes: where that
-    /// vanishes only rounding is left of it.
+    /// (C − q)·C' and |C'|² at t, both up to the same factor. At both ends the direction of motion replaces C', since where C'
+    /// vanishes only rounding errors remain of it.
     fn fall(&self, q: &[f64; M], t: f64) -> [f64; 2] {
         let Local { way, slope } = self.local(t);
         let (along, square) = if t <= 0.0 {
@@ -75,8 +77,8 @@ impl<const M: usize> Polygon<M> {
         [fall, square]
     }
 
-    /// The minimum between `a`, where the distance falls, and `b`, where it does not: Newton as if the piece were
-    /// straight, halved when it strays.
+    /// The minimum between `a`, where the distance falls, and `b`, where it does not: Newton steps as on a straight piece, and
+    /// bisection where they leave the bracket or do not shrink.
     fn minimum(&self, q: &[f64; M], mut a: f64, mut b: f64) -> f64 {
         let mut t = a;
         let mut last = f64::INFINITY;
@@ -91,7 +93,7 @@ impl<const M: usize> Polygon<M> {
             let step = (newton - t).abs();
             if newton >= a && newton <= b && step < 0.5 * last {
                 last = step;
-                // Off the piece the steps shrink by a constant factor only.
+                // Where `q` is off the piece, the steps shrink only by a constant factor.
                 if step <= CLOSE * CLOSE || (step <= CLOSE && distance(q, &self.at(newton)) <= CLOSE) {
                     return newton;
                 }
@@ -107,7 +109,7 @@ impl<const M: usize> Polygon<M> {
         t
     }
 
-    /// The first local minimum of the distance from `q` at or after `from`, and whether it still falls at the end.
+    /// The first local minimum of the distance from `q` at or after `from`, and whether the distance still falls at the end.
     pub fn first_minimum(&self, q: &[f64; M], from: f64) -> (f64, bool) {
         if self.fall(q, from)[0] >= 0.0 {
             return (from, false);
@@ -122,10 +124,10 @@ impl<const M: usize> Polygon<M> {
         found
     }
 
-    /// Calls `found` with the local minima of the distance from `q` at or after `from`, the ends included.
+    /// Calls `found` with `from`, with the local minima of the distance from `q` after it, and with the end.
     ///
-    /// All that matter where `q` lies beside the curve; of several minima on one nearly straight part, as a `q` beyond
-    /// the centres of curvature can have, one is found: then the distance comes out too great, never too small.
+    /// It finds all minima that matter for a `q` beside the curve. A `q` beyond the centres of curvature can have several minima
+    /// on one nearly straight part, of which one is found: then the distance may be too great, but never too small.
     pub fn all_minima(&self, q: &[f64; M], from: f64, found: &mut impl FnMut(f64)) {
         found(from);
         let mut falls = self.fall(q, from)[0] < 0.0;

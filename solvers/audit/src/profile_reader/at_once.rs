@@ -1,7 +1,7 @@
-//! Reads phases of a piece at several places, eight at once, in the vectors of the processor.
+//! Evaluates phases of a piece on which v² is a cubic of the length, at eight places at once in SIMD vectors.
 //!
-//! On phases on which v² is a cubic of the length these are the numbers of `motion`, bit for bit: the same formulas in the same order.
-//! Where a rule of quadrature would halve its interval, and where the piece has no direction, a place is left to `motion`.
+//! The results equal those of `motion` bit for bit: they use the same formulas in the same order. A place is left to `motion`
+//! where the quadrature would have to halve its interval, and where the piece has no direction.
 
 use fearless_simd::{f64x8, Select, Simd, SimdBase, SimdFloat};
 
@@ -16,21 +16,21 @@ use crate::station::Rounded;
 use crate::together::Together;
 use crate::EPS;
 
-/// Places that are read at once.
+/// Number of places evaluated at once.
 pub const PLACES: usize = 8;
 
-/// The numbers of a phase that are used, and the place.
+/// Numbers per place: seven of its phase, and u.
 const NUMBERS: usize = 8;
 
-/// What is found at the places; the time since the start of the phase is not a number where a place is left to `motion`.
+/// The results at eight places; `since`, the time since the start of the phase in s, is NaN where a place is left to `motion`.
 struct Found<const M: usize> {
     since: Lanes,
     velocity: Rounded<M, Lanes>,
     acceleration: Rounded<M, Lanes>,
 }
 
-/// Fills in the passages at places of a piece without weights, each on its phase, where v² is a cubic of the length; and leaves out
-/// those that it cannot tell.
+/// Fills in the passages at places of a piece without weights, each on its own phase, on which v² is a cubic of the length.
+/// Removes the places that are left to `motion`.
 pub fn read<const M: usize>(
     on: &Together<M>,
     phases: &Phases,
@@ -72,12 +72,12 @@ fn look<const M: usize, S: Simd>(
         of[row] = f64x8::from_slice(simd, &numbers[row]);
     }
     let [u0, u1, p0, p1, a0, a1, duration, u] = of;
-    // From the slower end; see `Phases::by_length`.
+    // Motion from the slower end, as in `Phases::by_length`.
     let (first, last) = (on.speed(u0) * p0.sqrt(), on.speed(u1) * p1.sqrt());
     let is_back = last.simd_lt(first);
     let speeds = [is_back.select(last, first), is_back.select(first, last)];
     let a = [is_back.select(a1 * -1.0, a0), is_back.select(a0 * -1.0, a1)];
-    // The length of the phase and of its first half, and the length to the place; see `PhaseByLength`.
+    // Lengths of the phase, of its first half, and up to the place, as in `PhaseByLength`.
     let width = u1 - u0;
     let half = width * 0.5;
     let mut slopes = nodes(half, half);
@@ -97,7 +97,7 @@ fn look<const M: usize, S: Simd>(
     }
     let way = d.simd_gt(from + nudge).select(before + by_gauss(slopes, reach), before);
     let way = d.simd_ge(width).select(length, way);
-    // The motion along the path, and the time; see `SpeedByLength`.
+    // Speed and acceleration along the path, and the time, as in `SpeedByLength`.
     let (c, x) = (cubic([speeds[0] * speeds[0], speeds[1] * speeds[1]], a, length), way / length);
     let (v, a) = (square(&c, x).sqrt(), cubic_acceleration(&c, length, x));
     let half = x * 0.5;
@@ -108,7 +108,7 @@ fn look<const M: usize, S: Simd>(
     let [time, doubt] = by_rules(&slowness, half);
     let are_times_good = doubt.abs().simd_le(time.abs() * RULES_AGREE);
     let pace = Pace { v, a: is_back.select(a * -1.0, a), j: nothing };
-    // The rates of the axes; see `Motion`.
+    // Velocities and accelerations of the columns, as in `Motion`.
     let (station, roundings) = on.rounded_station(u, room);
     let is_directed = station.slope.simd_gt(f64x8::splat(simd, on.still()));
     let (velocity, acceleration) = (station.velocity(v), station.acceleration(pace));
@@ -136,7 +136,7 @@ mod tests {
     use crate::Limits;
     use proptest::prelude::*;
 
-    /// Passages by `read` and by `Motion`, at shares of a phase; only the former that are known.
+    /// Passages by `read` and by `Motion` at shares of a phase; places that `read` removes are left out.
     fn passages(
         control: &[f64],
         [u, speeds, a]: [[f64; 2]; 3],

@@ -1,7 +1,8 @@
-//! Which of some consecutive setpoints cannot change what was found by their differences: those of one axis after the other, of all
-//! setpoints at once in the vectors of the processor.
+//! Finds, for 256 consecutive setpoints at once, those whose difference quotients cannot raise the greatest use of any limit
+//! found so far; only the others need the full check (`setpoints`). Works through one axis after the other, on all setpoints in
+//! SIMD vectors.
 //!
-//! The values are those that `setpoints` offers of a setpoint, at steps of one period, and so are the limits.
+//! Values and limits are those that `setpoints` offers to the tally for steps of one period.
 
 use std::ops::Range;
 
@@ -11,16 +12,16 @@ use crate::differences::Differences;
 use crate::rows::Row;
 use crate::{Check, Sided, Tally, EPS, ROUNDINGS};
 
-/// Setpoints that are looked at at once, and those before them that the differences of the first one need.
+/// Number of setpoints examined at once, and of those before them that the differences of the first one need.
 pub const COUNT: usize = 256;
 pub const BEFORE: usize = 4;
 pub const ALL: usize = BEFORE + COUNT;
 
-/// A number of each of them.
+/// One number for each of these setpoints.
 pub type Column = [f64; ALL];
 
-/// What of the distance of each of some rows may be rounding, where no check of its differences can change the tally; else not a
-/// number. There are as many rows before them as they need.
+/// For each row the rounding error bound of its position in mm, if no check of its difference quotients can change the tally,
+/// else NaN. At least `BEFORE` rows must precede `rows`.
 pub fn settled<const M: usize>(of: &Differences<M>, rows: &Range<usize>, tally: &Tally<M>) -> [f64; COUNT] {
     let rows = &of.rows[rows.start - BEFORE..rows.end];
     dispatch!(Level::new(), _simd => settled_in_vectors(of, rows, tally))
@@ -40,7 +41,7 @@ fn settled_in_vectors<const M: usize>(
     let records_velocity = rows.iter().any(|row| row.velocity.is_some());
     let records_acceleration = rows.iter().any(|row| row.acceleration.is_some());
     let (mut nothing, mut unsure_sq, mut is_open) = ([0.0; ALL], [0.0; ALL], [0.0; ALL]);
-    // Steps of one period.
+    // Open: rows where one of the last four time steps is not one period long.
     let grid = tally.most(Check::Grid, 0, 0.0);
     let mut is_odd = [grid; ALL];
     for i in 1..ALL {
@@ -119,7 +120,7 @@ fn settled_in_vectors<const M: usize>(
     unsure
 }
 
-/// Takes a number of each row.
+/// Fills a column with one number of each row.
 #[inline(always)]
 pub fn fill<const M: usize>(column: &mut Column, rows: &[Row<M>], number: impl Fn(&Row<M>) -> f64) {
     for (own, row) in column.iter_mut().zip(rows) {
@@ -127,7 +128,7 @@ pub fn fill<const M: usize>(column: &mut Column, rows: &[Row<M>], number: impl F
     }
 }
 
-/// Leaves open the rows whose value is not at most so much.
+/// Marks the rows whose value is not at most `most` as open (1); a NaN is open as well.
 #[inline(always)]
 pub fn judge(is_open: &mut Column, value: impl Fn(usize) -> f64, most: impl Fn(usize) -> f64) {
     for i in BEFORE..ALL {

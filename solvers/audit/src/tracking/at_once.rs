@@ -1,5 +1,5 @@
-//! The places of several setpoints on one piece, eight at once, in the vectors of the processor, by Newton's method. Each is found as it
-//! would be alone.
+//! Finds the places of eight setpoints on one piece at once in SIMD vectors, by Newton's method. The results are those of a
+//! search for each setpoint alone.
 
 use fearless_simd::{f64x8, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
@@ -7,17 +7,17 @@ use super::{beyond_last, MOST_GUESSES};
 use crate::number::{in_wide_vectors, inner, Lanes};
 use crate::together::Together;
 
-/// Setpoints that are looked for at once.
+/// Number of setpoints searched for at once.
 pub const COUNT: usize = 8;
 
-/// The place nearest to each setpoint, not a number where that is not found; the setpoint's distance from it; and |C'| there.
+/// The place nearest to each setpoint, NaN where it is not found; the distance of the setpoint from it in mm; and |C'| there.
 pub struct Nearest {
     pub u: Lanes,
     pub distance: Lanes,
     pub slope: Lanes,
 }
 
-/// From these places of a piece, for setpoints at these positions.
+/// The places nearest to setpoints at the positions `q`; the steps start from the places `u` of the piece.
 pub fn nearest<const M: usize>(on: &Together<M>, u: &Lanes, q: &[Lanes; M], room: &mut [Lanes]) -> Nearest {
     in_wide_vectors!(simd => look(simd, on, (u, q), room))
 }
@@ -66,7 +66,7 @@ mod tests {
     use crate::Limits;
     use proptest::prelude::*;
 
-    /// What `nearest` finds on one piece of axes, or of joints.
+    /// The result of `nearest` on one piece of axes, or of joints.
     fn found(control: &[f64], u: &Lanes, q: &[Lanes; 2], has_joints: bool) -> Nearest {
         let (degree, words, limits) = (control.len() / 2 - 1, Words::polar(), Limits::none());
         let (offsets, width) = ([0, degree + 1], [degree as f64]);
@@ -86,7 +86,7 @@ mod tests {
             let control: Vec<f64> = (0..6).flat_map(|i| [i as f64, bends[i]]).collect();
             let curve = Curve::new(Polygon::new((0..6).map(|i| [i as f64, bends[i]]), &[]), 5.0);
             let places: Lanes = std::array::from_fn(|i| first + step * i as f64);
-            // Beside the curve, and from places that are off by up to a tenth.
+            // Beside the curve; the search starts up to a tenth of a millimetre off.
             let beside = |u: f64| {
                 let ([x, y], [dx, dy]) = (curve.at(u), curve.derivative(u));
                 let size = dx.hypot(dy);
@@ -103,7 +103,7 @@ mod tests {
             }
         }
 
-        /// Around the origin, so that the angle passes half a turn; setpoints have it on any turn.
+        /// Around the origin, so that the angle passes 180 degrees; setpoints may have it plus any number of whole turns.
         #[test]
         fn the_place_of_joints_is_found_from_one_near_by(
             bends in prop::array::uniform6(-0.3..0.3_f64), first in 0.5..3.0_f64, step in 0.01..0.2_f64, turns in -3..4_i32,

@@ -1,9 +1,9 @@
-//! The motion at several times on phases of one piece, eight at once, in the vectors of the processor.
+//! Computes the motion at up to eight times on phases of one piece at once in SIMD vectors.
 //!
-//! It is that of `PhaseMotion` where v² is a cubic polynomial of a length, of the axes or of the tool's tip, on a piece without
-//! weights, in the same digits but for rounding. What takes longer is left to that: next to rest, where a phase needs several series
-//! or is longer than a panel of the table of lengths, and where the place is not known after so many steps of Newton's method. So what
-//! is found of one time does not depend on the others.
+//! It is the motion of `PhaseMotion` up to rounding, where v² is a cubic polynomial of a length, of the axes or of the tool tip,
+//! on a piece without weights. The slower cases are left to `PhaseMotion`: next to rest; phases that need several series or are
+//! longer than a panel of the table of lengths; and places not found within `MOST_STEPS` Newton steps. So the result at one time
+//! does not depend on the others.
 
 use fearless_simd::{dispatch, f64x8, Level, Select, Simd, SimdBase, SimdFloat, SimdMask};
 
@@ -17,22 +17,23 @@ use feedplan_geometry::spline::{Piece, MAX_DEGREE};
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phase;
 
-/// Times that are looked at at once.
+/// Number of times evaluated at once.
 pub const TIMES: usize = 8;
 
-/// A number at each of them.
+/// One number for each of these times.
 type Lanes = [f64; TIMES];
 
-/// The numbers of a phase that are used, and the time since its start.
+/// Numbers per time: seven of its phase, and the time since the start of the phase.
 const NUMBERS: usize = 8;
 
-/// Terms of a series of the length by time.
+/// Terms of a series of the length in time.
 const TERMS: usize = 14;
 
-/// Steps of Newton's method to a place.
+/// Limit of the Newton steps to a place.
 const MOST_STEPS: u32 = 3;
 
-/// Evaluates a call with the number of control points as a constant where it is that of most pieces, so that its loops are unrolled.
+/// Evaluates an expression with the number of control points as a constant if it is 6, that of most pieces, so that loops are
+/// unrolled.
 macro_rules! with_count {
     ($count:expr, $n:ident, $call:expr) => {
         match $count {
@@ -45,17 +46,17 @@ macro_rules! with_count {
     };
 }
 
-/// The motion at some times. A place that is not a number is not known.
+/// The motion at some times; u is NaN where the motion is left to `PhaseMotion`.
 pub struct Moments<const M: usize> {
     u: Lanes,
-    /// Bound of its error in parts of the phase's length.
+    /// Error bound of the place, as a share of the length of the phase.
     error: Lanes,
     iterations: Lanes,
     /// q and its derivatives by time.
     rates: [[Lanes; M]; 4],
 }
 
-/// The motion at one of them: the place with its error, and how it was found.
+/// The motion at one time: the place with its error bound, and the number of iterations.
 pub struct Moment<const M: usize> {
     pub u: f64,
     pub error: f64,
@@ -65,7 +66,8 @@ pub struct Moment<const M: usize> {
 }
 
 impl<const M: usize> Moments<M> {
-    /// At times since the starts of their phases, all of this piece, one to eight of them; `period` is the step whose length is to be met.
+    /// The motion at one to eight times, each since the start of its phase, all on this piece. Tolerances are shares of the step
+    /// in one `period`. None if all times are left to `PhaseMotion`.
     pub fn new(path: &PiecePath<M>, times: &[(Phase, f64)], period: f64) -> Option<Self> {
         let lengths = path.polynomial_lengths(PhaseLaw::SpeedCubic)?;
         let mut numbers = [[f64::NAN; TIMES]; NUMBERS];
@@ -84,7 +86,7 @@ impl<const M: usize> Moments<M> {
             .then(|| dispatch!(Level::new(), simd => look(simd, (path.piece(), &lengths), &numbers, period)))
     }
 
-    /// The motion at a time, where it is known.
+    /// The motion at a time; None where it is left to `PhaseMotion`.
     pub fn get(&self, lane: usize) -> Option<Moment<M>> {
         let u = self.u[lane];
         let [position, velocity, acceleration, jerk] =
@@ -112,7 +114,7 @@ fn look<const M: usize, S: Simd>(
         of[row] = f64x8::from_slice(simd, &numbers[row]);
     }
     let [u0, u1, p0, p1, a0, a1, duration, t] = of;
-    // The length of the phase, and v² along it; see `Cubic`.
+    // The length of the phase, and v² as a cubic of it, as in `Cubic`.
     let ([slope0, slope1], width) = ([speed(lengths, u0), speed(lengths, u1)], u1 - u0);
     let length = way(lengths, u0, u1);
     let [square0, square1] = [slope0 * slope0, slope1 * slope1];
@@ -135,7 +137,7 @@ fn look<const M: usize, S: Simd>(
         & end.simd_le(one * (1.0 + OVER))
         & end.simd_ge(one * (1.0 - OVER))
         & (total - 1.0).abs().simd_le(one * LAST_STEP);
-    // The part of the length at the time, and the motion along the path there.
+    // The share of the length at the time, and the motion along the path there.
     let (done, left) = (t / duration, (duration - t) / duration);
     let [share, _] = values(&terms, total * is_forward.select(done, left));
     let share = share.max(nothing).min(one);
@@ -144,7 +146,7 @@ fn look<const M: usize, S: Simd>(
     let v = (c0 + x * (c1 + x * (c2 + x * c3))).sqrt();
     let a = (c1 + x * (c2 * 2.0 + x * 3.0 * c3)) * 0.5 / length;
     let j = v * 0.5 * (c2 * 2.0 + x * 6.0 * c3) / (length * length);
-    // The place there: that of `inverse_length::predict` first, then by Newton's method.
+    // The place at that length: by the formula of `inverse_length::predict` first, then by Newton's method.
     let sought = length * x;
     let mixed = x * (one - x);
     let all = slope0 * slope1 * width;
@@ -164,7 +166,7 @@ fn look<const M: usize, S: Simd>(
         miss = is_found.select(miss, after);
         is_found |= after.simd_le(tolerance) & next.simd_ge(u0) & next.simd_le(u1);
     }
-    // The rates of the axes; see `PhaseMotion::sample`.
+    // Velocity, acceleration and jerk of the axes, as in `PhaseMotion::sample`.
     let q = with_count!(piece.control.len(), n, derivatives(piece, n, u));
     let [square, slope, bend] = match lengths.square {
         Square::Axes(_) => {
@@ -219,7 +221,7 @@ fn speed<const M: usize, S: Simd>(lengths: &PolynomialLengths<M>, u: f64x8<S>) -
             });
             sum.sqrt() * lengths.per_width
         }
-        // A square that touches 0 may be a rounding error below it.
+        // A square that touches 0 may be negative by rounding.
         Square::Tip(tip) => value(&tip.derivatives[0], t).max(f64x8::splat(u.simd, 0.0)).sqrt(),
     }
 }
@@ -236,7 +238,7 @@ fn value<S: Simd>(polynomial: &Polynomial<MAX_TIP>, t: f64x8<S>) -> f64x8<S> {
     sum
 }
 
-/// The length from one place to another, by the rule of the table.
+/// The length between two places, by one panel of the quadrature rule of the table.
 #[inline(always)]
 fn way<const M: usize, S: Simd>(lengths: &PolynomialLengths<M>, from: f64x8<S>, to: f64x8<S>) -> f64x8<S> {
     let (middle, half) = ((from + to) * 0.5, (to - from) * 0.5);
@@ -248,7 +250,7 @@ fn way<const M: usize, S: Simd>(lengths: &PolynomialLengths<M>, from: f64x8<S>, 
     half * sum
 }
 
-/// v² in powers of the part of the length; see `SpeedSq`.
+/// v² as a polynomial of the share of the length, as in `SpeedSq`.
 #[inline(always)]
 fn cubic<S: Simd>(speeds: [f64x8<S>; 2], a: [f64x8<S>; 2], length: f64x8<S>) -> [f64x8<S>; 4] {
     let (from, to) = (speeds[0] * speeds[0], speeds[1] * speeds[1]);
@@ -256,13 +258,13 @@ fn cubic<S: Simd>(speeds: [f64x8<S>; 2], a: [f64x8<S>; 2], length: f64x8<S>) -> 
     [from, slope, rise * 3.0 - slope * 2.0 - end_slope, slope + end_slope - rise * 2.0]
 }
 
-/// The part of the length in powers of the part of the time; see `Series` of `Cubic`.
+/// The share of the length as a power series of the share of the time, as `Series` in `Cubic`.
 struct Series<S: Simd> {
     terms: [f64x8<S>; TERMS],
     error: f64x8<S>,
 }
 
-/// With the time over the length.
+/// The series for this v²; `scale` is the duration over the length.
 #[inline(always)]
 fn series<S: Simd>(&[w, slope, bend, c3]: &[f64x8<S>; 4], scale: f64x8<S>) -> Series<S> {
     let half = scale * scale * 0.5;
@@ -281,7 +283,7 @@ fn series<S: Simd>(&[w, slope, bend, c3]: &[f64x8<S>; 4], scale: f64x8<S>) -> Se
         }
         terms[count] = (p1 * terms[k] + p2 * square) * PER_TERM[k];
     }
-    // What the terms left out add at most.
+    // Bound of the sum of the omitted terms.
     let mut rest = [nothing; TERMS + 1];
     for k in (0..TERMS).rev() {
         rest[k] = rest[k + 1] + terms[k].abs();
@@ -295,7 +297,7 @@ fn series<S: Simd>(&[w, slope, bend, c3]: &[f64x8<S>; 4], scale: f64x8<S>) -> Se
     Series { terms, error: is_gentle.select(missed, nothing + f64::INFINITY) }
 }
 
-/// The part of the length at a part of the time, and its derivative.
+/// The share of the length at the share s of the time, and its derivative by s.
 #[inline(always)]
 fn values<S: Simd>(terms: &[f64x8<S>; TERMS], s: f64x8<S>) -> [f64x8<S>; 2] {
     let (mut value, mut slope) = (terms[TERMS - 1], f64x8::splat(s.simd, 0.0));
@@ -306,7 +308,7 @@ fn values<S: Simd>(terms: &[f64x8<S>; TERMS], s: f64x8<S>) -> [f64x8<S>; 2] {
     [value, slope]
 }
 
-/// C, C', C'' and C''' by u, by corner cutting; see `feedplan_geometry::spline::bezier`.
+/// C, C', C'' and C''' by u, by de Casteljau's algorithm; see `feedplan_geometry::spline::bezier`.
 #[inline(always)]
 fn derivatives<const M: usize, S: Simd>(piece: &Piece<M>, count: usize, u: f64x8<S>) -> [[f64x8<S>; M]; 4] {
     let control = &piece.control[..count];
@@ -368,7 +370,7 @@ mod tests {
         PiecePath::new(piece, Counts::Axes, Counts::Axes)
     }
 
-    /// The same where laws are about the way of a tip, which goes half as far in Y and farther with X.
+    /// This path, with laws that refer to the length of a tip, which moves half as far in Y and farther with X.
     fn path_of_tip(control: &[[f64; 2]]) -> PiecePath<'_, 2> {
         let (piece, degree) =
             (Piece { control, weights: &[], width: (control.len() - 1) as f64 }, control.len() - 1);
@@ -382,7 +384,7 @@ mod tests {
         PiecePath::new(piece, Counts::Axes, Counts::Tip(TipSpeed::new(&coefficients, piece.width)))
     }
 
-    /// A phase from one speed to another, with the accelerations there, and as long as it takes.
+    /// A phase with these speeds and accelerations at its ends, and with the duration that follows from them.
     fn phase(path: &PiecePath<2>, u: [f64; 2], speeds: [f64; 2], a: [f64; 2]) -> Phase {
         let (law, [u0, u1], [a0, a1]) = (PhaseLaw::SpeedCubic, u, a);
         let mut made =
@@ -428,7 +430,7 @@ mod tests {
         assert_eq!(known(&curve, &times[1..4]), [false; 3]);
         let rational = path(&control, &[1.0, 2.0, 2.0, 1.0]);
         assert_eq!(known(&rational, &[half(whole)]), [false]);
-        // Next to a turn the table of lengths has many rows.
+        // Near a sharp turn the table of lengths has many rows.
         let turn = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.3], [0.0, 0.3]];
         let curve = path(&turn, &[]);
         let [short, long] =

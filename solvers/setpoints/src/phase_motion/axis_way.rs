@@ -1,8 +1,8 @@
-//! The way of one axis along a phase, and the place at a part of it by Newton's method in a bracket.
+//! The displacement of one axis along a phase, and the place at a share of it, by Newton's method with bisection.
 //!
-//! The way is measured from the end of the phase where |q'_k| is smaller, as the integral of q'_k in Bernstein form:
-//! coefficients of one sign lose no digits where q'_k vanishes, differences of positions would. Axis k is reflected so that
-//! q'_k ≥ 0. On rational pieces q'_k = h/ω² and its integral is m/ω.
+//! The displacement is measured from the end of the phase where |q'_k| is smaller, as the integral of q'_k in Bernstein form:
+//! coefficients of one sign lose no digits where q'_k vanishes; differences of positions would. The sign of axis k is chosen so
+//! that q'_k ≥ 0. On rational pieces q'_k = h/ω², and its integral is m/ω.
 
 use super::clock::Even;
 use super::part::Part;
@@ -14,19 +14,19 @@ use feedplan_geometry::spline::{Piece, MAX_HODOGRAPH};
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phase;
 
-/// Coefficients of a hodograph, and one more for its integral.
+/// Greatest number of coefficients of a hodograph, plus one for its integral.
 const C: usize = MAX_HODOGRAPH + 1;
-/// Quadratically convergent, a relative step this small leaves an error below rounding.
+/// A relative Newton step this small leaves an error below rounding, since the convergence is quadratic.
 const LAST_STEP: f64 = 3e-9;
-/// More rounds than Newton's method and bisection together take.
+/// More rounds than Newton's method and bisection can take together.
 const MAX_ROUNDS: u32 = 120;
-/// The axis turns at an end where q'_k is below this part of its mean.
+/// The axis turns at an end where q'_k is below this share of its mean.
 const TURN: f64 = 1e-4;
-/// The speed of the axis at such an end is rounding below this part of that at the other one. A speed that is left out
-/// is a delay of all other axes.
+/// At an end where the axis turns, its speed counts as rounding below this share of that at the other end and of the mean. If a
+/// real speed were neglected, all other axes would be delayed.
 const PASSED: f64 = 1e-9;
 
-/// q'_k and its integral along the phase from one of its ends, over x in [0, 1].
+/// q'_k and its integral along the phase from one of its ends, as functions of x in [0, 1].
 struct Way {
     h: Polynomial<C>,
     omega: Polynomial<C>,
@@ -41,7 +41,7 @@ impl Way {
         way
     }
 
-    /// The way to x.
+    /// The displacement from 0 to x.
     #[inline(always)]
     fn to(&self, x: f64) -> f64 {
         let m = self.m.value(x);
@@ -64,7 +64,7 @@ impl Way {
         }
     }
 
-    /// The x where a part of the whole way is done, and the rounds.
+    /// The x at a share of the whole displacement, and the number of rounds.
     fn place(&self, part: f64) -> (f64, u32) {
         let target = part * self.total;
         let (low, high) = (self.slope(0.0).max(0.0), self.slope(1.0).max(0.0));
@@ -95,27 +95,27 @@ impl Way {
             if last {
                 return (next.clamp(0.0, 1.0), round);
             }
-            // Where the steps do not settle the bracket is halved.
+            // Bisection now and then, in case the Newton steps do not converge.
             x = if round % 16 == 0 { middle } else { next };
         }
         (x, MAX_ROUNDS)
     }
 }
 
-/// The way of axis k along a phase on which it has a constant acceleration, which may be 0.
+/// The displacement of axis k along a phase on which the axis has a constant acceleration or velocity.
 pub struct AxisWay {
     pub k: usize,
     pub sign: f64,
-    /// From the start and from the end.
+    /// Measured from the start and from the end of the phase.
     ways: [Way; 2],
-    /// The way is measured from the start, where |q'_k| is smaller.
+    /// Whether |q'_k| is smaller at the start, from which the displacement is then measured.
     pub from_start: bool,
     /// Whether q'_k vanishes at each end: the axis turns there, or the path is at rest.
     pub turns: [bool; 2],
 }
 
 impl AxisWay {
-    /// With the speeds of the axis at both ends. None where the axis shows no motion: the phase is as short as a rounding
+    /// Also returns the speeds of the axis at both ends. None where the axis shows no motion: the phase is as short as a rounding
     /// error.
     pub fn new<const M: usize>(piece: &Piece<M>, phase: &Phase) -> Option<(Self, Even)> {
         let k = phase.axis as usize;
@@ -124,7 +124,7 @@ impl AxisWay {
         let (h, omega) = (h.part(t0, t1).scale(t1 - t0), omega.part(t0, t1));
         let sign = if h.value(0.5) >= 0.0 { 1.0 } else { -1.0 };
         let mut h = h.scale(sign);
-        // A q'_k that the profile's cuts put to 0 comes out as a rounding error of either sign.
+        // Where the profile cuts phases at q'_k = 0, the computed value is a rounding error of either sign.
         if h.first() < 0.0 {
             h.set_first(0.0);
         }
@@ -141,7 +141,7 @@ impl AxisWay {
             [(slopes[0], phase.p0), (slopes[1], phase.p1)].map(|(slope, p)| slope / width * p.sqrt());
         let stands = standstills(piece, phase);
         let fast = [0, 1].map(|i| speeds[i] > PASSED * speeds[1 - i].min(mean));
-        // An axis that hardly moves while others do, and yet more than rounding says, does not turn.
+        // An axis that moves much slower than others, but faster than rounding explains, does not turn.
         let turns = [0, 1].map(|i| slopes[i] <= TURN * way && (stands[i] || !fast[i]));
         let even = if phase.law == PhaseLaw::AxisVelocity {
             Even::constant(phase.value.sqrt())
@@ -156,7 +156,7 @@ impl AxisWay {
         moves.then_some((Self { k, sign, ways, from_start: slopes[0] <= slopes[1], turns }, even))
     }
 
-    /// Where a part of the way is done.
+    /// The place at a share of the displacement.
     pub fn place(&self, phase: &Phase, part: Part) -> Located {
         let (x, iterations) = self.ways[usize::from(!part.from_start)].place(part.share);
         let way = (phase.u1 - phase.u0) * x;
@@ -164,7 +164,7 @@ impl AxisWay {
         Located { u: u.clamp(phase.u0, phase.u1), iterations, miss: f64::EPSILON }
     }
 
-    /// The part of the way at u, from the nearer end.
+    /// The share of the displacement at u, counted from the nearer end.
     pub fn part(&self, phase: &Phase, u: f64) -> Part {
         let width = phase.u1 - phase.u0;
         let (before, after) = ((u - phase.u0) / width, (phase.u1 - u) / width);
@@ -174,7 +174,7 @@ impl AxisWay {
     }
 }
 
-/// Whether no axis moves at the ends of a phase, beside what they do in its middle.
+/// Whether, at each end of a phase, all axes are at rest compared with its middle.
 fn standstills<const M: usize>(piece: &Piece<M>, phase: &Phase) -> [bool; 2] {
     let speed = |u: f64| norm(&derivatives(piece, u)[1]);
     let middle = speed(0.5 * (phase.u0 + phase.u1));
@@ -190,7 +190,7 @@ fn numerator<const M: usize>(piece: &Piece<M>, k: usize) -> (Polynomial<C>, Poly
         return (Polynomial::from_bernstein(steps), Polynomial::constant(1.0));
     }
     let omega = Polynomial::from_bernstein(weights.iter().map(|&weight| weight / weights[0]));
-    // About the first point, for the digits.
+    // Relative to the first point, to lose no digits.
     let points = control.iter().zip(weights).map(|(point, w)| (point[k] - control[0][k]) * (w / weights[0]));
     (Polynomial::from_bernstein(points).wronskian(&omega), omega)
 }

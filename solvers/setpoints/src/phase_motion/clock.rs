@@ -1,8 +1,9 @@
-//! Speed along the measure of a phase, and the part of the measure that is done, at a time, by the phase's law: in closed form
-//! at constant acceleration, by Newton's method at constant jerk, by a table of times where v² is linear in u. `cubic` has v² as
-//! a cubic of the length.
+//! Speed along the measure of a phase, and the share of the measure that is done, at a time, by the law of the phase: in closed
+//! form at constant acceleration, by polynomials of time at constant jerk, by a table of times where v² is linear in u. In
+//! `cubic`, v² is a cubic of the length.
 //!
-//! Parts are counted from the end of the phase that is nearer in time, so that nothing is lost next to rest.
+//! Shares are counted from the end of the phase that is nearer in time, for the displacement of an axis from the end with the
+//! smaller |q'_k|, and in `cubic` from the slower end, so that no digits are lost next to rest.
 
 pub mod cubic;
 
@@ -16,10 +17,10 @@ use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phase;
 
-/// A speed below 0 is rounding where it is this part of what speed and acceleration at the ends make of it.
+/// A negative speed counts as rounding down to this share of the speeds and speed changes at the ends.
 const BACKWARDS: f64 = 1e-9;
 
-/// v along the measure by time.
+/// v along the measure as a function of time.
 pub enum Clock {
     Even(Even),
     Jerk(Jerk),
@@ -27,7 +28,7 @@ pub enum Clock {
     Line(Box<SpeedLine>),
 }
 
-/// v linear in time, from one end to the other: v² is linear in the measure.
+/// v linear in time, given by its values at both ends; v² is linear in the measure.
 pub struct Even {
     pub v: [f64; 2],
     pub a: f64,
@@ -38,7 +39,8 @@ impl Even {
         Self { v: [v; 2], a: 0.0 }
     }
 
-    /// The part of the measure when these parts of the duration are done and left, counted from an end.
+    /// The share of the measure after the share `done` of the duration, with the share `left` still to go, counted from the start
+    /// or the end.
     pub fn part(&self, from_start: bool, done: f64, left: f64) -> Part {
         let [v0, v1] = self.v;
         let v = v0 * left + v1 * done;
@@ -61,7 +63,7 @@ impl Even {
     }
 }
 
-/// v, a and j at one end, counted away from it: time runs back from the end of a phase.
+/// v, a and j at one end of a phase, counted away from it: from the end of the phase, time runs backwards.
 #[derive(Clone, Copy)]
 struct End {
     v: f64,
@@ -78,9 +80,9 @@ impl End {
         self.v + t * (self.a + t * 0.5 * self.j)
     }
 
-    /// The time up to `most` after which a way is done, on which the motion does not turn back.
+    /// The time in [0, `most`], within which the motion does not turn back, after which the distance `way` is done.
     fn time(&self, way: f64, most: f64) -> f64 {
-        // Where all terms are positive this is beyond the time, and Newton's method comes down to it.
+        // If all terms are positive, this is not before the sought time, and Newton's method converges from above.
         let alone = |term: f64, time: f64| if term > 0.0 { time } else { f64::INFINITY };
         let guess = alone(self.v, way / self.v)
             .min(alone(self.a, (2.0 * way / self.a).sqrt()))
@@ -89,11 +91,11 @@ impl End {
     }
 }
 
-/// Constant jerk along the path: v, a and the way are polynomials of time.
+/// Constant jerk along the path: v, a and the distance are polynomials of time.
 pub struct Jerk {
     ends: [End; 2],
     duration: f64,
-    /// Ways of the two halves of the duration.
+    /// Distances in the first and in the second half of the duration.
     ways: [f64; 2],
 }
 
@@ -104,7 +106,7 @@ impl Jerk {
         Self { ends, duration: t, ways: ends.map(|end| end.way(0.5 * t)) }
     }
 
-    /// The end that is nearer in time, and the time from there.
+    /// The end that is nearer in time (0 or 1), and the time from it.
     fn nearer(&self, done: f64, left: f64) -> (usize, f64) {
         if done <= 0.5 {
             (0, done * self.duration)
@@ -144,7 +146,7 @@ impl Jerk {
         }
     }
 
-    /// Why nothing can follow it.
+    /// Why the phase cannot be followed; None if it can.
     pub fn flaw(&self) -> Option<&'static str> {
         let (t, start) = (self.duration, &self.ends[0]);
         if t <= 0.0 {
@@ -159,11 +161,11 @@ impl Jerk {
     }
 }
 
-/// v² linear in u; the time is a table over u, or over the root of the way of u from rest.
+/// v² linear in u; the time is a table over u or, from rest, over the square root of the distance in u from there.
 pub struct SpeedLine {
     law: PhaseLaw,
     line: Line,
-    /// The end at rest on a path with a direction there, and the sign of u away from it.
+    /// The end at rest, where the path has a direction there (C' is not 0), and the sign of u away from it.
     rest: Option<(f64, f64)>,
     times: Vec<Node>,
     time_error: f64,
@@ -194,7 +196,8 @@ impl SpeedLine {
         self.rest.map(|(place, sign)| FromRest { source, place, sign, slope })
     }
 
-    /// The place when these parts of the duration are done and left, within an error in parts of the duration.
+    /// The place after the share `done` of the duration, with the share `left` still to go; `error` is the allowed error as a
+    /// share of the duration.
     pub fn place<const M: usize>(&self, path: &PiecePath<M>, done: f64, left: f64, error: f64) -> Located {
         let rate = path.rate(self.law, self.line);
         match self.time_from_rest(&rate) {
@@ -214,7 +217,7 @@ impl SpeedLine {
         Located { miss: (found.miss + self.time_error) / total, ..found }
     }
 
-    /// The part of the duration that has passed at u.
+    /// The share of the duration that has passed at u.
     pub fn done<const M: usize>(&self, path: &PiecePath<M>, u: f64) -> f64 {
         let rate = path.rate(self.law, self.line);
         match self.time_from_rest(&rate) {
@@ -234,7 +237,7 @@ impl SpeedLine {
         }
     }
 
-    /// The motion at u; a and j at the place `at`, whose length per u is g, with the slope dg.
+    /// The motion at u at time t. a and j are those at the place `at`, where the length per u is g and its derivative is dg.
     pub fn pace(&self, u: f64, at: f64, g: f64, dg: f64, t: f64) -> Pace {
         // a = v dv/ds with ds = g du.
         let a = 0.5 * self.line.slope / g;

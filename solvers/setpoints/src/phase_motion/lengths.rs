@@ -1,5 +1,5 @@
-//! The lengths of one piece that laws are about, as tables shared by all phases on it: of the axes, of what the feed counts,
-//! and of the whole path. The place at a length comes from `feedplan_geometry::inverse_length`.
+//! The lengths of one piece that laws refer to, as tables shared by all phases on it: of the axes, of what the feed counts, and
+//! of the path. `feedplan_geometry::inverse_length` finds the place at a length.
 
 use std::cell::{Cell, OnceCell};
 
@@ -15,37 +15,37 @@ use feedplan_geometry::tolerance;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::Phase;
 
-/// C' vanishes at an end where |C'|² is below this part of that in the middle of the phase.
+/// C' counts as 0 at an end where |C'|² is below this share of that in the middle of the phase.
 pub const SLOW: f64 = 1e-8;
-/// Tables of lengths are built for this part of the phase's piece; a phase may be a small part of it.
+/// Allowed error of a table of lengths, as a share of the length of the piece; a phase may be a small part of the piece.
 pub const ERROR: f64 = 0.125 * tolerance::TABLE;
 
-/// Whose length a law is about.
+/// Whose length a law refers to.
 #[derive(Clone, Debug)]
 pub enum Counts<const M: usize> {
     /// All axes of the piece.
     Axes,
-    /// Each axis times its share.
+    /// The axes, each multiplied by its share.
     Shares([f64; M]),
-    /// The tool tip, whose joints the piece moves.
+    /// The tool tip; the axes of the piece are joints that move it.
     Tip(TipSpeed),
 }
 
-/// A piece with its lengths, which are tabulated when they are first asked for.
+/// A piece with its lengths, which are tabulated when they are first needed.
 pub struct PiecePath<'a, const M: usize> {
     piece: Piece<'a, M>,
     feed: Counts<M>,
     way: Counts<M>,
-    /// Of the axes, of the feed, of the way.
+    /// Lengths of the axes, of what the feed counts, and of the path.
     lengths: [OnceCell<Lengths<'a, M>>; 3],
-    /// A place, and the square of the length per u there.
+    /// The last u, and the square of the length per u there; one pair for each length.
     last_square: [Cell<[f64; 2]>; 3],
 }
 
 const AXES: usize = 0;
 
 impl<'a, const M: usize> PiecePath<'a, M> {
-    /// What counts at the feed, and in laws about the way along the path. On a speed line shares do not count.
+    /// `feed` is what the feed counts, `way` what the laws along the path count. Speed lines ignore shares.
     pub fn new(piece: Piece<'a, M>, feed: Counts<M>, way: Counts<M>) -> Self {
         let last_square = [const { Cell::new([f64::NAN; 2]) }; 3];
         Self { piece, feed, way, lengths: Default::default(), last_square }
@@ -72,19 +72,19 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         self.lengths[number].get_or_init(|| Lengths::new(self.piece, counts))
     }
 
-    /// The length that a law is about.
+    /// The length that a law refers to.
     fn of(&self, law: PhaseLaw) -> &Lengths<'a, M> {
         let (number, counts) = self.counts(law);
         self.lengths(number, counts)
     }
 
-    /// The length from the start of the piece to u, and per u there.
+    /// The length from the start of the piece to u, and the length per u there.
     pub(super) fn row(&self, law: PhaseLaw, u: f64) -> Node {
         let lengths = self.of(law);
         lengths.even.map_or_else(|| lengths.row(u), |even| Node { u, sum: even * u, rate: even })
     }
 
-    /// The place at a length between two places with theirs, with the proven error of the table in its miss.
+    /// The place at a length between two known places. `miss` includes the proven error of the table.
     pub(super) fn locate(&self, law: PhaseLaw, length: f64, tolerance: f64, ends: &[Node; 2]) -> Located {
         let lengths = self.of(law);
         if let Some(even) = lengths.even {
@@ -96,7 +96,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         Located { miss: found.miss + error, ..found }
     }
 
-    /// The lengths that a law is about, where the square of their speed is a polynomial and the piece has no weights.
+    /// The length that a law refers to, where the square of its speed is a polynomial and the piece has no weights; else None.
     pub(super) fn polynomial_lengths(&self, law: PhaseLaw) -> Option<PolynomialLengths<'_, M>> {
         if self.piece.is_rational() {
             return None;
@@ -122,17 +122,17 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         Some(PolynomialLengths { square, per_width, nodes, error: *error, steepest: *steepest, rounding })
     }
 
-    /// The length of a phase from one quadrature.
+    /// The length of a phase by a single quadrature.
     pub(super) fn rough_length(&self, phase: &Phase) -> f64 {
         quadrature(&self.rate(phase.law, Line::ONE), phase.u0, phase.u1)
     }
 
-    /// The time per u of a speed line.
+    /// The integrand of the time on a speed line: the time per u.
     pub(super) fn rate(&self, law: PhaseLaw, line: Line) -> Rate<'_, M> {
         self.of(law).rate(line)
     }
 
-    /// The same with the bounds that a table is built by.
+    /// The time per u on a speed line, with the bounds needed to build a table of its integral.
     pub(super) fn bounded(&self, law: PhaseLaw, line: Line) -> Rate<'_, M> {
         self.of(law).bounded(line)
     }
@@ -142,7 +142,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         self.rate(law, Line::ONE).at(u).powi(2)
     }
 
-    /// The length per u, and its first two derivatives, where q and its derivatives are known.
+    /// The length per u and its first two derivatives, from q and its first three derivatives.
     pub(super) fn slopes(&self, law: PhaseLaw, u: f64, q: &[[f64; M]; 4]) -> [f64; 3] {
         let of_axes = |q: &[[f64; M]; 4]| {
             let bend = 2.0 * (dot(&q[2], &q[2]) + dot(&q[1], &q[3]));
@@ -153,13 +153,13 @@ impl<'a, const M: usize> PiecePath<'a, M> {
             Counts::Shares(share) => of_axes(&q.map(|q| times(share, &q))),
             Counts::Tip(tip) => tip.derivatives.each_ref().map(|d| d.value(u / self.piece.width)),
         };
-        // A square that touches 0 may be a rounding error below it.
+        // A square that touches 0 may be negative by rounding.
         let g = square.max(0.0).sqrt();
         let dg = 0.5 * slope / g;
         [g, dg, (0.5 * bend - dg * dg) / g]
     }
 
-    /// What a law counts of a way in a direction of length 1.
+    /// Length that a law counts of a unit displacement in this direction.
     pub(super) fn share_of(&self, law: PhaseLaw, direction: &[f64; M]) -> f64 {
         match self.counts(law).1 {
             Counts::Shares(share) => norm(&times(share, direction)),
@@ -170,7 +170,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
     /// Squares of the length per u at both ends of a phase.
     pub(super) fn end_squares(&self, phase: &Phase) -> [f64; 2] {
         let (number, _) = self.counts(phase.law);
-        // Most phases begin where one has ended.
+        // Most phases begin at the end of the phase before.
         let [u, known] = self.last_square[number].get();
         let first = if u == phase.u0 { known } else { self.square(phase.law, phase.u0) };
         let last = self.square(phase.law, phase.u1);
@@ -178,7 +178,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         [first, last]
     }
 
-    /// The place a length of the axes ahead of u, within `tolerance` mm, by Newton–Raphson.
+    /// The place at a distance of `step` from u along the length of the axes, within `tolerance` mm, by Newton–Raphson.
     pub fn advance(&self, u: f64, step: f64, tolerance: f64) -> Located {
         let lengths = self.lengths(AXES, &Counts::Axes);
         if let Some(even) = lengths.even {
@@ -188,7 +188,7 @@ impl<'a, const M: usize> PiecePath<'a, M> {
         newton::advance(&table, (u, table.integral(u)), step, tolerance).0
     }
 
-    /// No length of the axes is found more closely than this, and the proven error of its table.
+    /// The error bound by rounding of lengths of the axes, and the proven error of their table, in mm.
     pub fn length_errors(&self) -> [f64; 2] {
         let lengths = self.lengths(AXES, &Counts::Axes);
         let rounding = match lengths.even {
@@ -203,7 +203,7 @@ fn times<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
     std::array::from_fn(|k| a[k] * b[k])
 }
 
-/// The length per u of a piece, ready to be integrated.
+/// The speed of a length, in mm per u.
 enum Speeds<const M: usize> {
     Axes { coefficients: Coefficients<M>, width: f64 },
     Tip { square: Box<Polynomial<MAX_TIP>>, width: f64 },
@@ -220,7 +220,7 @@ impl<const M: usize> Speeds<M> {
         }
     }
 
-    /// The length per u of a line, whose control points are even.
+    /// The constant length per u of a line whose control points are equally spaced; else None.
     fn even(&self) -> Option<f64> {
         match self {
             Self::Axes { coefficients, width } => {
@@ -241,28 +241,30 @@ impl<const M: usize> Speeds<M> {
     }
 }
 
-/// The square of a speed on a piece without weights.
+/// The square of the speed of a length on a piece without weights.
 pub(super) enum Square<'a, const M: usize> {
-    /// Of the axes: Bernstein coefficients of the hodograph times binomials.
+    /// Of the axes: Bernstein coefficients of the hodograph times binomial coefficients.
     Axes(&'a [[f64; M]]),
     Tip(&'a TipSpeed),
 }
 
-/// Lengths whose speed has such a square.
+/// A length whose squared speed is a polynomial.
 pub(super) struct PolynomialLengths<'a, const M: usize> {
     pub square: Square<'a, M>,
     pub per_width: f64,
-    /// Of the table; none of a line.
+    /// The table; empty for a line.
     nodes: &'a [Node],
-    /// Its proven error, at least the slope of the length per u, and what no length is known more closely than.
+    /// The proven error of the table, an upper bound of the derivative of the length per u, and the rounding error bound of
+    /// lengths.
     pub error: f64,
     pub steepest: f64,
     pub rounding: f64,
 }
 
 impl<const M: usize> PolynomialLengths<'_, M> {
-    /// Whether the rule of the table is as good between two places as on its panels: they are no farther apart than the panels that
-    /// they and what is between them are on are wide. The bound of the derivatives that makes a panel so wide holds on all of it.
+    /// Whether the quadrature rule of the table is as accurate between these places as on the panels of the table: it is if the
+    /// interval is not longer than any panel that it overlaps, since the derivative bound that gives the width of a panel holds
+    /// on the whole panel.
     pub fn is_rule_good(&self, from: f64, to: f64) -> bool {
         let first = self.nodes.partition_point(|node| node.u <= from).saturating_sub(1);
         let panels = self.nodes[first.min(self.nodes.len())..].windows(2);
@@ -270,21 +272,21 @@ impl<const M: usize> PolynomialLengths<'_, M> {
     }
 }
 
-/// A table of a length, its proven error, and at least the slope of the length per u.
+/// A table of a length, its proven error, and an upper bound of the derivative of the length per u.
 struct Filled {
     nodes: Vec<Node>,
     error: f64,
     steepest: f64,
 }
 
-/// A length of a piece, with a table of it that is filled when it is first asked for.
+/// A length of a piece, with a table that is filled when it is first needed.
 struct Lengths<'a, const M: usize> {
     piece: Piece<'a, M>,
     speeds: Speeds<M>,
-    /// The length per u, where it is the same everywhere: on lines.
+    /// The length per u where it is constant, on lines.
     even: Option<f64>,
     table: OnceCell<Filled>,
-    /// What was asked for last: most phases begin where one has ended.
+    /// The last result: most phases begin at the end of the phase before.
     last: Cell<Node>,
 }
 
@@ -294,7 +296,7 @@ impl<'a, const M: usize> Lengths<'a, M> {
         Self { piece, even: speeds.even(), speeds, table: OnceCell::new(), last: Cell::new(none) }
     }
 
-    /// The length up to u, and per u there.
+    /// The length up to u, and the length per u there.
     fn row(&self, u: f64) -> Node {
         let last = self.last.get();
         if u == last.u {
@@ -305,12 +307,13 @@ impl<'a, const M: usize> Lengths<'a, M> {
         row
     }
 
-    /// The length per u over the root of v².
+    /// The length per u divided by the square root of v².
     fn rate(&self, line: Line) -> Rate<'_, M> {
         Rate { source: self.speeds.source(), line, foot: f64::NAN }
     }
 
-    /// The same with the bounds that a table is built by, and the end of the piece where C' vanishes.
+    /// The length per u divided by the square root of v², with the bounds needed to build a table, and the end of the piece where
+    /// C' vanishes.
     fn bounded(&self, line: Line) -> Rate<'_, M> {
         let square = |u: f64| self.rate(Line::ONE).at(u).powi(2);
         let least = SLOW * square(0.5 * self.piece.width);
@@ -340,7 +343,7 @@ impl<'a, const M: usize> Lengths<'a, M> {
     }
 }
 
-/// A table of f from one end to another, and its proven error.
+/// A table of the integral of f between two ends, and its proven error.
 pub(super) fn fill<F: Integrand>(f: F, ends: (f64, f64)) -> (Vec<Node>, f64) {
     let (estimate, mut nodes) = (quadrature(&f, ends.0, ends.1), Vec::new());
     let error = tabulate(f, ends.0, ends.1, ERROR * estimate, &mut nodes);

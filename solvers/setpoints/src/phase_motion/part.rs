@@ -1,4 +1,5 @@
-//! A place on a phase as a share of its whole measure: of its length, of its parameter or of the way of an axis.
+//! A place on a phase as a share of its whole measure: of its length, of its parameter interval or of the displacement of an
+//! axis.
 
 /// A share of the whole measure of a phase, counted from its start or from its end.
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +9,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// The same from the end that is nearer.
+    /// The same place, counted from the nearer end.
     pub fn nearer_end(self) -> Self {
         if self.share <= 0.5 {
             self

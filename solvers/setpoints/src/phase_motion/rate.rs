@@ -1,21 +1,21 @@
-//! What is integrated along a phase: the length per u, |C'| of the axes or √D of the tool tip, over the root of a v² that is
+//! The integrands along a phase: the length per u, which is |C'| of the axes or √D of the tool tip, divided by v, where v² is
 //! linear in u. With v = 1 the integral is the length, otherwise the time.
 
 use feedplan_geometry::arc_length::{Disc, Integrand};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::spline::speed::{greatest_ratio, to_taylor, Speed};
 
-/// Most coefficients of a tip speed.
+/// Greatest number of coefficients of a tip speed.
 pub const MAX_TIP: usize = 37;
 
-/// D(u), the square of the tip's speed per parameter on one piece, D' and D'' over t = u / width.
+/// D, the square of the tip's speed per u on one piece, and its derivatives D' and D'' by u, as polynomials in t = u / width.
 #[derive(Clone, Debug)]
 pub struct TipSpeed {
     pub derivatives: Box<[Polynomial<MAX_TIP>; 3]>,
 }
 
 impl TipSpeed {
-    /// By the Bernstein coefficients of D on a piece of this width.
+    /// From the Bernstein coefficients of D on a piece of this width.
     pub fn new(coefficients: &[f64], width: f64) -> Self {
         let square = Polynomial::from_bernstein(coefficients.iter().copied());
         let slope = square.derivative().scale(1.0 / width);
@@ -33,7 +33,7 @@ pub struct Tip<'a> {
 impl Tip<'_> {
     #[inline(always)]
     fn at(&self, u: f64) -> f64 {
-        // A D that touches 0 may be a rounding error below it.
+        // A D that touches 0 may be negative by rounding.
         self.square.value(u / self.width).max(0.0).sqrt()
     }
 
@@ -42,7 +42,7 @@ impl Tip<'_> {
         self.square.values_in_vectors(u.map(|u| u / self.width)).map(|square| square.max(0.0).sqrt())
     }
 
-    // As for |C'|: no zero of D within the disc.
+    // As for |C'|: the disc contains no zero of D.
     fn disc(&self, a: f64, b: f64) -> Disc {
         let (middle, half) = (0.5 * (a + b) / self.width, 0.5 * (b - a) / self.width);
         let n = self.square.degree();
@@ -53,7 +53,7 @@ impl Tip<'_> {
         to_taylor(&mut taylor[..=n], middle, half);
         let least = taylor[0][0];
         if least <= 0.0 {
-            // Below rounding: taken for 0, whose integral has no error.
+            // Below rounding: counts as 0, whose integral has no error.
             return Disc { radius: f64::INFINITY, bound: 0.0 };
         }
         let ratio = greatest_ratio(|rho| {
@@ -66,7 +66,7 @@ impl Tip<'_> {
         self.square.range().1.max(0.0).sqrt()
     }
 
-    // |D'| / 2√D, each at its bound; where D may vanish there is none.
+    // Bound of |D'| divided by twice that of √D; infinite where D may vanish.
     fn steepest(&self) -> f64 {
         let least = self.square.range().0;
         let (low, high) = self.square.derivative().range();
@@ -77,7 +77,7 @@ impl Tip<'_> {
     }
 }
 
-/// Whose speed.
+/// Whose speed is integrated.
 #[derive(Clone, Copy, Debug)]
 pub enum Source<'a, const M: usize> {
     Own(Speed<'a, M>),
@@ -108,7 +108,7 @@ impl<const M: usize> Source<'_, M> {
         }
     }
 
-    /// At least the slope of the speed; infinite where that is not known.
+    /// Upper bound of the derivative of the speed by u; infinite where none is known.
     pub fn steepest(&self) -> f64 {
         match self {
             Self::Own(speed) => speed.steepest(),
@@ -133,7 +133,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// 1 everywhere: what is integrated is the length.
+    /// v² = 1: the integral is the length.
     pub const ONE: Self = Self { start: 1.0, slope: 0.0, u0: 0.0 };
 
     #[inline(always)]
@@ -142,19 +142,19 @@ impl Line {
     }
 }
 
-/// From rest at `place`, v² grows by `slope` with the way of u: by y, the root of that way, the time is the integral of
-/// 2 √D / √slope, which is smooth there.
+/// From rest at `place`, v² is `slope` times the distance in u from there. With y, the square root of that distance, the time is
+/// the integral of 2 √D / √slope over y, which is smooth at rest.
 #[derive(Clone, Copy, Debug)]
 pub struct FromRest<'a, const M: usize> {
     pub source: Source<'a, M>,
     pub place: f64,
-    /// 1 from the start of a phase, −1 back from its end.
+    /// 1 from the start of a phase, −1 backwards from its end.
     pub sign: f64,
     pub slope: f64,
 }
 
 impl<const M: usize> FromRest<'_, M> {
-    /// The parameter of the piece.
+    /// The parameter of the piece at y.
     pub fn u(&self, y: f64) -> f64 {
         self.place + self.sign * y * y
     }
@@ -166,7 +166,7 @@ impl<const M: usize> Integrand for FromRest<'_, M> {
         2.0 * self.source.at(self.u(y)) / self.slope.sqrt()
     }
 
-    // About y a disc of this radius goes into one of the other radius about u: r (2 b + r) = R.
+    // The disc of radius r about y is mapped into the disc of radius R about u if r (2 b + r) = R.
     fn disc(&self, a: f64, b: f64) -> Disc {
         let (from, to) = (self.u(a), self.u(b));
         let disc = self.source.disc(from.min(to), from.max(to));
@@ -190,7 +190,7 @@ impl<const M: usize> Integrand for FromRest<'_, M> {
 pub struct Rate<'a, const M: usize> {
     pub source: Source<'a, M>,
     pub line: Line,
-    /// Where D or v² is 0; not a number where neither is.
+    /// Where D or v² is 0; NaN if neither is.
     pub foot: f64,
 }
 
@@ -208,7 +208,7 @@ impl<const M: usize> Integrand for Rate<'_, M> {
     #[inline(always)]
     fn at_each<const K: usize>(&self, u: [f64; K]) -> [f64; K] {
         let mut rates = self.source.at_each(u);
-        // Divided by 1 nothing changes.
+        // A division by 1 can be left out.
         if self.line.slope != 0.0 || self.line.start != 1.0 {
             for (rate, u) in rates.iter_mut().zip(u) {
                 let square = if self.line.slope == 0.0 { self.line.start } else { self.line.at(u) };
@@ -218,7 +218,7 @@ impl<const M: usize> Integrand for Rate<'_, M> {
         rates
     }
 
-    // v² loses at most half of its least value within the disc.
+    // Within the disc v² falls to no less than half of its least value on [a, b].
     fn disc(&self, a: f64, b: f64) -> Disc {
         let disc = self.source.disc(a, b);
         let least = self.line.at(a).min(self.line.at(b));
@@ -235,7 +235,7 @@ impl<const M: usize> Integrand for Rate<'_, M> {
         self.foot
     }
 
-    // The speed's bound over √v²: at worst v² is `slope` times the distance from the foot.
+    // The bound of the speed over √v²: in the worst case v² is `slope` times the distance from the foot.
     fn foot_error(&self, width: f64) -> f64 {
         let speed = self.source.foot_error(width);
         if self.line.slope == 0.0 {

@@ -1,4 +1,4 @@
-//! Whether the arrays of a path and a profile fit together, before anything is computed from them.
+//! Checks, before anything is computed, that the arrays of a path and of a profile are valid and fit together.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::{Phase, Phases};
 
-/// The error is a sentence for the user.
+/// Checks path and profile; the error is a sentence for the user.
 pub(super) fn check<const M: usize>(
     path: &PathData<M>,
     phases: &Phases,
@@ -48,7 +48,7 @@ pub(super) fn check<const M: usize>(
     if !offsets(phase_runs, phases.len()) {
         return Err("the profile does not belong to this path: their runs differ".into());
     }
-    // At least one part of each run, so that a run without phases is looked at as well.
+    // Every run has at least one part, so that a run without phases is checked as well.
     let parts: Vec<(usize, Range<usize>)> = (0..runs)
         .flat_map(|r| {
             let (from, to) = (phase_runs[r], phase_runs[r + 1]);
@@ -70,7 +70,7 @@ pub(super) fn check<const M: usize>(
     first.map_or(Ok(()), Err)
 }
 
-/// What is wrong with a run without phases: that it moves.
+/// The error if the path moves in a run without phases.
 fn flaw_of_nothing<const M: usize>(path: &PathData<M>, run: usize) -> Option<String> {
     let of_run = path.curve.offsets[path.runs[run]]..path.curve.offsets[path.runs[run + 1]];
     let points = &path.curve.control[of_run];
@@ -81,7 +81,7 @@ fn flaw_of_nothing<const M: usize>(path: &PathData<M>, run: usize) -> Option<Str
     })
 }
 
-/// Whether coefficients and their offsets are those of so many pieces.
+/// Whether the arrays are coefficients and offsets for this number of pieces.
 fn fits_pieces(values: &[f64], offsets: &[usize], pieces: usize) -> bool {
     offsets.len() == pieces + 1
         && offsets[0] == 0
@@ -90,7 +90,7 @@ fn fits_pieces(values: &[f64], offsets: &[usize], pieces: usize) -> bool {
         && values.iter().all(|value| value.is_finite())
 }
 
-/// `piece` keeps the piece of the phase before.
+/// Checks one phase; `piece` caches the piece of the phase before.
 fn check_phase<'a, const M: usize>(
     path: &'a PathData<M>,
     run: usize,

@@ -1,10 +1,10 @@
-//! Setpoints in arrays, and their parts for parallel work.
+//! Setpoints as one array for each quantity, and their division into parts for parallel work.
 
-/// The greatest rounds and length error of some setpoints.
+/// The greatest number of iterations and the greatest length error of some setpoints.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Effort {
     pub iterations: u32,
-    /// In parts of the step; the table's proven error included.
+    /// As a share of the step; includes the proven error of the table of lengths.
     pub length_error: f64,
 }
 
@@ -15,7 +15,7 @@ impl Effort {
     }
 }
 
-/// Consecutive setpoints, one array per quantity. `piece` and `u` say where on the path.
+/// Consecutive setpoints, one array for each quantity. `piece` and `u` are their places on the path.
 #[derive(Clone, Debug, Default)]
 pub struct Chunk<const M: usize> {
     pub t: Vec<f64>,
@@ -29,7 +29,7 @@ pub struct Chunk<const M: usize> {
     pub effort: Effort,
 }
 
-/// Parts of a chunk's arrays, from setpoint `start` on.
+/// Parts of the arrays of a chunk, from setpoint `start` on.
 pub(super) struct Slices<'a, const M: usize> {
     pub start: usize,
     pub t: &'a mut [f64],
@@ -43,7 +43,7 @@ pub(super) struct Slices<'a, const M: usize> {
 }
 
 impl<const M: usize> Chunk<M> {
-    /// Room for `size` setpoints.
+    /// A chunk of `size` setpoints, all numbers 0.
     pub(super) fn with_size(size: usize) -> Self {
         Self {
             t: vec![0.0; size],
@@ -58,7 +58,7 @@ impl<const M: usize> Chunk<M> {
         }
     }
 
-    /// All its arrays, whose first setpoint is `start`.
+    /// Slices of all arrays; their first setpoint has the index `start`.
     pub(super) fn slices(&mut self, start: usize) -> Slices<'_, M> {
         Slices {
             start,
@@ -75,7 +75,7 @@ impl<const M: usize> Chunk<M> {
 }
 
 impl<const M: usize> Slices<'_, M> {
-    /// Splits before each of the given setpoints, which ascend.
+    /// Splits before each of the given setpoints, which must be in ascending order.
     pub(super) fn split(self, cuts: &[usize]) -> Vec<Self> {
         let mut parts = Vec::with_capacity(cuts.len() + 1);
         let mut rest = self;

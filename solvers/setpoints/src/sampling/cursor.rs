@@ -1,4 +1,4 @@
-//! The phase at a time of a run, for times that mostly rise.
+//! Finds the phase at a time of a run, for times that mostly ascend.
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -7,11 +7,11 @@ use super::path_data::PathData;
 use crate::phase_motion::{PhaseMotion, PiecePath};
 use feedplan_planner::phases::Phases;
 
-/// The phase at a time, kept from one setpoint to the next, and its piece, kept from one phase to the next.
+/// The current phase and the motion on it, and the current piece: kept as long as setpoints stay on them.
 pub struct Cursor<'a, const M: usize> {
     path: &'a PathData<M>,
     phases: &'a Phases,
-    /// Time from the start of the phase's run.
+    /// Start of each phase, from the start of its run, in s.
     starts: &'a [f64],
     phase: usize,
     piece: Option<(u32, Rc<PiecePath<'a, M>>)>,
@@ -23,19 +23,19 @@ impl<'a, const M: usize> Cursor<'a, M> {
         Self { path, phases, starts, phase: usize::MAX, piece: None, motion: None }
     }
 
-    /// The next search begins at this phase.
+    /// Sets the phase at which the next search begins.
     pub fn begin_at(&mut self, phase: usize) {
         self.phase = phase;
     }
 
-    /// Goes to the phase that contains the time, among those of a run, and makes its motion ready.
+    /// Goes to the phase of a run that contains the time, and prepares its motion.
     pub fn seek(&mut self, run: &Range<usize>, time: f64) -> usize {
         self.find(run, time);
         self.enter(self.phase);
         self.phase
     }
 
-    /// Goes to the phase that contains the time, among those of a run.
+    /// Goes to the phase of a run that contains the time.
     pub fn find(&mut self, run: &Range<usize>, time: f64) -> usize {
         let starts = self.starts;
         if !run.contains(&self.phase) || starts[self.phase] > time {
@@ -47,7 +47,7 @@ impl<'a, const M: usize> Cursor<'a, M> {
         self.phase
     }
 
-    /// Makes the motion on a phase ready.
+    /// Prepares the motion on a phase.
     pub fn enter(&mut self, number: usize) {
         if self.motion.as_ref().is_none_or(|(phase, _)| *phase != number) {
             let phase = self.phases.get(number).expect("all laws are known");
@@ -56,7 +56,7 @@ impl<'a, const M: usize> Cursor<'a, M> {
         }
     }
 
-    /// A piece, with the lengths that laws are about.
+    /// A piece with its lengths.
     pub fn piece(&mut self, number: u32) -> Rc<PiecePath<'a, M>> {
         let piece = match self.piece.take() {
             Some((last, piece)) if last == number => piece,

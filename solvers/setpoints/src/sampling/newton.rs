@@ -1,5 +1,5 @@
-//! The Newton–Raphson interpolator: from setpoint to setpoint by speed, acceleration and jerk times the period. Zhang et al.
-//! 2010, section 4.2, corrected.
+//! The Newton–Raphson interpolator (Zhang et al. 2010, section 4.2, corrected): each setpoint from the one before, by a step
+//! computed from speed, acceleration and jerk.
 
 use super::chunk::Slices;
 use super::{Effort, Resume, Sampler};
@@ -7,16 +7,16 @@ use crate::phase_motion::{PhaseMotion, Rates};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::watch::Watch;
 
-/// A speed below this part of what a step gains is treated as rest.
+/// A speed below this share of the speed gained in a step counts as rest.
 const REST: f64 = 1e-9;
 
-/// A Newton–Raphson step is repeated so often before halving; two or three times are usual.
+/// Limit of the Newton–Raphson steps before bisection; two or three are usual.
 const MAX_REPEATS: u32 = 20;
 
 impl<const M: usize> Sampler<M> {
-    /// Fills a part of one run. The paper's step v·T is of first order and stands still at rest: here it is of third
-    /// order on the phase that it ends on, and is repeated for the time that the profile still has to go from the
-    /// place reached, so that errors do not add up and every run ends on time.
+    /// Computes the setpoints of a part of one run. The step v·T of the paper is of first order and does not leave rest. Here the
+    /// step is of third order, on the phase on which it ends, and is repeated with the time that the profile still needs from the
+    /// place reached. So errors do not accumulate, and every run ends on time.
     pub(super) fn fill_by_steps(
         &self,
         mut part: Slices<M>,
@@ -64,7 +64,8 @@ impl<const M: usize> Sampler<M> {
         (effort, Some(at))
     }
 
-    /// Moves u to `time` on the phase; returns the rounds of Newton–Raphson and the length error left, in steps.
+    /// Moves u to the place at `time` on the phase. Returns the number of Newton–Raphson rounds and the remaining length error,
+    /// as a share of the step.
     fn step(&self, motion: &PhaseMotion<M>, time: f64, u: &mut f64) -> (u32, f64) {
         let (mut low, mut high) = motion.span();
         let ([rounding, table_error], allowed) = (motion.path().length_errors(), motion.step_error());
@@ -75,7 +76,7 @@ impl<const M: usize> Sampler<M> {
             let rates = motion.rates(&state);
             let step = step_length(&rates, left);
             if repeat == 0 {
-                // The step may have begun on an earlier phase.
+                // The step over the whole period may have begun on an earlier phase.
                 whole = step_length(&rates, self.period).max(step.abs());
             }
             if left > 0.0 {
@@ -84,7 +85,8 @@ impl<const M: usize> Sampler<M> {
                 high = high.min(*u);
             }
             let middle = 0.5 * (low + high);
-            // The derivatives of the speed may be rounding where an axis turns round: the speed alone must agree.
+            // Where an axis reverses, the derivatives of the speed may be mostly rounding: the step from the speed alone must be
+            // small as well.
             let off = step.abs().max(0.5 * left.abs() * norm(&rates.velocity));
             if off <= allowed * whole + 2.0 * rounding || !(low < middle && middle < high) {
                 let error = if whole > 0.0 { (step.abs() + table_error) / whole } else { 0.0 };
@@ -93,7 +95,7 @@ impl<const M: usize> Sampler<M> {
             let tolerance = 0.1 * allowed * whole + rounding;
             let located = motion.path().advance(*u, step, tolerance);
             rounds += located.iterations;
-            // A large period can be too much for the series.
+            // With a large period the third-order step may be too inaccurate.
             let usable = low < located.u && located.u < high && repeat < MAX_REPEATS;
             *u = if usable { located.u } else { middle };
         }
@@ -101,22 +103,23 @@ impl<const M: usize> Sampler<M> {
     }
 }
 
-/// Length of the step over `time`: v t + a t²/2 + j t³/6 with the first derivatives of the speed v, at most to
-/// the standstill that a < 0 leads to.
+/// Length of the step over `time`: v t + a t²/2 + j t³/6 with v and its first derivatives; if a < 0, at most up to the
+/// standstill.
 fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
     let Rates { velocity, acceleration, jerk } = rates;
     let v = norm(velocity);
     let (pull, push) = (norm(acceleration), norm(jerk));
-    // The direction of a speed that is rounding beside what acceleration and jerk add says nothing.
+    // A velocity that is only rounding beside what acceleration and jerk add has no meaningful direction.
     if v <= REST * (pull + 0.5 * push * time.abs()) * time.abs() {
-        // Away from the standstill, forward or back in time; so the jerk pushes, where there is nothing else.
+        // The motion leaves the standstill both forwards and backwards in time, in the direction of the acceleration or, if that
+        // is negligible, of the jerk.
         let push = if pull <= REST * push * time.abs() { push } else { dot(acceleration, jerk) / pull };
         return time * time.abs() * (0.5 * pull + time.abs() * push / 6.0);
     }
     let a = dot(velocity, acceleration) / v;
     let across: [f64; M] = std::array::from_fn(|k| acceleration[k] - a * velocity[k] / v);
     let j = (dot(velocity, jerk) + dot(&across, &across)) / v;
-    // Where v + a t + j t²/2 vanishes, if it does: not a number otherwise, which `min` leaves out.
+    // The time at which v + a t + j t²/2 vanishes; NaN if it does not, which `min` ignores.
     let time = if a < 0.0 { time.min(2.0 * v / ((a * a - 2.0 * v * j).sqrt() - a)) } else { time };
     time * (v + time * (0.5 * a + time * j / 6.0))
 }

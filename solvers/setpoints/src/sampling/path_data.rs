@@ -1,4 +1,4 @@
-//! The path that setpoints follow: its curve, the lengths that laws are about, source lines, runs and pauses.
+//! The path that setpoints follow: its curve, the speeds that phase laws refer to, source lines, runs and pauses.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -7,16 +7,16 @@ use crate::phase_motion::{Counts, PhaseMotion, PiecePath, TipSpeed};
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_planner::phases::Phase;
 
-/// What a path gives: the curve that the axes follow; where the feed is about another one, and where laws of jerk are,
-/// the Bernstein coefficients of the squares of their speeds per parameter, with offsets; the source lines of the
-/// pieces, runs as piece offsets, and the pauses before the first run and after each.
+/// A path: the curve that the axes follow, source lines of the pieces, runs as piece offsets, pauses before the first run and
+/// after each run in s. `tip_speed` is given where the feed refers to another curve, and `way_speed` where the laws along the
+/// path do: Bernstein coefficients of the square of that curve's speed per parameter for all pieces, and their offsets.
 pub struct PathData<const M: usize> {
     pub curve: Arc<CompositeCurve<M>>,
-    /// Number of axes; those beyond rest.
+    /// Number of axes; axes beyond it rest.
     pub axes: usize,
     pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
     pub way_speed: Option<(Vec<f64>, Vec<usize>)>,
-    /// What the axes count in the feed on each piece; empty where that is not by shares.
+    /// Share of each axis in the feed on each piece; empty where the feed has no shares.
     pub feed_share: Vec<[f64; M]>,
     pub lines: Vec<i32>,
     pub runs: Vec<usize>,
@@ -25,7 +25,7 @@ pub struct PathData<const M: usize> {
 }
 
 impl<const M: usize> PathData<M> {
-    /// Piece i with the lengths that laws are about.
+    /// Piece i with its lengths.
     pub(super) fn piece(&self, i: usize) -> PiecePath<'_, M> {
         let [feed, way] = [&self.tip_speed, &self.way_speed].map(|speed| {
             speed.as_ref().map(|(coefficients, offsets)| {

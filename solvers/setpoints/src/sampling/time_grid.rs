@@ -1,4 +1,4 @@
-//! The times of setpoints: every run starts on a setpoint, and takes whole periods with the pause after it.
+//! The times of setpoints: every run starts on a setpoint, and takes whole periods together with the pause after it.
 
 use std::sync::Arc;
 
@@ -8,14 +8,14 @@ use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phases::Phases;
 
-/// More setpoints than this are refused: their indices and arrays would serve nobody.
+/// Greatest number of setpoints.
 pub const MAX_COUNT: f64 = 2e9;
 
-/// A run that ends this part of a period after a setpoint ends on it.
+/// A run that ends less than this share of a period after a setpoint ends on that setpoint.
 const SLACK: f64 = 1e-9;
 
 impl<const M: usize> Sampler<M> {
-    /// Lays the time grid. `phase_runs` are the phase offsets of the runs. The error is a sentence for the user.
+    /// Computes the times of the setpoints. `phase_runs` are the phase offsets of the runs. The error is a sentence for the user.
     pub fn on(
         path: &Arc<PathData<M>>,
         phases: &Arc<Phases>,
@@ -91,7 +91,7 @@ impl<const M: usize> Sampler<M> {
     }
 }
 
-/// Whole periods of a run, as f64 so that absurd numbers stay numbers.
+/// Number of whole periods that a time takes, as f64 so that a huge number does not overflow.
 fn periods_of(time: f64, period: f64) -> f64 {
     let exact = time / period;
     match time > 0.0 {

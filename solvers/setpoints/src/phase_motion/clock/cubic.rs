@@ -1,7 +1,7 @@
-//! The time along a phase whose v² is a cubic polynomial of the length, never 0: the part x of the length as power series of
-//! the time, from the slower end.
+//! The time along a phase on which v² is a cubic polynomial of the length and nowhere 0: power series of x, the share of the
+//! length, in time, from the slower end.
 //!
-//! From (v²)' = 2 ẍ follows ẍ = P(x) with a quadratic P, whose series come term by term (Taylor's method for differential
+//! d(ẋ²)/dx = 2 ẍ gives ẍ = P(x) with a quadratic P, and the terms of its solution one by one (Taylor's method for differential
 //! equations).
 
 use crate::phase_motion::lengths::ERROR;
@@ -9,10 +9,11 @@ use crate::phase_motion::pace::{time_of_way, Pace};
 use crate::phase_motion::part::Part;
 use feedplan_planner::phases::Phase;
 
-/// Terms of a series of the length by time; it ends where two of them are no more than this part of the length.
+/// Greatest number of terms of a series of the length in time. A series ends where two consecutive terms are below `NOTHING`, as
+/// a share of the length.
 const MOST_TERMS: usize = 18;
 const NOTHING: f64 = 1e-18;
-/// 1/((k + 1)(k + 2)): what the term k of ẍ is in that of x.
+/// 1/((k + 1)(k + 2)): the factor from term k of ẍ to term k + 2 of x.
 pub const PER_TERM: [f64; MOST_TERMS] = {
     let (mut per, mut k) = ([0.0; MOST_TERMS], 0);
     while k < MOST_TERMS {
@@ -21,38 +22,39 @@ pub const PER_TERM: [f64; MOST_TERMS] = {
     }
     per
 };
-/// A step of Newton's method, in parts of the time of a series, whose error, about its square, is below rounding.
+/// A Newton step below this share of the time of a series is the last one: its error, about the square of it, is below rounding.
 pub const LAST_STEP: f64 = 1e-10;
-/// A series may end so far beyond the length, in parts of it: where the duration is that of the motion but for rounding.
+/// A series may go beyond the length by this share of it: the duration of the phase is that of the motion only up to rounding.
 pub const OVER: f64 = 1e-3;
-/// Series are no shorter than this part of the duration, and no more than so many: speeds that are absurd have more.
+/// A series is at least this share of the duration long, and their number is limited: only absurd speeds need more.
 const SHORTEST: f64 = 1e-12;
 const MOST_PARTS: usize = 10_000;
 
-/// v² a cubic polynomial of the length.
+/// The motion where v² is a cubic polynomial of the length.
 pub struct Cubic {
     speed_sq: SpeedSq,
-    /// The slower end is the start.
+    /// Whether the start is the slower end.
     from_start: bool,
-    /// In the order of time; most phases have one.
+    /// The series in the order of time; most phases have only one.
     first: Series,
     others: Vec<Series>,
-    /// The time of all the length, in the unit of the series.
+    /// The time for the whole length, in the time unit of the series.
     total: f64,
     error: f64,
 }
 
 impl Cubic {
-    /// It is made where it stays: it is too large to be moved for each phase.
+    /// Created on the heap: it is too large to be moved for each phase.
     pub fn new(phase: &Phase, speeds: [f64; 2], length: f64) -> Box<Self> {
         let (from_start, speed_sq) = (speeds[0] <= speeds[1], SpeedSq::new(phase, speeds, length));
-        // Time runs back from the end.
+        // From the end of the phase, time runs backwards.
         let back = || SpeedSq::between([speeds[1], speeds[0]], [-phase.a1, -phase.a0], length);
         let own = if from_start { speed_sq } else { back() };
         let unit = if phase.duration > 0.0 { phase.duration } else { 2.0 * length / (speeds[0] + speeds[1]) };
         let (first, others) = (Series::default(), Vec::new());
         let mut cubic = Box::new(Self { speed_sq, from_start, first, others, total: 0.0, error: 0.0 });
-        // A series that is good from here on, or as short as any; where it ends.
+        // Fills a series from here on, halving its duration until its error is small enough or the limit is reached; returns x
+        // and dx/ds at its end.
         let fill = |series: &mut Series, time: f64, x: f64, mut width: f64| loop {
             series.fill(&own, [time, x, width], unit / length);
             let [end, slope] = series.at(1.0);
@@ -79,7 +81,7 @@ impl Cubic {
         self.others.last().unwrap_or(&self.first)
     }
 
-    /// The last series that begins at a place where `has_begun` holds, or the first.
+    /// The last series that `has_begun`; the first series if there is no other.
     fn series(&self, has_begun: impl Fn(&Series) -> bool) -> &Series {
         match self.others.partition_point(has_begun) {
             0 => &self.first,
@@ -87,13 +89,13 @@ impl Cubic {
         }
     }
 
-    /// Why nothing can follow a phase.
+    /// Why the phase cannot be followed; None if it can.
     pub fn flaw(phase: &Phase, speeds: [f64; 2], length: f64) -> Option<&'static str> {
         let moves = SpeedSq::new(phase, speeds, length).is_positive();
         (!moves).then_some("loses all its speed on the way")
     }
 
-    /// The part of the length when these parts of the duration are done and left, and its error.
+    /// The share of the length after the share `done` of the duration, with the share `left` still to go; and its error bound.
     pub fn part(&self, done: f64, left: f64) -> (Part, f64) {
         let time = self.total * if self.from_start { done } else { left };
         let series = self.series(|series| series.from <= time);
@@ -101,7 +103,7 @@ impl Cubic {
         (Part { from_start: self.from_start, share: share.clamp(0.0, 1.0) }, self.error)
     }
 
-    /// The motion at a part of the length, t seconds after the start.
+    /// The motion at a share of the length, t seconds after the start.
     pub fn pace(&self, part: Part, t: f64) -> Pace {
         let x = if part.from_start { part.share } else { 1.0 - part.share };
         let (length, [w, slope, bend]) = (self.speed_sq.length, self.speed_sq.derivatives(x));
@@ -118,7 +120,7 @@ impl Cubic {
     }
 }
 
-/// v² over the part x of the way in powers of x.
+/// v² as a polynomial of x, the share of the length.
 #[derive(Clone, Copy, Debug)]
 struct SpeedSq {
     c: [f64; 4],
@@ -130,7 +132,7 @@ impl SpeedSq {
         Self::between(speeds, [phase.a0, phase.a1], length)
     }
 
-    /// From v and a at both ends.
+    /// The cubic with these v and a at both ends.
     fn between(speeds: [f64; 2], a: [f64; 2], length: f64) -> Self {
         let ([w0, w1], [slope0, slope1]) = (speeds.map(|v| v * v), a.map(|a| 2.0 * a * length));
         let rise = w1 - w0;
@@ -142,10 +144,10 @@ impl SpeedSq {
         [c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + x * 3.0 * c3), 2.0 * c2 + 6.0 * x * c3]
     }
 
-    /// Whether v² is above 0 all the way.
+    /// Whether v² is above 0 on the whole length.
     fn is_positive(&self) -> bool {
         let [_, c1, c2, c3] = self.c;
-        // Where 3 c3 x² + 2 c2 x + c1 vanishes, without cancellation.
+        // The roots of 3 c3 x² + 2 c2 x + c1, without cancellation.
         let root = (c2 * c2 - 3.0 * c1 * c3).max(0.0).sqrt();
         let q = -(c2 + root.copysign(c2));
         [0.0, 1.0, q / (3.0 * c3), c1 / q]
@@ -155,35 +157,36 @@ impl SpeedSq {
     }
 }
 
-/// The part of the length over a time, in powers of the part of that.
+/// The share of the length as a power series of s, the time as a share of the duration of the series.
 #[derive(Default)]
 struct Series {
-    /// When it begins and how long it lasts, in parts of some unit.
+    /// Start and duration, in the time unit of the phase.
     from: f64,
     width: f64,
-    /// The part of the length at its start, and what is added to that.
+    /// The share of the length at the start of the series, and the terms that are added to it.
     x: f64,
     terms: [f64; MOST_TERMS],
     count: usize,
-    /// Proven bound of what the terms left out add.
+    /// Proven bound of the sum of the omitted terms.
     error: f64,
 }
 
 impl Series {
-    /// Becomes that from a time and a place on, of this width; `per` is the unit of time over the length.
+    /// Computes the series from a time and a place on, with this duration; `per` is the time unit over the length.
     fn fill(&mut self, speed_sq: &SpeedSq, [from, x, width]: [f64; 3], per: f64) {
         let [w, slope, bend] = speed_sq.derivatives(x);
         let scale = width * per;
         let half = 0.5 * scale * scale;
-        // ẍ = p0 + p1 x + p2 x² about the start.
+        // ẍ = p0 + p1 y + p2 y² with y = x minus its value at the start.
         let [p0, p1, p2] = [half * slope, half * bend, half * 3.0 * speed_sq.c[3]];
         let terms = &mut self.terms;
-        // The last two terms beside the table: a pair of numbers that have just been stored cannot be loaded at once.
+        // The last two terms are also kept in variables: loading two numbers at once just after each was stored would stall the
+        // processor.
         let (mut before, mut last, mut count) = (scale * w.sqrt(), 0.5 * p0, 3);
         (terms[1], terms[2]) = (before, last);
         while count < MOST_TERMS && before.abs() + last.abs() > NOTHING {
             let k = count - 2;
-            // Each product but that of the middle comes twice.
+            // Each product appears twice, except the middle one.
             let pairs: f64 = (1..k.div_ceil(2)).map(|i| terms[i] * terms[k - i]).sum();
             let middle = if k % 2 == 0 { terms[k / 2] * terms[k / 2] } else { 0.0 };
             let square = 2.0 * pairs + middle;
@@ -191,8 +194,8 @@ impl Series {
             terms[count] = last;
             count += 1;
         }
-        // The series misses the equation by the terms of P from the power `count` − 2 on. With a slope of P of no more than 1 an error
-        // of ẍ grows to cosh(1)/2 of itself at most.
+        // The residual of the equation consists of the terms of P from the power `count` − 2 on. If |P'| ≤ 1, an error of ẍ
+        // causes an error of x of at most cosh(1)/2 times it.
         let mut rest = [0.0; MOST_TERMS + 1];
         for k in (0..count).rev() {
             rest[k] = rest[k + 1] + terms[k].abs();
@@ -204,7 +207,7 @@ impl Series {
         self.error = if is_gentle { missed } else { f64::INFINITY };
     }
 
-    /// The part of the length at a part of the time, and its derivative.
+    /// The share of the length at s, and its derivative by s.
     #[inline]
     fn at(&self, s: f64) -> [f64; 2] {
         let (mut way, mut slope) = (0.0, 0.0);
@@ -215,9 +218,9 @@ impl Series {
         [self.x + way, slope]
     }
 
-    /// The part of the time at all of the length, where the whole time makes this part of it, with its derivative.
+    /// The s at which the whole length is done; `end` and `slope` are the share of the length and its derivative at s = 1.
     fn time_of_all(&self, [end, slope]: [f64; 2]) -> f64 {
-        // Mostly the first step of Newton's method is the last.
+        // Mostly the first Newton step is the last one.
         let time = 1.0 - (end - 1.0) / slope;
         if (time - 1.0).abs() <= LAST_STEP {
             time
@@ -226,7 +229,7 @@ impl Series {
         }
     }
 
-    /// The part of the time at a part of the length, at the end or before.
+    /// The s at a share of the length.
     fn time(&self, x: f64) -> f64 {
         time_of_way(|s| self.at(s), x, [1.0, 2.0], LAST_STEP)
     }
@@ -240,7 +243,7 @@ mod tests {
     #[test]
     fn the_part_of_a_cubic_at_a_time_is_where_its_time_is_over() {
         let length = 3.0;
-        // Nearly even; from and to a crawl, in many parts; with a dip between.
+        // Nearly constant speed; from and to a crawl, in many series; with a dip between.
         for (speeds, a, most) in [
             ([10.0, 10.1], [3.0, -2.0], 1),
             ([1e-3, 10.0], [20.0, 10.0], 40),
@@ -248,7 +251,7 @@ mod tests {
             ([10.0, 9.0], [-30.0, 28.0], 8),
         ] {
             let square = SpeedSq::between(speeds, a, length);
-            // Over x = y³, for the start, and 1 − y³, for the end, from the middle: Simpson's rule.
+            // Integrates over y with x = y³ in the first half and x = 1 − y³ in the second, by Simpson's rule.
             let n = 20_000;
             let half = |end: f64, to: f64| {
                 let f = |y: f64| {
