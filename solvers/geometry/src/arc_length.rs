@@ -1,19 +1,19 @@
 //! The integral S(u) of a positive function f along a curve, as a table of Gauss–Legendre quadratures with a proven error.
 //!
-//! f is |C'|, of which S is the length, or the time per parameter, 1/√p, of a profile. Source: Cheatham 2007, section 3.2,
+//! f is |C'|, whose integral is the length, or the time per parameter, 1/√p, of a profile. Source: Cheatham 2007, section 3.2,
 //! after Guenter & Parent and Yang & Red, with K_n and the table size corrected. With n = 8 nodes on a panel of width w
 //!
 //!   |∫f − Σ| = w^(2n+1) K_n |f^(2n)(ξ)|,   K_n = (n!)⁴ / ((2n+1) ((2n)!)³)
 //!
-//! and the error of N equal panels on [a, b] is at most ε if N ≥ ((b−a)^(2n+1) K_n M / ε)^(1/(2n)), M ≥ |f^(2n)|. M is
-//! Cauchy's estimate on a disc without singularities of f. Near a singularity equal panels would be many, so panels are
-//! halved towards it, and each has a bound of its own.
+//! and the error of N equal panels on [a, b] is at most ε if N ≥ ((b−a)^(2n+1) K_n M / ε)^(1/(2n)), M ≥ |f^(2n)|. M is Cauchy's
+//! estimate on a disc without singularities of f. Near a singularity too many equal panels would be needed, so panels are halved
+//! towards it, and each has a bound of its own.
 
 use crate::elementary::Elementary;
 use crate::quadratic::{dot, Quadratic};
 use crate::tolerance::NO_CURVATURE;
 
-/// Nodes of the quadrature.
+/// The number of nodes of the quadrature.
 const N: usize = 8;
 /// The positive nodes of Gauss–Legendre quadrature on [−1, 1], and the weights of each pair.
 pub const X: [f64; 4] =
@@ -31,16 +31,17 @@ const K: f64 = {
     ratio * ratio / (2 * N + 1) as f64
 };
 
-/// Parts of a panel on which two, three and seven nodes are as good as eight on the whole of it, where that is 1e-13.
+/// On up to these parts of a panel, rules of two, three and seven nodes are as accurate as eight nodes on a whole panel whose
+/// error is 1e-13.
 const TWO_NODES: f64 = 2e-3;
 const THREE_NODES: f64 = 3e-2;
 pub const SEVEN_NODES: f64 = 0.5;
-/// The positive ones of seven nodes, and the weights of each pair and of the middle.
+/// The positive nodes of the rule of seven, and the weights of each pair and of the middle node.
 const X7: [f64; 3] = [0.405_845_151_377_397_2, 0.741_531_185_599_394_4, 0.949_107_912_342_758_5];
 const W7: [f64; 4] =
     [0.381_830_050_505_118_9, 0.279_705_391_489_276_7, 0.129_484_966_168_869_7, 0.417_959_183_673_469_4];
 
-/// An interval that needs more equal panels is halved.
+/// An interval that needs more equal panels than this is halved.
 const UNIFORM: f64 = 4.0;
 
 /// |f^(2n)| ≤ (2n)! · bound / radius^(2n) on an interval.
@@ -62,10 +63,10 @@ pub trait Integrand: Copy {
     /// Cauchy's estimate of f^(2n), valid for all of [a, b].
     fn disc(&self, a: f64, b: f64) -> Disc;
 
-    /// The parameter nearest to the singularities: panels end there.
+    /// The parameter nearest to the singularities of f: panels end there.
     fn foot(&self) -> f64;
 
-    /// Bound of the quadrature's error on a panel that ends at the foot, where the disc is too small.
+    /// Bound of the quadrature error on a panel that ends at the foot, where the disc is too small.
     fn foot_error(&self, width: f64) -> f64;
 }
 
@@ -106,7 +107,7 @@ impl QuadraticSpeed {
         self.e_sq * x * x + self.d_sq
     }
 
-    /// The least |C'| on [a, b] and its distance δ from the branch points, |C'| = E δ.
+    /// The least |C'| on [a, b], and the distance δ of that place from the branch points: |C'| = E δ.
     fn least(&self, a: f64, b: f64) -> (f64, f64) {
         let speed = self.squared(self.foot.clamp(a, b)).sqrt();
         (speed, if self.e > 0.0 { speed / self.e } else { f64::INFINITY })
@@ -129,7 +130,7 @@ impl Integrand for QuadraticSpeed {
         self.foot
     }
 
-    // f = E|x| + r with 0 ≤ r ≤ d; the linear part is integrated exactly.
+    // f = E|x| + r with 0 ≤ r ≤ d; the quadrature of the linear part is exact.
     fn foot_error(&self, width: f64) -> f64 {
         self.d_sq.sqrt() * width
     }
@@ -157,7 +158,7 @@ impl<F: Integrand> Table<'_, F> {
         self.nodes[self.nodes.len() - 1].sum
     }
 
-    /// The rounding of the integral, by the sum and by u itself: no u is found more closely.
+    /// The rounding error of the integral, from the sum and from u itself. No u can be located more closely.
     #[inline]
     pub fn rounding(&self) -> f64 {
         let (first, last) = (&self.nodes[0], &self.nodes[self.nodes.len() - 1]);
@@ -170,7 +171,7 @@ impl<F: Integrand> Table<'_, F> {
         node.sum + quadrature(&self.f, node.u, u)
     }
 
-    /// A row at u, from the nearer end of its panel.
+    /// A row at u, computed from the nearer end of its panel.
     pub fn row(&self, u: f64) -> Node {
         let first = self.panel(|node| node.u <= u);
         let (start, end) = (self.nodes[first], self.nodes[first + 1]);
@@ -179,7 +180,7 @@ impl<F: Integrand> Table<'_, F> {
         Node { u, sum: near.sum + way, rate }
     }
 
-    /// The last panel whose first node satisfies `before`, a condition that holds up to some node.
+    /// The last panel whose first node satisfies `before`, which must hold up to some node and not after it.
     #[inline]
     pub fn panel(&self, before: impl Fn(&Node) -> bool) -> usize {
         let inner = &self.nodes[1..self.nodes.len() - 1];
@@ -191,7 +192,7 @@ impl<F: Integrand> Table<'_, F> {
     }
 }
 
-/// Gauss–Legendre quadrature of f over [a, b].
+/// Gauss–Legendre quadrature of f over [a, b] with eight nodes.
 #[inline]
 pub fn quadrature<F: Integrand>(f: &F, a: f64, b: f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
@@ -207,12 +208,12 @@ pub fn quadrature<F: Integrand>(f: &F, a: f64, b: f64) -> f64 {
     half * sum
 }
 
-/// The same where [a, b] is a part of a panel of the width `panel`, and f(b): fewer nodes do on a short part, because the error of
-/// a rule of m nodes shrinks with the power 2 m + 1 of the part.
+/// The integral over [a, b], a part of a panel of width `panel`, and f(b). Short parts need fewer nodes, because the error of a
+/// rule of m nodes shrinks with the power 2 m + 1 of the part.
 #[inline]
 pub fn quadrature_of_part<F: Integrand>(f: &F, a: f64, b: f64, panel: f64) -> [f64; 2] {
     let (middle, half, part) = (0.5 * (a + b), 0.5 * (b - a), ((b - a) / panel).abs());
-    // Four or eight values fill a vector.
+    // Four or eight values fill a SIMD vector.
     if part < TWO_NODES {
         let x = half * 0.577_350_269_189_625_8;
         let [before, after, end, _] = f.at_each([middle - x, middle + x, b, b]);
@@ -233,8 +234,7 @@ pub fn quadrature_of_part<F: Integrand>(f: &F, a: f64, b: f64, panel: f64) -> [f
     [quadrature(f, a, b), f.at(b)]
 }
 
-/// N_table: the number of equal panels that integrate over `width` with an error of at most `error`; not
-/// rounded, at least 1.
+/// N_table: the number of equal panels whose quadrature over `width` has an error of at most `error`; not rounded, at least 1.
 pub fn table_size(width: f64, disc: &Disc, error: f64) -> f64 {
     if width <= 0.0 || disc.radius == f64::INFINITY {
         return 1.0;
@@ -246,7 +246,7 @@ pub fn table_size(width: f64, disc: &Disc, error: f64) -> f64 {
     (width / disc.radius * (K * width * disc.bound / error).power(exponent)).max(1.0)
 }
 
-/// Appends the table of f over [a, b] to `nodes`, with an error of at most `error` at each u. Returns the proven bound: it
+/// Appends the table of f over [a, b] to `nodes`, with an error of at most `error` at each u. Returns the proven bound. This
 /// exceeds `error` only next to a cusp, where panels are as narrow as the rounding of u.
 pub fn tabulate<F: Integrand>(f: F, a: f64, b: f64, error: f64, nodes: &mut Vec<Node>) -> f64 {
     nodes.push(Node { u: a, sum: 0.0, rate: f.at(a) });
@@ -262,8 +262,8 @@ pub fn tabulate<F: Integrand>(f: F, a: f64, b: f64, error: f64, nodes: &mut Vec<
     builder.bound
 }
 
-/// Appends panels from left to right. Half of the allowed error is shared by width; each of the two panels at the foot gets
-/// a quarter.
+/// Appends panels from left to right. Half of the allowed error is distributed in proportion to width; each of the two panels at
+/// the foot gets a quarter.
 struct Builder<'a, F> {
     f: F,
     share: f64,
@@ -401,7 +401,7 @@ mod tests {
     }
 
     prop_compose! {
-        /// Quadratics from plain to a hair off a cusp: the middle point is pulled towards a fold.
+        /// Quadratics from ordinary ones to almost a cusp: the middle point is pulled towards a fold.
         fn quadratic()(
             a in prop::array::uniform3(-5.0..5.0), b in prop::array::uniform3(-5.0..5.0),
             c in prop::array::uniform3(-5.0..5.0), fold in 0.0..1.0f64, exponent in -14.0..0.0f64,

@@ -1,6 +1,6 @@
-//! Where a condition changes between two numbers, to the last digit, by halving.
+//! Finds where a condition changes between two numbers, to the last digit, by bisection.
 
-/// The neighbouring numbers between which a condition ends to hold that holds at `low` and not at `high`.
+/// The two neighbouring numbers between which the condition changes; it holds at `low` and not at `high`.
 pub fn boundary(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> [f64; 2] {
     loop {
         let middle = 0.5 * (low + high);

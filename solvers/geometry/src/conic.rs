@@ -37,13 +37,13 @@ impl<const M: usize> Conic<M> {
         (factor * norm(&sub(b, a)), factor * norm(&sub(c, b)))
     }
 
-    /// The width with which the mean of |C'| at both ends is 1.
+    /// The width that makes the mean of |C'| at both ends 1.
     pub fn natural_width(&self) -> f64 {
         let (start, end) = self.end_speeds();
         0.5 * (start + end)
     }
 
-    /// The part on [u0, u1]. The part of a line is a line exactly, whatever the rounding of its middle point.
+    /// The part on [u0, u1]. A part of a line is again exactly a line, whatever the rounding of its middle point.
     pub fn part(&self, u0: f64, u1: f64) -> Self {
         if u0 == 0.0 && u1 == self.width {
             return *self;
@@ -79,8 +79,8 @@ impl<const M: usize> Conic<M> {
         let [a, b, c] = self.control.map(|point| point[axis]);
         let (mut least, mut greatest) = (a.min(c), a.max(c));
         if b < least || b > greatest {
-            // The numerator of the derivative is the Bernstein form of w (b − a), (c − a)/2, w (c − b), of which the
-            // outer two differ in sign.
+            // The numerator of the derivative has the Bernstein coefficients w (b − a), (c − a)/2, w (c − b); the outer two
+            // differ in sign.
             let (p, q, r) = (self.weight * (b - a), 0.5 * (c - a), self.weight * (c - b));
             let root = (q * q - p * r).sqrt();
             let t = p / (p - q + root.copysign(p));
@@ -157,7 +157,7 @@ mod tests {
             let at = |conic: &Conic<2>, t: f64| derivatives_of(conic, t * conic.width)[0];
             prop_assert!(norm(&sub(&part.control[0], &at(&whole, from))) < 1e-12);
             prop_assert!(norm(&sub(&part.control[2], &at(&whole, to))) < 1e-12);
-            // The parameter of the part is a ratio of linear functions; its middle is where both weights balance.
+            // The parameter of the part is a ratio of linear functions of the whole's; its middle is where both weights balance.
             let weights = |t: f64| (1.0 - t).powi(2) + 2.0 * weight * t * (1.0 - t) + t * t;
             let (w0, w1) = (weights(from).sqrt(), weights(to).sqrt());
             let middle = (from * w1 + to * w0) / (w0 + w1);

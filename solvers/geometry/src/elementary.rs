@@ -1,7 +1,7 @@
-//! Elementary functions that are the same bit for bit on every processor.
+//! Elementary functions with the same result, bit for bit, on every processor.
 //!
-//! Those of the standard library are the C library's, which takes other instructions where there is fused multiply-add, and
-//! rounds otherwise then.
+//! Those of the standard library call the C library. On processors with fused multiply-add it uses other instructions, which
+//! round differently.
 
 pub trait Elementary {
     fn power(self, exponent: f64) -> f64;
@@ -12,7 +12,7 @@ pub trait Elementary {
 }
 
 impl Elementary for f64 {
-    /// Of the exponents 3/4 and 3/2 in a few nanoseconds.
+    /// The exponents 3/4 and 3/2 take only a few nanoseconds.
     #[inline(always)]
     fn power(self, exponent: f64) -> f64 {
         if exponent == 0.75 {

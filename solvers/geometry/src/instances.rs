@@ -1,10 +1,11 @@
-//! A macro that compiles kernels for each number of axes in the crate that has them.
+//! A macro that compiles generic kernels once, for a few numbers of axes, in the crate that defines them.
 
-/// A trait whose methods are kernels for any number of axes M, compiled in the crate that uses this macro, once for each
-/// number in the list. Few numbers are enough, for an axis at rest changes no result. Crates that call them compile nothing.
+/// Defines a trait whose methods are kernels for any number of axes M, and compiles them for each number in the list, in the
+/// crate that uses this macro; crates that call the trait compile no kernel. A few numbers are enough, because additional axes at
+/// rest change no result.
 ///
-/// `fn name(&self, ...) -> ... = kernel;` calls `kernel(self, ...)`. Tests inside the crate call the kernels directly, with
-/// the few axes that they have.
+/// `fn name(&self, ...) -> ... = kernel;` calls `kernel(self, ...)`. Tests inside the crate call the kernels directly, with the
+/// few axes that they need.
 #[macro_export]
 macro_rules! instances {
     ($(#[$about:meta])* pub trait $name:ident for [$($count:literal),+] $kind:ty = $body:tt) => {

@@ -1,10 +1,9 @@
-//! Intervals [lo, hi], rounded outward: every result contains the exact one.
+//! Interval arithmetic with intervals [lo, hi] rounded outward: every result contains the exact one.
 //!
-//! Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009); Tucker, Validated Numerics (2011). An operation
-//! has an error of at most half a unit in the last place. Outward rounding subtracts |lo| ε and adds |hi| ε, ε = 2⁻⁵²,
-//! which is at least one unit; it costs less than a change of the rounding mode. A result that is not defined (a divisor
-//! with 0 in it, the root of a negative number) is the whole line: the caller sees an unbounded interval and cuts the
-//! part smaller.
+//! Moore, Kearfott and Cloud, Introduction to Interval Analysis (2009); Tucker, Validated Numerics (2011). An operation has an
+//! error of at most half a unit in the last place. Outward rounding subtracts |lo| ε and adds |hi| ε, ε = 2⁻⁵², which is at least
+//! one unit; this costs less than a change of the rounding mode. An undefined result (division by an interval that contains 0,
+//! the root of a negative number) is the whole line: the caller sees an unbounded interval and subdivides.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -45,22 +44,22 @@ impl Interval {
         self.lo.abs().max(self.hi.abs())
     }
 
-    /// About the middle, inside; NaN where the interval is unbounded on both sides.
+    /// A number near the middle, inside the interval; NaN if the interval is unbounded on both sides.
     pub fn middle(self) -> f64 {
         0.5 * self.lo + 0.5 * self.hi
     }
 
-    /// The least interval around both.
+    /// The smallest interval that contains both.
     pub fn hull(self, other: Interval) -> Interval {
         Interval { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
-    /// The numbers in both intervals, which are known to hold the same number.
+    /// The intersection of two intervals that are known to contain the same number.
     pub fn meet(self, other: Interval) -> Interval {
         Interval { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
     }
 
-    /// Rounded outward by `ulps` units in the last place and by `tiny`; the whole line where an end is NaN.
+    /// The interval rounded outward by `ulps` units in the last place and by `tiny`; the whole line if an end is NaN.
     #[inline]
     pub fn rounded(lo: f64, hi: f64, ulps: f64, tiny: f64) -> Interval {
         let lo = lo - (lo.abs() * (ulps * f64::EPSILON) + tiny);
@@ -72,8 +71,8 @@ impl Interval {
         }
     }
 
-    /// The least and the greatest product of both ends, not yet rounded outward, and the sum of all four, which is NaN
-    /// where one is NaN (0 times infinity) or where the result is the whole line.
+    /// The least and the greatest product of the ends, not yet rounded outward, and the sum of all four products. The sum is NaN
+    /// if a product is NaN (0 times infinity); the result is then the whole line.
     #[inline(always)]
     pub fn products(self, other: Interval) -> (f64, f64, f64) {
         let (a, b) = (self.lo * other.lo, self.lo * other.hi);
@@ -81,7 +80,7 @@ impl Interval {
         (less(less(a, b), less(c, d)), greater(greater(a, b), greater(c, d)), (a + b) + (c + d))
     }
 
-    /// 1/x; the whole line where x may be 0.
+    /// 1/x; the whole line if x may be 0.
     #[inline]
     pub fn reciprocal(self) -> Interval {
         if self.lo <= 0.0 && self.hi >= 0.0 {
@@ -101,7 +100,7 @@ impl Interval {
         Interval { lo: found.lo.max(0.0), hi: found.hi }
     }
 
-    /// √x; the whole line where x may be negative.
+    /// √x; the whole line if x may be negative.
     #[inline]
     pub fn sqrt(self) -> Interval {
         Interval::rounded(self.lo.sqrt(), self.hi.sqrt(), 1.0, 0.0)
@@ -159,7 +158,7 @@ impl Div for Interval {
     }
 }
 
-/// The lesser of two numbers, in one instruction; any of both where one is NaN.
+/// The lesser of two numbers, in one instruction; either of them if one is NaN.
 #[inline(always)]
 pub fn less(a: f64, b: f64) -> f64 {
     if a < b {
@@ -169,7 +168,7 @@ pub fn less(a: f64, b: f64) -> f64 {
     }
 }
 
-/// The greater of two numbers, likewise.
+/// The greater of two numbers, in one instruction; either of them if one is NaN.
 #[inline(always)]
 pub fn greater(a: f64, b: f64) -> f64 {
     if a > b {

@@ -1,30 +1,30 @@
-//! The parameter u at a given length S, from a table of lengths: a monotone rational cubic predicts it on the panel, and
-//! corrects it on brackets that shrink. Where the greatest slope of S' is known, a last step of Newton's method needs no
-//! further integral: S is off its tangent by no more than half of that slope times the square of the step.
+//! Finds the parameter u at a given length S from a table of lengths. A monotone rational cubic on the panel predicts u, and is
+//! applied again on shrinking brackets. Where a bound of |S''| is known, the last Newton step needs no further integral: S
+//! differs from its tangent by at most half of that bound times the square of the step.
 //!
 //! Source: Cheatham 2007, sections 3.2.3 and 3.2.4 (equations 3.11–3.14), after Sarfraz. S may be the integral of any
 //! `Table`, S' its integrand; d = 1/S' is the slope of u(S).
 
 use crate::arc_length::{quadrature, quadrature_of_part, Integrand, Node, Table, SEVEN_NODES};
 
-/// Greatest number of rounds. Each makes the miss four times smaller, or a halving of the bracket follows; so fewer are
-/// needed from the width of a panel to its last digit.
+/// The greatest number of rounds. Each round makes the error of S four times smaller, or the next one halves the bracket, so
+/// fewer are needed to get from the width of a panel to the last digit of u.
 pub const MAX_ITERATIONS: u32 = 200;
 
 /// A parameter and how it was found.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Located {
     pub u: f64,
-    /// The remaining miss |S(u) − S|, in the unit of S.
+    /// The remaining error |S(u) − S|, in the unit of S.
     pub miss: f64,
-    /// Evaluations of S(u): 1 when the prediction was good enough, 0 at the ends.
+    /// The number of evaluations of S(u): 1 when the prediction was good enough, 0 at the ends.
     pub iterations: u32,
 }
 
-/// The Sarfraz curve u(S) between two rows; NaN or an end of them if S' is 0 at one.
+/// The value of Sarfraz's curve u(S) between two rows; NaN or the u of a row if S' is 0 at a row.
 ///
-/// Over the common denominator the terms of (3.12) are d₀ΔS θ(1−θ) + Δu θ³; with S' instead of d = 1/S' there is one division for all.
-/// All are positive, so no digits are lost.
+/// Over the common denominator the terms of (3.12) are d₀ΔS θ(1−θ) + Δu θ³. Written with S' instead of d = 1/S' it takes one
+/// division. All terms are positive, so no digits cancel.
 #[inline]
 pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
     let (width, rise) = (to.u - from.u, to.sum - from.sum);
@@ -36,8 +36,8 @@ pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
     from.u + width * (to.rate * rise * mixed + all * theta * theta * theta) / below
 }
 
-/// The u with S(u) = s within `tolerance`; beyond either end that end. Rows that are `known` beside those of the table may be nearer to
-/// it on both sides. `steepest` is at least |S''|; infinite where that is not known.
+/// The u with S(u) = s within `tolerance`; beyond an end of the table that end. `known` has further rows, which may narrow the
+/// bracket on both sides. `steepest` is an upper bound of |S''|; infinite if none is known.
 pub fn locate<F: Integrand>(
     table: &Table<F>,
     s: f64,
@@ -66,11 +66,11 @@ pub fn locate<F: Integrand>(
     for iterations in 1..=MAX_ITERATIONS {
         let middle = 0.5 * (low.u + high.u);
         let mut u = if halve { middle } else { predict(&low, &high, s) };
-        // Next to a cusp, and in a bracket of a few roundings, the prediction is outside.
+        // Next to a cusp, and in a bracket of a few roundings, the prediction may be outside.
         if !(low.u < u && u < high.u) {
             u = middle;
         }
-        // From the nearer end of the bracket, where that is near.
+        // The integral from the nearer end of the bracket if that is near, otherwise from the start of the panel.
         let near = if u - low.u < high.u - u { low } else { high };
         let (sum, rate) = if (u - near.u).abs() <= SEVEN_NODES * panel {
             let [way, rate] = quadrature_of_part(&table.f, near.u, u, panel);
@@ -155,7 +155,7 @@ mod tests {
             assert!((beside.u - u).abs() < 1e-9, "{beside:?}");
             assert!(beside.iterations < alone.iterations, "{alone:?} {beside:?}");
         }
-        // A place that is not between them.
+        // A row that does not lie between them.
         assert!((locate(&table, table.integral(0.6), 1e-13, &known, f64::INFINITY).u - 0.6).abs() < 1e-12);
     }
 

@@ -1,15 +1,15 @@
-//! Four or eight numbers at a time, in the vectors of the processor: values on neighbouring intervals.
+//! Four or eight numbers at a time in SIMD vectors, one number for each of some neighbouring intervals.
 //!
-//! The instructions for vectors depend on the processor. `dispatch!` of fearless_simd compiles the call that it is given once
-//! for each level of them (on x86-64: v2, AVX2, AVX-512) and chooses when it runs. What is to be compiled so takes `simd`, the
-//! proof of the level, and is inlined into that call: functions that take it are `#[inline(always)]`.
+//! The SIMD instructions depend on the processor. `dispatch!` of fearless_simd compiles the call in its argument once for each
+//! level of instructions (on x86-64: v2, AVX2, AVX-512) and chooses one at run time. Code that is to be compiled in this way
+//! takes `simd`, the proof of the level, and must be inlined into that call: functions that take it are `#[inline(always)]`.
 //!
-//! Every operation on numbers rounds as IEEE 754 says, and no product is fused with a sum: results are the same on every
-//! level, bit for bit.
+//! Every operation rounds as IEEE 754 requires, and no product is fused with a sum, so results are the same on every level, bit
+//! for bit.
 
 use crate::elementary::Elementary;
 
-/// Numbers that are joined in halves, in an order that does not depend on the processor.
+/// Joins numbers by halves, in an order that does not depend on the processor.
 #[inline(always)]
 fn fold<const N: usize>(mut values: [f64; N], join: impl Fn(f64, f64) -> f64) -> f64 {
     let mut count = N;
@@ -87,7 +87,7 @@ macro_rules! lanes {
                 &mut self.0
             }
 
-            /// Each of them by a function.
+            /// The result of a function for each number.
             pub fn map(self, f: impl FnMut(f64) -> f64) -> Self {
                 Self(self.0.map(f))
             }
@@ -110,7 +110,7 @@ macro_rules! lanes {
         pub struct Register<S: Simd>($vector<S>);
 
         impl<S: Simd> Register<S> {
-            /// The proof of its level.
+            /// The proof of the register's level.
             #[inline(always)]
             pub fn simd(self) -> S {
                 self.0.token()
@@ -148,7 +148,7 @@ macro_rules! lanes {
                 Self(1.0 / self.0)
             }
 
-            /// Its numbers from one on, then the first ones of another register.
+            /// The numbers of this register from index `FROM` on, followed by the first ones of `next`.
             #[inline(always)]
             pub fn slide<const FROM: usize>(self, next: Self) -> Self {
                 Self(self.0.slide::<FROM>(next.0))
@@ -218,7 +218,7 @@ pub mod eight {
     lanes!(f64x8, 8, 64);
 }
 
-/// The logarithm of a product of positive numbers, however many: only the last step takes a logarithm.
+/// The logarithm of a product of any number of positive factors; only the last step computes a logarithm.
 pub struct LogProduct {
     /// In [1, 2).
     mantissa: [f64; eight::LANES],

@@ -1,18 +1,19 @@
-//! The parameter one step of given length ahead, from a table of lengths: a first-order start and Newton–Raphson.
+//! Finds the parameter that is one step of given length ahead, from a table of lengths: a first-order start and Newton–Raphson.
 //!
-//! Source: Zhang et al. 2010, section 4.2, which bounds neither the number of rounds nor the iterates. Here each iterate is
-//! between the start of the step and the end of the curve. If Newton–Raphson leaves that bracket, as it does next to a
-//! cusp, or does not converge, bisection continues. A step may be negative.
+//! Source: Zhang et al. 2010, section 4.2, which bounds neither the number of rounds nor the iterates. Here each iterate stays
+//! between the start of the step and the end of the curve. If Newton–Raphson leaves that bracket, as happens next to a cusp, or
+//! does not converge, bisection continues. A step may be negative.
 
 use crate::arc_length::{Integrand, Table};
 use crate::inverse_length::Located;
 
-/// Rounds of Newton–Raphson before bisection takes over.
+/// The number of rounds of Newton–Raphson before bisection takes over.
 const NEWTON_ROUNDS: u32 = 20;
-/// Bisection of a bracket of doubles ends before this.
+/// Bisection of a bracket of doubles ends in fewer rounds.
 const MAX_ROUNDS: u32 = NEWTON_ROUNDS + 1100;
 
-/// The u with S(u) = S(from) + step within `tolerance`, and the S(u) reached; beyond an end that end.
+/// The u with S(u) = S(from) + step within `tolerance`, and that S(u); beyond an end of the table that end. `from` is a parameter
+/// and its S.
 pub fn advance<F: Integrand>(
     table: &Table<F>,
     from: (f64, f64),

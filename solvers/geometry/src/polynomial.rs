@@ -1,8 +1,8 @@
-//! Polynomials on [0, 1] of a degree known at run time, in scaled Bernstein form: p(x) = Σ c_i x^i (1 − x)^(n−i).
+//! Polynomials on [0, 1] whose degree is known at run time, in scaled Bernstein form: p(x) = Σ c_i x^i (1 − x)^(n−i).
 //!
-//! A scaled coefficient is the Bernstein coefficient times a binomial. So both have the same sign, a product is a
-//! convolution, and a root of order r at 0 is divided out by dropping the first r coefficients. `C` is the greatest number
-//! of coefficients; no operation allocates.
+//! A scaled coefficient is the Bernstein coefficient times a binomial. So both have the same sign, a product is a convolution,
+//! and a root of order r at 0 is divided out by dropping the first r coefficients. `C` is the greatest number of coefficients; no
+//! operation allocates memory.
 
 mod integral;
 mod parts;
@@ -10,9 +10,9 @@ mod roots;
 
 use fearless_simd::{dispatch, Level};
 
-/// Greatest number of coefficients of any polynomial.
+/// The greatest number of coefficients of any polynomial.
 pub const MOST: usize = 74;
-/// If `C` is at most this, loops run over all `C` coefficients: their number is then known to the compiler.
+/// If `C` is at most this, loops run over all `C` coefficients, so that the compiler knows their number.
 const FEW: usize = 12;
 
 /// Pascal's triangle.
@@ -83,7 +83,7 @@ impl<const C: usize> Polynomial<C> {
         &self.c[..self.width()]
     }
 
-    /// The number of coefficients that loops over a polynomial of degree `n` go through: `C` where that is small.
+    /// The number of coefficients that loops over a polynomial of degree `n` run through: `C` where that is small.
     #[inline(always)]
     pub fn padded_len(n: usize) -> usize {
         if C <= FEW {
@@ -380,7 +380,7 @@ impl<const C: usize> Polynomial<C> {
         sum
     }
 
-    /// The same in the vectors of the processor.
+    /// The same values as by `values`, computed with the best SIMD instructions of the processor.
     pub fn values_in_vectors<const K: usize>(&self, x: [f64; K]) -> [f64; K] {
         dispatch!(Level::new(), _simd => self.values(x))
     }

@@ -28,7 +28,7 @@ pub fn lerp<const M: usize>(a: &[f64; M], b: &[f64; M], t: f64) -> [f64; M] {
     std::array::from_fn(|k| a[k] + t * (b[k] - a[k]))
 }
 
-/// The line from one point to another.
+/// The straight segment from one point to another.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment<const M: usize> {
     start: [f64; M],
@@ -39,7 +39,7 @@ pub struct Segment<const M: usize> {
 impl<const M: usize> Segment<M> {
     pub fn new(start: &[f64; M], end: &[f64; M]) -> Self {
         let vector = sub(end, start);
-        // Any positive number, for a segment without a length.
+        // For a segment of length 0 any positive number will do.
         Self { start: *start, vector, length_sq: dot(&vector, &vector).max(f64::MIN_POSITIVE) }
     }
 
@@ -82,8 +82,8 @@ impl<const M: usize> Quadratic<M> {
         (std::array::from_fn(|k| scale * (b[k] - a[k])), std::array::from_fn(|k| scale * (c[k] - b[k])))
     }
 
-    /// C' by t = u/width at both ends. On a line as `line` makes it both are equal: its middle is rounded, which would bend a
-    /// short line far from the origin.
+    /// The derivatives of C with respect to t = u/width at both ends. On a line made by `line` both are set equal: the rounding
+    /// of its middle point would bend a short line far from the origin.
     #[inline(always)]
     pub fn tangents(&self) -> ([f64; M], [f64; M]) {
         let [a, b, c] = &self.control;

@@ -6,8 +6,8 @@
 //! | file | computes |
 //! |---|---|
 //! | `knots`, `extract` | a checked B-spline or NURBS; its pieces |
-//! | `bezier`, `rational` | values and derivatives of a piece, parts of it, the same of another degree |
-//! | `cusps` | where C' is 0 |
+//! | `bezier`, `rational` | values and derivatives of a piece, parts of it, the same piece of higher degree |
+//! | `cusps` | the places where C' is 0 |
 //! | `regular` | the same curve as pieces without a cusp inside |
 //! | `speed`, `length` | \|C'\| with bounds of its derivatives; the length and its inverse |
 
@@ -25,9 +25,9 @@ use crate::tolerance::NO_DIRECTION;
 
 /// The greatest degree of a piece.
 pub const MAX_DEGREE: usize = 9;
-/// Greatest number of coefficients of a hodograph: that of a rational piece has degree 2d − 2.
+/// The greatest number of coefficients of a hodograph: that of a rational piece has degree 2d − 2.
 pub const MAX_HODOGRAPH: usize = 2 * MAX_DEGREE - 1;
-/// Greatest number of coefficients of its square.
+/// The greatest number of coefficients of the square of a hodograph.
 pub(crate) const MAX_SQUARE: usize = 2 * MAX_HODOGRAPH - 1;
 
 /// One piece: degree + 1 control points in mm, as many weights (none if it is polynomial), and the width of its parameter
@@ -40,7 +40,7 @@ pub struct Piece<'a, const M: usize> {
 }
 
 impl<'a, const M: usize> Piece<'a, M> {
-    /// A piece with as many weights as control points, or none; with equal weights it is polynomial.
+    /// A piece with as many weights as control points, or none; with equal weights it is treated as polynomial.
     #[inline]
     pub fn new(control: &'a [[f64; M]], weights: &'a [f64], width: f64) -> Self {
         let equal = weights.windows(2).all(|pair| pair[0] == pair[1]);
@@ -68,8 +68,8 @@ impl<'a, const M: usize> Piece<'a, M> {
         (!self.is_rational()).then_some(Quadratic { control, width: self.width })
     }
 
-    /// The first edge of the control polygon that has a direction, or with `at_end` the last; None if the piece has no
-    /// length. It is in the direction of motion at that end.
+    /// The first edge of the control polygon that has a direction, or with `at_end` the last one: the direction of motion at that
+    /// end. None if the piece has no length.
     pub fn edge(&self, at_end: bool) -> Option<[f64; M]> {
         let extent = self.extent();
         let mut edges = self.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
@@ -87,8 +87,8 @@ impl<'a, const M: usize> Piece<'a, M> {
     }
 }
 
-/// Pieces in order, each of its own degree: piece i has the control points from `offsets[i]` to `offsets[i + 1]`. `weights`
-/// is empty if no piece is rational.
+/// Pieces in order, each of its own degree: piece i has the control points `offsets[i]..offsets[i + 1]`. `weights` is empty if no
+/// piece is rational.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompositeCurve<const M: usize> {
     pub control: Vec<[f64; M]>,
@@ -113,7 +113,7 @@ impl<const M: usize> CompositeCurve<M> {
         self.width.is_empty()
     }
 
-    /// Piece i; with equal weights it is polynomial.
+    /// Piece i; with equal weights it is treated as polynomial.
     #[inline]
     pub fn piece(&self, i: usize) -> Piece<'_, M> {
         let range = self.offsets[i]..self.offsets[i + 1];
@@ -130,7 +130,7 @@ impl<const M: usize> CompositeCurve<M> {
         (0..self.len()).map(|i| self.piece(i))
     }
 
-    /// Appends a piece; empty `weights` are ones.
+    /// Appends a piece; empty `weights` stand for ones.
     pub fn push(&mut self, control: &[[f64; M]], weights: &[f64], width: f64) {
         if !weights.is_empty() && self.weights.is_empty() {
             self.weights.resize(self.control.len(), 1.0);
@@ -145,7 +145,7 @@ impl<const M: usize> CompositeCurve<M> {
         self.width.push(width);
     }
 
-    /// Removes all pieces; the memory stays.
+    /// Removes all pieces, but keeps the memory.
     pub fn clear(&mut self) {
         self.control.clear();
         self.weights.clear();

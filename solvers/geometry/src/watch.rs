@@ -1,18 +1,17 @@
-//! The progress of a kernel's work, and its cancellation.
+//! Progress and cancellation of a kernel's work.
 //!
-//! Kernels count in their outer loops what they have done, at least every few milliseconds. Cancelled work ends there: it
-//! unwinds without a message to its caller, through all its threads, so no kernel needs an error for it.
+//! Kernels count finished work in their outer loops, at least every few milliseconds. If the work was cancelled, it ends there by
+//! unwinding to its caller, through all its threads and without a message. So no kernel needs an error for it.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-/// The whole work in units of its counter: 1e9 equal parts are still counted well, and work that is done again has room
-/// above.
+/// The whole work in units of the counter: fine enough for 1e9 equal parts, with room above for work that is done again.
 const WHOLE: f64 = (1u64 << 52) as f64;
 /// Small units of work are counted in groups of this many.
 const STEP: usize = 256;
 
-/// The counter of a work, and whether it is cancelled.
+/// The counter of a task's work, and whether it is cancelled.
 #[derive(Debug, Default)]
 pub struct Work {
     done: AtomicU64,
@@ -28,37 +27,37 @@ impl Work {
         (self.done.load(Relaxed) as f64 / WHOLE).min(1.0)
     }
 
-    /// Makes the work end where it next counts.
+    /// Requests that the work ends where it next counts.
     pub fn cancel(&self) {
         self.cancelled.store(true, Relaxed);
     }
 
-    /// The counter for all of the work.
+    /// A counter for all of the work.
     pub fn watch(&self) -> Watch<'_> {
         Watch { work: Some(self), share: WHOLE }
     }
 }
 
-/// Counts a part of a work. The default counts nothing.
+/// Counts a share of some work. The default counts nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Watch<'a> {
     work: Option<&'a Work>,
-    /// In units of the counter.
+    /// The share, in units of the counter.
     share: f64,
 }
 
 impl Watch<'_> {
-    /// The counter of this fraction of the part, 0 to 1.
+    /// A counter for this fraction, 0 to 1, of the share.
     pub fn part(self, share: f64) -> Self {
         Self { share: share * self.share, ..self }
     }
 
-    /// The counter of one of `count` equal parts.
+    /// A counter for one of `count` equal parts of the share.
     pub fn each(self, count: usize) -> Self {
         self.part(1.0 / count.max(1) as f64)
     }
 
-    /// Counts the part `times` times. Unwinds if the work is cancelled.
+    /// Counts the share `times` times. Unwinds if the work is cancelled.
     #[inline]
     pub fn advance(self, times: usize) {
         if let Some(work) = self.work {
@@ -67,7 +66,7 @@ impl Watch<'_> {
         }
     }
 
-    /// Counts the part once, in round `i` of a loop over small parts: a few hundred are counted at once.
+    /// Counts the share once, in round `i` of a loop over small parts; every 256th round counts for all 256.
     #[inline]
     pub fn count(self, i: usize) {
         if i.is_multiple_of(STEP) {
@@ -83,7 +82,7 @@ impl Watch<'_> {
         }
     }
 
-    /// Unwinds if the work is cancelled, in round `i` of a loop over small parts.
+    /// In round `i` of a loop over small parts: unwinds if the work is cancelled, checked in every 256th round.
     #[inline]
     pub fn check_at(self, i: usize) {
         if i.is_multiple_of(STEP) {
@@ -126,7 +125,7 @@ mod tests {
         }));
         assert!(ended.expect_err("it was cancelled").is::<Cancelled>());
         assert!(work.done() < 1.0);
-        // Nobody waits: nothing is counted and nothing ends.
+        // No work is attached: nothing is counted and nothing ends.
         Watch::default().advance(1);
         Watch::default().check();
     }

@@ -1,10 +1,10 @@
-//! An arc or a helix of a program as conic pieces, with a bound of their distance from it.
+//! An arc or a helix of a program as conic pieces, with a bound of their distance from the arc.
 //!
 //! | file | computes |
 //! |---|---|
 //! | `polar` | an arc about its centre |
-//! | `true_circle` | the circle through both ends, and helices on its cylinder |
-//! | `spiral` | an arc whose ends are too far apart in radius for one circle, within a tolerance |
+//! | `true_circle` | the circle through both ends, and helices on the cylinder of such a circle |
+//! | `spiral` | an arc whose radius changes too much for one circle, within a tolerance |
 
 mod polar;
 mod spiral;
@@ -15,10 +15,10 @@ use polar::Polar;
 pub use polar::{Arc, ArcError};
 use std::f64::consts::{PI, TAU};
 
-/// The arc as pieces in standard form, and an upper bound of its distance from them, both ways.
+/// The arc as pieces in standard form, and an upper bound of the distance between arc and pieces, both ways, in mm.
 ///
-/// Start and end are met exactly. The pieces lie on the circle through both ends whose centre is nearest the
-/// programmed one where that is within `tolerance` > 0, and are a spiral otherwise; the bound is at most `tolerance`.
+/// Start and end are met exactly. Where the circle through both ends whose centre is nearest to the programmed one is within
+/// `tolerance` > 0, the pieces lie on it; otherwise they are a spiral. The bound is at most `tolerance`.
 pub fn arc_pieces<const M: usize>(arc: &Arc<M>, tolerance: f64) -> Result<(Vec<Conic<M>>, f64), ArcError> {
     let polar = Polar::new(arc)?;
     match true_circle::pieces(arc, &polar, tolerance) {
@@ -27,8 +27,8 @@ pub fn arc_pieces<const M: usize>(arc: &Arc<M>, tolerance: f64) -> Result<(Vec<C
     }
 }
 
-/// Least and greatest value of axis `k` of the plane (0 or 1) on the arc. Where the radius changes, the values are
-/// taken at the angles at which a circle has its extremes.
+/// Least and greatest value of axis `k` of the plane (0 or 1) on the arc. Where the radius changes, the values are taken at the
+/// angles of the extremes of a circle.
 pub fn arc_extent<const M: usize>(arc: &Arc<M>, k: usize) -> Result<(f64, f64), ArcError> {
     let polar = Polar::new(arc)?;
     let (a, b) = (arc.start[arc.plane[k]], arc.end[arc.plane[k]]);
@@ -43,7 +43,7 @@ pub fn arc_extent<const M: usize>(arc: &Arc<M>, k: usize) -> Result<(f64, f64), 
         if turns < 0.0 {
             continue;
         }
-        // With a changing radius the first or the last turn reaches farthest.
+        // With a changing radius the extreme is in the first or in the last turn.
         for angle in [first, first + TAU * turns] {
             let value = arc.centre[k] + side * (polar.radius + polar.growth * angle);
             least = least.min(value);
@@ -184,7 +184,7 @@ mod tests {
             let (pieces, deviation) = arc_pieces(&arc, 0.05).unwrap();
             let found = sampled_deviation(&arc, &pieces);
             assert!(found <= deviation + 1e-12, "{found} {deviation} {arc:?}");
-            // What the bound has beside g is d²/2r, at most 3e-6 here.
+            // Besides |g| the bound contains d²/2r, at most 3e-6 here.
             assert!(found >= 0.9 * deviation - 4e-6, "{found} of {deviation} {arc:?}");
             greatest = greatest.max(deviation);
             assert_eq!(pieces[pieces.len() - 1].control[2], arc.end);
@@ -272,7 +272,7 @@ mod tests {
                 let [point, tangent] = at(piece, j as f64 / 8.0);
                 assert!((point[0].hypot(point[1]) - 2.0).abs() < 1e-14);
                 assert!(tangent[2] < 0.0 && tangent[3] > 0.0);
-                // Both other axes go together, and with the angle but for the bound.
+                // Both other axes move in proportion, and are linear in the angle up to the bound.
                 let share = (point[3] - 10.0) / 130.0;
                 assert!((point[2] + 3.25 * share).abs() < 1e-14);
                 let angle = 6.5 * PI * share;

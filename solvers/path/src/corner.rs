@@ -1,8 +1,8 @@
-//! The blend of a corner: the pieces of both its sides, displaced so that they meet smoothly.
+//! The blend of a corner: the pieces on both sides of it, displaced so that they meet smoothly.
 //!
-//! Two smooth sides meet in V with unit tangents t₋ before and t₊ after. To each side, up to the length l from V, the
-//! displacement D (q/l)² is added, where q is the distance from the far end of the side, measured in a parameter in which
-//! the side is C1 and has speed 1 in V. With
+//! Two smooth sides meet in V with unit tangents t₋ before and t₊ after. Each side, up to the length l from V, is displaced by
+//! D (q/l)², where q is the distance from the far end of the side, measured in a parameter in which the side is C1 and has
+//! speed 1 in V. With
 //!
 //! ```text
 //! D = (t₊ − t₋)/(2/l₋ + 2/l₊)          |D| = l |t₊ − t₋|/4 at equal lengths
@@ -13,24 +13,24 @@
 //! the distance of V from the curve is exactly |D|, and both sides are one parabola, with the control points V − l t₋, V,
 //! V + l t₊.
 //!
-//! A rational piece of degree d stays one: its control points get fractions of D. On the piece from q₀ to q₁ the first
-//! step of the fraction is q₀ w₀/w₁, the last q₁ w_d/w_{d−1}, and those between go evenly from one to the other, all times
-//! 2 (q₁ − q₀)/(d l² A). A makes the sum of the steps of a side 1, and the slope in V is 2/(lA). On polynomials A = 1, and
-//! the displacement is D (q/l)².
+//! A rational piece of degree d keeps its degree and weights: each of its control points is displaced by a fraction of D. On the
+//! piece from q₀ to q₁ the first step between these fractions is q₀ w₀/w₁, the last is q₁ w_d/w_{d−1}, and those between are
+//! interpolated linearly; all are multiplied by 2 (q₁ − q₀)/(d l² A). A is chosen so that the sum of the steps of a side is 1;
+//! the slope in V is then 2/(lA). On polynomials A = 1, and the displacement is D (q/l)².
 //!
 //! # Why a parabola
-//! Two quadratics with the polygon A, A + x t₋, B − x t₊, B and the apex at the tolerance leave the ratio r = x/l free;
-//! r = 1/2 is the parabola above. The table has the times against r = 1/2 by exact planning of 140 corners between two
-//! lines of 10 mm: apex 0.01 mm, turns from 10° to 170° in five directions each, axis accelerations 1000/1000 and
-//! 400/1000 mm/s², feeds 50 and 1000 mm/s.
+//! Two quadratics with the polygon A, A + x t₋, B − x t₊, B and the apex at the tolerance leave the ratio r = x/l free; r = 1/2
+//! is the parabola above. The table compares the times with r = 1/2, from exact plans of 140 corners between two lines of 10 mm:
+//! apex 0.01 mm, turns from 10° to 170° in five directions each, axis accelerations 1000/1000 and 400/1000 mm/s², feeds 50 and
+//! 1000 mm/s.
 //!
 //! | r    | 0.3    | 0.4   | 0.45  | 0.5 | 0.55   | 0.6   | 0.7   |
 //! |------|--------|-------|-------|-----|--------|-------|-------|
 //! | mean | +2.6 % | +1.1 % | +0.5 % | 0 | −0.01 % | +0.2 % | +0.7 % |
 //! | worst | +15.8 % | +7.6 % | +3.6 % | 0 | +1.4 % | +3.0 % | +6.8 % |
 //!
-//! Two axes with constant accelerations draw a parabola, so on it both can be at their limits all along. Greater ratios
-//! also take more of the sides, which short sides do not have.
+//! Two axes with constant accelerations follow a parabola, so both can be at their limits all along. Greater ratios also need
+//! longer sides, which short lines do not have.
 
 mod share_lengths;
 mod tangent_jump;
@@ -48,13 +48,13 @@ use feedplan_geometry::spline::CompositeCurve;
 pub struct Sides<const M: usize> {
     pub before: Vec<PathPiece<M>>,
     pub after: Vec<PathPiece<M>>,
-    /// The pieces of splines among them, cut and bent.
+    /// The spline pieces of both sides, cut and bent.
     pub made: CompositeCurve<M>,
 }
 
 impl<const M: usize> Sides<M> {
-    /// The one piece that rounds a corner between two lines: a circle with the lower of both feeds, or a parabola if
-    /// feeds and tolerances are equal.
+    /// The single piece that rounds a corner between two lines: a circle with the lower of both feeds, or a parabola, which needs
+    /// equal feeds and tolerances on both sides. None in other cases.
     pub fn between_lines(&self, jump: &TangentJump<M>, rounding: Rounding) -> Option<PathPiece<M>> {
         let ([before], [after]) = (&self.before[..], &self.after[..]) else { return None };
         let (Shape::Conic(first), Shape::Conic(second)) = (&before.shape, &after.shape) else { return None };
@@ -71,7 +71,7 @@ impl<const M: usize> Sides<M> {
         if rounding == Rounding::Circle {
             corner.width = corner.natural_width();
         }
-        // The distance of a conic from the corner is 2/(1 + weight) times that of the parabola.
+        // The distance of a conic from the corner is 2/(1 + weight) times the distance of the parabola.
         let distance = 2.0 / (1.0 + weight) * norm(&jump.displacement(first.width, second.width));
         Some(PathPiece {
             shape: Shape::Conic(corner),
@@ -83,8 +83,8 @@ impl<const M: usize> Sides<M> {
         })
     }
 
-    /// Displaces both sides so that they meet smoothly. Returns the greatest ratio of a piece's deviation to the rest of
-    /// its tolerance; None if a side is empty, or has a place where C' is 0.
+    /// Displaces both sides so that they meet smoothly. Returns the greatest ratio of a piece's new deviation to what was left of
+    /// its tolerance; None if a side is empty, or if C' is 0 somewhere.
     pub fn bend(&mut self, jump: &TangentJump<M>) -> Option<f64> {
         let Self { before, after, made } = self;
         if before.is_empty() || after.is_empty() {
@@ -95,7 +95,7 @@ impl<const M: usize> Sides<M> {
         let sum_before = sum_of_steps(before.iter(), length_before, made, true);
         let sum_after = sum_of_steps(after.iter().rev(), length_after, made, false);
         let displacement = jump.displacement(length_before * sum_before, length_after * sum_after);
-        // From the far ends to the corner, so that q starts as an exact 0 and ends as an exact length.
+        // From the far ends to the corner, so that q starts at exactly 0 and ends at exactly the length of the side.
         let before = bend(before.iter_mut(), true, &displacement, length_before, sum_before, made)?;
         let after = bend(after.iter_mut().rev(), false, &displacement, length_after, sum_after, made)?;
         Some(before.max(after))
@@ -122,7 +122,7 @@ impl Ends {
         }
     }
 
-    /// C'·width at both ends as lengths.
+    /// C' times the width of the piece at both ends, as lengths.
     fn speeds<const M: usize>(&self, shape: &Shape<M>, made: &CompositeCurve<M>) -> [f64; 2] {
         let control = match shape {
             Shape::Conic(conic) => &conic.control[..],
@@ -133,7 +133,7 @@ impl Ends {
         [degree / self.ratio[0] * norm(&edges[0]), degree / self.ratio[1] * norm(&edges[1])]
     }
 
-    /// The steps of the fraction of D on a piece on which q/l grows from `far` to `near`, before the division by A.
+    /// The steps between the fractions of D on a piece on which q/l grows from `far` to `near`, before the division by A.
     fn steps(&self, far: f64, near: f64, corner_at_end: bool) -> impl Iterator<Item = f64> {
         let [mut first, mut last] = self.ratio;
         if !corner_at_end {
@@ -148,8 +148,8 @@ impl Ends {
     }
 }
 
-/// Gives the pieces of a side, taken from the corner outwards, widths that make it C1 with speed 1 in the corner. Returns
-/// the sum of the widths; None if C' is 0 at an end of a piece.
+/// Gives the pieces of a side, taken from the corner outwards, widths with which the side is C1 and has speed 1 at the corner.
+/// Returns the sum of the widths; None if C' is 0 at an end of a piece.
 fn rescale<'a, const M: usize>(
     side: impl Iterator<Item = &'a mut PathPiece<M>>,
     corner_at_end: bool,
@@ -189,8 +189,8 @@ fn sum_of_steps<'a, const M: usize>(
     sum
 }
 
-/// Displaces the pieces of a side, taken from the far end to the corner. Returns the greatest ratio of a piece's deviation
-/// to the rest of its tolerance.
+/// Displaces the pieces of a side, taken from the far end to the corner. Returns the greatest ratio of a piece's new deviation to
+/// what was left of its tolerance.
 fn bend<'a, const M: usize>(
     side: impl ExactSizeIterator<Item = &'a mut PathPiece<M>>,
     corner_at_end: bool,
@@ -277,7 +277,7 @@ mod tests {
         assert!(
             (norm(&sub(&apex, &[10.0, 0.0])) - 0.1).abs() < 1e-15 && (corner.deviation - 0.1).abs() < 1e-15
         );
-        // Bending the two sides draws the same curve in two pieces.
+        // Bending the two sides gives the same curve in two pieces.
         let mut sides = sides;
         assert!((sides.bend(&jump).unwrap() - 0.1).abs() < 1e-14);
         let bent = conic(&sides.before[0]);
@@ -310,13 +310,13 @@ mod tests {
         }
         let [middle, _] = at(&arc, 0.5);
         assert!((norm(&sub(&middle, &[10.0, 0.0])) - 0.1).abs() < 1e-14);
-        // The parabola needs one feed.
+        // The parabola needs equal feeds.
         assert!(sides.between_lines(&jump, Rounding::Parabola).is_none());
     }
 
     #[test]
     fn bent_sides_of_several_pieces_are_smooth_and_as_near_as_they_say() {
-        // Two C0 sides in space, smooth in themselves with changing parameter speeds.
+        // Two sides in space that meet in a corner; each is smooth in itself, with changing parameter speeds.
         let curve =
             |a: [f64; 3], b: [f64; 3], c: [f64; 3]| Conic::from(Quadratic { control: [a, b, c], width: 0.7 });
         let before = [
@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn bent_circles_stay_conics_and_are_as_near_as_they_say() {
-        // Two arcs of one circle of radius 1, then three of one of radius 2 that leaves at a right angle.
+        // Two arcs of one circle of radius 1, then two arcs of a circle of radius 2 that starts at a right angle to it.
         let arc = |centre: [f64; 2], radius: f64, from: f64, to: f64| {
             let at = |angle: f64, r: f64| [centre[0] + r * angle.cos(), centre[1] + r * angle.sin()];
             let half = 0.5 * (to - from);

@@ -1,4 +1,4 @@
-//! A chain of G1 points as C1 quadratic B-splines within a tolerance that is certified both ways.
+//! Fits C1 quadratic B-splines to a chain of G1 points, within a tolerance that is certified both ways.
 //!
 //! After Zhang, Yan, Yuan, Wang and Gao, "Curve fitting and optimal interpolation on CNC machines based on quadratic
 //! B-splines", Sci. China Inf. Sci. 53 (2010), section 3:
@@ -10,13 +10,13 @@
 //! | `features` | the feature points of a group, which are interpolated | 3.2, Algorithm 1 |
 //! | `spline` | the spline through feature points | 3.3 |
 //! | `certificate` | a bound of the distance between spline and polygon, both ways | own |
-//! | `refine` | more feature points until the bound is within the tolerance, and breaks where none helps | own |
+//! | `refine` | adds feature points until the bound is within the tolerance, and breaks splines where none helps | own |
 //! | `piece_builder` | the quadratic pieces of a spline | |
 //!
 //! The paper tests its tolerance on the Bézier curves of Algorithm 1 only, not on the spline.
 //!
-//! The tangent at a breaking point that is no corner is that of one spline through the groups on both sides. So the path
-//! is C1 there, and each group can be refined by itself, in parallel.
+//! At a breaking point that is no corner, the tangent is that of one spline through the groups on both sides. So the path is C1
+//! there, and each group can be refined by itself, in parallel.
 
 mod breaking;
 mod certificate;
@@ -35,7 +35,7 @@ pub use piece_builder::FittedPiece;
 use refine::Block;
 use spline::{interpolate, EndCondition};
 
-/// Chains of fewer points are fitted by one thread, which is faster.
+/// Chains of fewer points are fitted by one thread: this is faster.
 const PARALLEL: usize = 4096;
 /// A long group is refined in blocks of about this many points, so that one refinement changes few of them.
 const BLOCK: usize = 512;
@@ -44,19 +44,19 @@ const BLOCK: usize = 512;
 pub struct FitOptions {
     /// Allowed distance between spline and polygon, both ways, in mm.
     pub tolerance: f64,
-    /// Longer chords stay lines, in mm.
+    /// Chords longer than this, in mm, stay lines.
     pub max_chord: f64,
-    /// Extreme points of a greater curvature are breaking points, in 1/mm (Zhang eq. 2: α a_max / F²).
+    /// Extremes of the curvature above this, in 1/mm, are breaking points (Zhang eq. 2: α a_max / F²).
     pub max_curvature: f64,
-    /// A breaking point that turns by more is a corner, where the tangent may jump, in rad.
+    /// A breaking point that turns by more than this, in rad, is a corner, where the tangent may jump.
     pub corner_angle: f64,
 }
 
 /// Lines and C1 quadratic B-splines within the tolerance of the polygon of `points`, both ways.
 ///
-/// * Breaking points and both ends are interpolated exactly. So are other features, unless a chord beside them is then
-///   out of tolerance; such a feature is passed at an offset.
-/// * Chords that no smooth curve follows within the tolerance stay lines, with corners between them.
+/// * Breaking points and both ends are interpolated exactly. Other features are as well, unless a chord beside them would be out
+///   of tolerance; such a feature is passed at an offset.
+/// * Chords that no smooth curve follows within the tolerance stay lines, with corners at their ends.
 /// * All chords stay lines if the tolerance is not positive, a point is not finite or two neighbours are equal.
 ///
 /// The result does not depend on the number of threads.
@@ -103,7 +103,7 @@ pub fn fit_points<const M: usize>(
     let blocks = blocks(&chain, &breaks, &features);
     let fitted = chain.map(&blocks, watch.part(0.7), |block| block.fit(&chain));
 
-    // Splines are numbered through; a block that continues its group continues its spline.
+    // Splines are numbered consecutively; a block that continues its group continues its spline.
     let mut pieces = Vec::with_capacity(fitted.iter().map(|block| block.pieces.len()).sum());
     let (mut spline, mut open) = (0, false);
     for (block, part) in blocks.iter().zip(fitted) {
@@ -118,10 +118,11 @@ pub fn fit_points<const M: usize>(
     pieces
 }
 
-/// The chain cut at its breaking points, and long groups cut at feature points, each with its tangents at both ends.
+/// The blocks of a chain with their end conditions: it is cut at its breaking points, and long groups also at feature points.
 fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<usize>]) -> Vec<Block<M>> {
     let count = features.len();
-    // The condition at break `at`, where the other side is group `beside`.
+    // The end condition of a curve at break `at`: the direction of the neighbouring group `beside` if that is a line without a
+    // corner.
     let end =
         |beside: Option<usize>, at: usize| match beside.filter(|&g| breaks[g].line && !breaks[at].corner) {
             Some(g) => EndCondition::Tangent(chain.direction(breaks[g].at, breaks[g + 1].at)),
@@ -148,8 +149,8 @@ fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<us
     blocks
 }
 
-/// Appends the blocks of groups that share one spline. They are cut where the tangent of that spline is plausible: its
-/// length is near 1, and its direction near those of both chords.
+/// Appends the blocks of groups that share one spline. They are cut at the breaking points. Long groups are also cut at features
+/// where the tangent of that spline is plausible: its length is near 1, and its direction near those of both chords.
 fn append_blocks<const M: usize>(
     chain: &Chain<M>,
     breaks: &[Break],

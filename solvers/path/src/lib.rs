@@ -23,8 +23,8 @@ instances! {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
         fn path(&self, options: &PathOptions, axes: &Axes<M>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_path;
-        /// One smooth curve between two stops: without a `motion` arcs and bends keep their size, with one it is fitted
-        /// to its speed.
+        /// One smooth curve between two stops. Without a `motion` arcs and bends keep their size; with one the curve is fitted to
+        /// the speed of that motion.
         fn smooth_path(&self, options: &PathOptions, axes: &Axes<M>, motion: Option<&Motion<M>>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_smooth_path;
     }

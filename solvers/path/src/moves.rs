@@ -1,4 +1,4 @@
-//! A program as columns of moves, and what is wrong with a move that has no path.
+//! A program as columns of moves, and the reasons why a move has no path.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::spline::CompositeCurve;
 
-/// What a move is, in the numbers of the Python `MoveKind`.
+/// The kind of a move, numbered like the Python `MoveKind`.
 pub const RAPID: u8 = 0;
 pub const LINE: u8 = 1;
 pub const ARC: u8 = 2;
@@ -23,16 +23,16 @@ pub struct Moves<'a, const M: usize> {
     pub feed: &'a [f64],
     /// Allowed distance between path and program in mm; 0 asks for the exact path.
     pub tolerance: &'a [f64],
-    /// The part of it that the fit of chains may use, in mm; 0: lines are not fitted.
+    /// The part of that tolerance that the fit of chains may use, in mm; with 0 lines are not fitted.
     pub fit_tolerance: &'a [f64],
     /// Whether the tool stops at the end of the move.
     pub halt: &'a [bool],
-    /// Arcs with the index of their move, ascending; start and end are taken from the moves.
+    /// Arcs with the index of their move, ascending; their start and end come from the moves.
     pub arcs: &'a [(usize, ArcShape)],
-    /// Spline moves, ascending, with the pieces of `splines` that they take, from the start to the target.
+    /// Spline moves, ascending, with the range of the pieces of `splines` that they follow, from the start to the target.
     pub spline_moves: &'a [(usize, Range<usize>)],
-    /// Moves that begin elsewhere than the one before ends, ascending, with their starts: there words change their
-    /// meaning.
+    /// Moves that do not begin where the one before ends, ascending, with their starts: the meaning of the axis words changes
+    /// there.
     pub changes: &'a [(usize, [f64; M])],
     pub splines: &'a CompositeCurve<M>,
     /// Whether the coordinates are positions of joints, which have a travel.
@@ -50,15 +50,15 @@ pub struct ArcShape {
 /// How moves become pieces.
 #[derive(Clone, Copy, Debug)]
 pub struct PathOptions {
-    /// Distance from arcs that no circle meets and from helices, in mm.
+    /// Allowed distance from helices, and from arcs that are not exactly circles, in mm; also the tolerance of exact moves.
     pub exact_tolerance: f64,
     /// Chords longer than this stay lines, in mm.
     pub max_chord: f64,
-    /// α a_max in mm/s²: a chain is broken where its curvature exceeds this over the square of the feed.
+    /// α a_max in mm/s²: a chain is broken where its curvature exceeds this divided by the square of the feed.
     pub corner_acceleration: f64,
-    /// The speed that no chain exceeds, whatever its feed, in mm/s.
+    /// No chain is followed faster than this, whatever its feed, in mm/s.
     pub max_speed: f64,
-    /// Chains stay smooth where they turn by less than this, in rad.
+    /// Chains stay smooth where they turn by less than this angle, in rad.
     pub corner_angle: f64,
     /// What corners between two lines become.
     pub rounding: Rounding,
@@ -83,7 +83,7 @@ pub enum MoveFault {
     Spline,
 }
 
-/// What a list that ascends by moves has for move `i`.
+/// The value for move `i` in a list that is sorted by moves.
 pub fn of_move<T>(list: &[(usize, T)], i: usize) -> Option<&T> {
     list.binary_search_by_key(&i, |row| row.0).ok().map(|row| &list[row].1)
 }
@@ -98,7 +98,7 @@ impl<const M: usize> Moves<'_, M> {
         }
     }
 
-    /// Whether move `i` has a feed, and if it is a line a length.
+    /// Checks that move `i` has a feed and, if it is a line, a length.
     pub fn check(&self, i: usize) -> Result<(), MoveError> {
         let length = norm(&sub(&self.target[i], &self.origin(i)));
         let straight = self.kind[i] != ARC && self.kind[i] != SPLINE;
@@ -110,7 +110,7 @@ impl<const M: usize> Moves<'_, M> {
         has_feed.then_some(()).ok_or(MoveError { index: i, fault: MoveFault::Feed })
     }
 
-    /// The feed of move `i` in mm/s; rapids have none.
+    /// The feed of move `i` in mm/s; infinite for rapids.
     pub fn feed_of(&self, i: usize) -> f64 {
         if self.kind[i] == RAPID {
             f64::INFINITY
@@ -125,7 +125,7 @@ impl<const M: usize> Moves<'_, M> {
         (exact, if exact { options.exact_tolerance } else { self.tolerance[i] })
     }
 
-    /// The arc of move `i` as pieces within `tolerance`, and the bound of their distance from it.
+    /// The arc of move `i` as pieces within `tolerance`, and the bound of their distance from it, in mm.
     pub fn arc_pieces(&self, i: usize, tolerance: f64) -> Result<(Vec<Conic<M>>, f64), MoveError> {
         arc_pieces(&self.arc(i)?, tolerance)
             .map_err(|error| MoveError { index: i, fault: MoveFault::Arc(error) })
@@ -138,7 +138,7 @@ impl<const M: usize> Moves<'_, M> {
         Ok(Arc { start: self.origin(i), end: self.target[i], centre, plane, sweep })
     }
 
-    /// The pieces of spline move `i` that have a length, with widths whose sum is about the length of the spline.
+    /// The pieces of spline move `i` that have a length, their widths scaled so that the sum is about the length of the spline.
     pub fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, MoveError> {
         let none = MoveError { index: i, fault: MoveFault::Spline };
         let range = of_move(self.spline_moves, i).ok_or(none)?.clone();

@@ -4,9 +4,9 @@
 //! |---|---|
 //! | `built_path`, `chunk` | the path as it is built, with its deviation |
 //! | `corner_rounding` | the path with each corner rounded by itself within the tolerance |
-//! | `chords` | moves as chords for a smooth curve |
+//! | `chords` | moves as chords, the input of the smooth fit |
 //! | `smooth_path` | the path with one smooth curve between two stops |
-//! | `travel` | the first place that an axis cannot reach |
+//! | `travel` | the first place that is outside the travel of an axis |
 
 mod built_path;
 mod chords;
@@ -151,7 +151,7 @@ mod tests {
         let points: Vec<[f64; 2]> =
             (0..41).map(|i| [0.02 * i as f64, if i % 2 == 0 { 0.0 } else { 0.02 }]).collect();
         let (pieces, runs) = polyline(&points, &[0.1; 40], false, false);
-        // 39 corners; of the first and the last edge half is left.
+        // 39 corners; half of the first and of the last edge is left.
         assert_eq!((pieces.len(), runs.len()), (41, 2));
         for pair in pieces.windows(2) {
             assert_eq!(conic(&pair[0]).control[2], conic(&pair[1]).control[0]);
@@ -208,7 +208,7 @@ mod tests {
         assert_eq!(widths[0], 10.0);
         assert!(widths[1] == widths[2] && pieces[1].shape.conic().is_none());
         assert!(path.outside.is_none() && path.deviation == 0.0);
-        // The polygon reaches 12, the curve less than that before its end.
+        // The control polygon reaches 12; the curve stays below that before its end.
         limits.travel[0] = [f64::NEG_INFINITY, 13.0];
         let outside = between_lines(0.0, &[true; 3], &limits, false).unwrap().outside.unwrap();
         assert_eq!((outside.index, outside.axis, outside.position), (1, 0, 14.0));
@@ -233,7 +233,7 @@ mod tests {
             }
             _ => None,
         });
-        // What is left of the cubic, its end, and the line in three parts, of which the middle one is a line still.
+        // The rest of the cubic, its end, and the line in three parts, of which the middle one is still a line.
         let made: Vec<_> =
             curves.map(|(deviation, piece)| (deviation, piece.degree(), piece.is_rational())).collect();
         assert_eq!(made.iter().map(|piece| piece.1).collect::<Vec<_>>(), [3, 3, 2, 2, 2]);

@@ -1,4 +1,4 @@
-//! A piece of a path: the moves that it goes along and its shape, which is a conic or a piece of a spline, as programmed,
+//! A piece of a path: the moves along which it goes, and its shape. The shape is a conic or a piece of a spline, as programmed,
 //! fitted, or cut and bent at a corner.
 
 use feedplan_geometry::conic::Conic;
@@ -6,7 +6,7 @@ use feedplan_geometry::quadratic::sub;
 use feedplan_geometry::spline::cusps::rests_at_ends;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 
-/// A piece of a path, and the moves that it goes along.
+/// A piece of a path, and the moves along which it goes.
 #[derive(Clone, Copy, Debug)]
 pub struct PathPiece<const M: usize> {
     pub shape: Shape<M>,
@@ -16,11 +16,11 @@ pub struct PathPiece<const M: usize> {
     pub feed: f64,
     /// Upper bound of the distance from the moves, both ways, in mm.
     pub deviation: f64,
-    /// Allowed distance in mm.
+    /// Allowed distance from the moves, in mm.
     pub tolerance: f64,
     /// Whether the moves ask for the exact path.
     pub exact: bool,
-    /// Whether the piece is one of an arc, whose extent is checked as programmed.
+    /// Whether the piece belongs to an arc, whose extent is checked as programmed.
     pub arc: bool,
 }
 
@@ -30,10 +30,10 @@ pub enum Shape<const M: usize> {
     Spline(Spline<M>),
 }
 
-/// A piece of a spline by its number, and what blends need of its ends.
+/// A piece of a spline, by its number, with the directions at its ends that blends need.
 #[derive(Clone, Copy, Debug)]
 pub struct Spline<const M: usize> {
-    /// The number of the piece in the program's splines, or if `made` in those of its chunk.
+    /// The number of the piece in the splines of the program or, if `made`, of its chunk.
     pub index: u32,
     pub made: bool,
     pub width: f64,
@@ -41,7 +41,7 @@ pub struct Spline<const M: usize> {
     /// The first and the last edge of the control polygon that has a direction.
     start_edge: [f64; M],
     end_edge: [f64; M],
-    /// Whether the tool rests at the start and at the end, in a cusp.
+    /// Whether the tool rests at the start, and at the end, because the curve has a cusp there.
     rests: [bool; 2],
 }
 
@@ -64,8 +64,7 @@ impl<const M: usize> Spline<M> {
         })
     }
 
-    /// The part on [low, high], appended to `made` with degree 2 or more, so that it can be bent; `splines` are the
-    /// program's.
+    /// The part on [low, high], appended to `made` with degree 2 or more, so that it can be bent; `splines` are the program's.
     pub fn part(
         &self,
         splines: &CompositeCurve<M>,
@@ -85,14 +84,14 @@ impl<const M: usize> Spline<M> {
         Self::of(&made.piece(index), index, true, high - low)
     }
 
-    /// The last of the made pieces; None if it has no length.
+    /// The last piece of `made`; None if it has no length.
     pub fn last_made(made: &CompositeCurve<M>) -> Option<Self> {
         let index = made.len().checked_sub(1)?;
         let piece = made.piece(index);
         Self::of(&piece, index, true, piece.width)
     }
 
-    /// The same piece after its control points have changed.
+    /// The same piece with the ends of its changed control points.
     pub fn bent(&self, made: &CompositeCurve<M>) -> Option<Self> {
         let index = self.index as usize;
         Self::of(&made.piece(index), index, true, self.width)
@@ -134,7 +133,7 @@ impl<const M: usize> Shape<M> {
         }
     }
 
-    /// Whether the tool rests at the start and at the end, in a cusp.
+    /// Whether the tool rests at the start, and at the end, because the curve has a cusp there.
     #[inline]
     pub fn rests(&self) -> [bool; 2] {
         match self {

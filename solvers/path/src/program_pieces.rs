@@ -1,7 +1,7 @@
 //! The moves of a program as pieces with sharp corners: lines, arcs, splines, and splines fitted to chains of lines.
 //!
-//! A chain is a maximal sequence of G1 lines with one tolerance and no halt. A change of feed does not end it: its curve
-//! stays whole, and a piece is cut where the feed changes (`feed_cuts`).
+//! A chain is a maximal sequence of G1 lines with one tolerance and without a halt. A change of feed does not end it: the fitted
+//! curve is the same, and a piece is cut where the feed changes (`feed_cuts`).
 
 mod feed_cuts;
 
@@ -16,17 +16,17 @@ use feed_cuts::cut_at_feeds;
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::watch::Watch;
 
-/// Moves outside of chains that one task takes at most.
+/// The greatest number of moves outside of chains in a task.
 const TASK: usize = 4096;
 
-/// The pieces of a program, and what was fitted.
+/// The pieces of a program, and the counts of what was fitted.
 #[derive(Default)]
 pub struct ProgramPieces<const M: usize> {
     pub pieces: Vec<PathPiece<M>>,
     pub fit: FitCounts,
 }
 
-/// Numbers of fitted chords, of splines fitted to them, and of the splines' polynomials.
+/// The numbers of fitted chords, of splines fitted to them, and of the polynomials of these splines.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitCounts {
     pub chords: usize,
@@ -43,7 +43,7 @@ impl AddAssign for FitCounts {
 }
 
 impl<const M: usize> Moves<'_, M> {
-    /// Whether move `i` is in one chain with the move before.
+    /// Whether move `i` and the move before it belong to one chain.
     fn chained(&self, i: usize) -> bool {
         let fitted =
             |k: usize| self.kind[k] == LINE && self.fit_tolerance[k] > 0.0 && self.tolerance[k] > 0.0;
@@ -54,7 +54,7 @@ impl<const M: usize> Moves<'_, M> {
             && self.fit_tolerance[i - 1] == self.fit_tolerance[i]
     }
 
-    /// Whether consecutive moves, of which all or none are chained, are a chain.
+    /// Whether consecutive moves, either all of one chain or all outside of chains, are a chain.
     fn is_chain(&self, moves: &Range<usize>) -> bool {
         moves.len() > 1 && self.chained(moves.start + 1)
     }
@@ -137,7 +137,7 @@ fn one_by_one<const M: usize>(
             pieces.push(line);
             continue;
         }
-        // The other half is left for blends with the neighbours.
+        // One half of the tolerance; the other is left for blends with the neighbours.
         let budget = 0.5 * tolerance.min(options.exact_tolerance);
         let (arc, deviation) = moves.arc_pieces(i, budget)?;
         pieces.extend(arc.into_iter().map(|piece| PathPiece {
@@ -150,7 +150,7 @@ fn one_by_one<const M: usize>(
     Ok(ProgramPieces { pieces, fit: FitCounts::default() })
 }
 
-/// The pieces of a chain, with one feed each.
+/// The pieces of a chain, each with one feed.
 fn chain<const M: usize>(
     moves: &Moves<M>,
     options: &PathOptions,
@@ -163,7 +163,7 @@ fn chain<const M: usize>(
     }
     let points: Vec<[f64; M]> =
         std::iter::once(moves.origin(first)).chain(moves.target[range.clone()].iter().copied()).collect();
-    // The greatest feed decides which curvature the chain can have without slowing the tool.
+    // The greatest feed decides which curvature the chain may have without slowing the tool down.
     let feed = moves.feed[range.clone()].iter().fold(0.0, |a: f64, &b| a.max(b)).min(options.max_speed);
     let fitted = fit_points(
         &points,
@@ -255,7 +255,7 @@ mod tests {
         assert!(cut[..fast].iter().all(|piece| piece.feed == 10.0 && piece.last <= 37));
         assert!(cut[fast..].iter().all(|piece| piece.feed == 20.0 && piece.first >= 37));
         assert!(norm(&sub(cut[fast].shape.start(), &target[36])) < 0.005);
-        // Both halves lie on the one curve, with one tangent.
+        // Both halves lie on one curve and have the same tangent where they meet.
         let unit = |edge: [f64; 2]| edge.map(|value| value / norm(&edge));
         let (out, into) = (unit(cut[fast - 1].shape.end_edge()), unit(cut[fast].shape.start_edge()));
         assert!(norm(&sub(&out, &into)) < 1e-12);

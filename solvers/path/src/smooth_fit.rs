@@ -1,25 +1,25 @@
-//! A run of lines becomes a C4 quintic B-spline within the tolerance: the one of least energy in the tolerance tube, with
-//! certified distances both ways. The method is our own.
+//! Fits a C4 quintic B-spline to a run of lines: the curve of least energy in the tolerance tube, with certified distances both
+//! ways. The method is our own.
 //!
 //! | file | what it computes |
 //! |---|---|
-//! | `curve` | the curve as pieces, and what each of them follows |
+//! | `curve` | the curve as pieces, and the chords that each piece follows |
 //! | `polyline` | what the curve follows: vertices, stations, directions, tolerances |
 //! | `bends` | the weights that pull the curve to vertices, so that bends keep their size |
 //! | `pace` | the energy of the curve at the speed of a motion |
-//! | `size` | the greatest length of intervals along the polyline, and the knots |
-//! | `spline`, `bezier` | the curve and forms of its energy; its pieces and bounds on them |
+//! | `size` | the greatest length of an interval at each place of the polyline, and the knots |
+//! | `spline`, `bezier` | the spline, its basis and derivatives; its Bézier pieces and their bounds |
 //! | `rows` | the tolerance tube as linear rows |
 //! | `problem`, `band`, `interior_point` | the solution of the convex problem in a window |
-//! | `quads` | the rows of four intervals side by side in the vectors of the processor |
+//! | `quads` | the rows of four neighbouring intervals in SIMD vectors |
 //! | `windows` | all windows of a run in parallel, then the seams between them |
 //! | `certificate` | a proof of the distances both ways, and that the curve never stops |
 //! | `offsets` | on which side of the polyline the curve lies |
-//! | `refine` | halved intervals where the certificate fails |
+//! | `refine` | halves intervals where the certificate fails |
 //! | `corner` | a curve of its own for each corner, where refinement does not help |
 //!
-//! The parameter u of the curve is the length of the chords in mm, so that stations tell the block and the feed of a place.
-//! D is the number of axes that move, ε the tolerance. Time and memory are linear in the number of vertices.
+//! The parameter u of the curve is the length of the chords in mm, so that a station leads to the line of the program and its
+//! feed. D is the number of axes that move, ε the tolerance. Time and memory are linear in the number of vertices.
 
 mod band;
 mod bends;
@@ -52,23 +52,23 @@ use spline::DEGREE;
 use std::ops::Range;
 use windows::{Fit, FREE};
 
-/// The number of times that intervals are halved.
+/// Intervals are halved at most this many times.
 const REFINEMENTS: usize = 3;
-/// The number of times that a run is split where it cannot be fitted; after that all its corners are rounded one by one.
+/// A run that cannot be fitted is split at most this many times; after that all its corners are rounded one by one.
 const PARTINGS: usize = 3;
-/// A run whose vertices are this close to a line, in tolerances, becomes that line.
+/// A run whose vertices are all within this distance of a line, in tolerances, becomes that line.
 const STRAIGHT: f64 = 1e-3;
-/// What rounding of the control points of a quintic adds to its third derivative, in coordinates over its width cubed.
+/// The rounding error of the third derivative of a quintic, times its width cubed, in parts of the greatest coordinate.
 const ROUNDING: f64 = 240.0 * f64::EPSILON;
-/// What it may add on a part of an interval, times the square of the interval's width.
+/// The rounding error of the third derivative that a part of an interval may have, times the square of the interval's width.
 const KNOWN: f64 = 1e-3;
 
 /// How a run is fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothOptions<const D: usize> {
-    /// Chords longer than this, in mm, are straight in the middle.
+    /// Chords longer than this, in mm, become straight in their middle.
     pub long: f64,
-    /// Least and greatest position of each axis. Where no curve stays inside, corners are rounded one by one.
+    /// Least and greatest position of each axis. Where no curve stays between them, corners are rounded one by one.
     pub bounds: [[f64; 2]; D],
 }
 
@@ -82,7 +82,7 @@ instances! {
 
 /// The curve along a polyline of one chord or more. It is cut into pieces near the vertices for which `cut` is true.
 ///
-/// A polyline must end at vertices that turn back: no curve passes them without a stop.
+/// The polyline must be split beforehand where it turns back: no curve passes such a vertex without a stop.
 pub(crate) fn smooth_fit<const D: usize>(
     line: &Polyline<D>,
     cut: &[bool],
@@ -90,7 +90,7 @@ pub(crate) fn smooth_fit<const D: usize>(
     watch: Watch,
 ) -> Smooth<D> {
     let mut out = Smooth::default();
-    // A length that is not a number cannot be fitted.
+    // A polyline whose length is infinite or NaN cannot be fitted.
     let partings = if line.length().is_finite() { PARTINGS } else { 0 };
     Run { line, cut, options, watch: watch.each(line.chords()) }.fit(0..line.chords(), partings, &mut out);
     out
@@ -105,7 +105,8 @@ struct Run<'a, const D: usize> {
 }
 
 impl<const D: usize> Run<'_, D> {
-    /// Appends the curve along some chords.
+    /// Appends the curve along some chords. Where the fit fails, corners are rounded one by one, and the chords between these
+    /// places are fitted again, up to `partings` times.
     fn fit(&self, chords: Range<usize>, partings: usize, out: &mut Smooth<D>) {
         if chords.is_empty() {
             return;
@@ -132,10 +133,10 @@ impl<const D: usize> Run<'_, D> {
         self.fit(next..chords.end, partings - 1, out);
     }
 
-    /// The fit of a part, refined until its certificate holds, at most REFINEMENTS times.
+    /// The fit of a part, its Bézier pieces and its certificate; refined until that holds, at most REFINEMENTS times.
     fn refined<'b>(&self, part: &'b Polyline<D>) -> (Fit<'b, D>, Vec<bezier::Control<D>>, Certificate) {
         let long = self.options.long;
-        // The number of refinements is not known, so each one counts as half of the work that is left.
+        // How many refinements follow is unknown, so each one counts as half of the remaining work.
         let mut watch = self.watch.part(0.5 * part.chords() as f64);
         let mut fit = Fit::new(part, size::knots(part, long), long);
         let all = 0..fit.spline.intervals();
@@ -162,8 +163,8 @@ impl<const D: usize> Run<'_, D> {
         }
     }
 
-    /// The greatest distance of the vertices from the line between the ends, if that is below STRAIGHT tolerances and no
-    /// chord turns back.
+    /// The greatest distance in mm of the vertices from the line between the ends; None if it is above STRAIGHT tolerances at a
+    /// vertex, or if a chord turns back.
     fn straight(&self, chords: &Range<usize>) -> Option<f64> {
         let line = self.line;
         let (start, end) = (line.vertex[chords.start], line.vertex[chords.end]);
@@ -185,7 +186,7 @@ impl<const D: usize> Run<'_, D> {
         Some(worst)
     }
 
-    /// Appends a line, cut near the vertices of the run.
+    /// Appends a line, cut near the vertices for which `cut` is true.
     fn append_line(&self, chords: &Range<usize>, deviation: f64, out: &mut Smooth<D>) {
         let (start, end) = (self.line.vertex[chords.start], self.line.vertex[chords.end]);
         out.splines += 1;
@@ -212,14 +213,15 @@ impl<const D: usize> Run<'_, D> {
         out.after_stop(|out| append_corners(self.line, chords.start, chords.end, out));
         out.splines += chords.len();
         out.polynomials += out.covered.len() - before;
-        // The curve of a corner lies inside it, between its legs.
+        // The curve of a corner lies on its inner side, between its legs.
         for covered in &out.covered[before..] {
             out.offsets.offer(-covered.deviation);
         }
         out.corners.push(chords);
     }
 
-    /// Appends the pieces of a spline, cut at the foot points of vertices; pieces on one straight chord become one line.
+    /// Appends the pieces of a spline, cut at the foot points of the vertices to cut at; neighbouring pieces that lie exactly on
+    /// one long chord become one line.
     fn append_spline(
         &self,
         chords: &Range<usize>,
@@ -231,13 +233,13 @@ impl<const D: usize> Run<'_, D> {
         let knots = &fit.spline.knots;
         let Certificate { foot, deviation, .. } = certificate;
         out.splines += 1;
-        // The chord on which an interval lies exactly.
+        // The long chord on which interval j lies exactly.
         let lies = |j: usize| {
             let pins = &fit.pin[j..=j + DEGREE];
             (pins[0] != FREE && pins.iter().all(|&pin| pin == pins[0])).then_some(pins[0] as usize)
         };
-        // The chord at the end of what is appended, and the first that no piece follows yet. Every chord is followed by a
-        // piece, also one that has a single foot point for all its places.
+        // `chord` contains the end of what is appended; `next` is the first chord that no piece follows yet. Every chord gets a
+        // piece that follows it, also a chord whose two foot points coincide.
         let last = chords.len() - 1;
         let (mut chord, mut next) = (0, 0);
         let mut push = |control: &[[f64; D]], width: f64, [first, end]: [usize; 2], j: usize| {
@@ -282,13 +284,13 @@ impl<const D: usize> Run<'_, D> {
     }
 }
 
-/// The least width of parts of an interval: the rounding of the control points of a shorter one would add to the jerk.
+/// The least width of a part of an interval: the rounding of the control points of a shorter part would spoil its jerk.
 fn sliver<const D: usize>(control: &bezier::Control<D>, width: f64) -> f64 {
     let coordinate = control.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     width * (ROUNDING * coordinate / (KNOWN * width)).cbrt()
 }
 
-/// The chords around the intervals that fail their certificate, with one interval more on each side.
+/// The chords along the intervals that fail their certificate, and along one more interval on each side.
 fn zones<const D: usize>(line: &Polyline<D>, knots: &[f64], certificate: &Certificate) -> Vec<Range<usize>> {
     let last = knots.len() - 1;
     let mut zones: Vec<Range<usize>> = Vec::new();

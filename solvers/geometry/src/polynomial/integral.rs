@@ -1,20 +1,21 @@
-//! The integral of a quotient p/w² of Bernstein forms, as m/w.
+//! The integral of a quotient p/w² of Bernstein forms, as m/w, by linear least squares.
 //!
-//! m' w − m w' = p gives one equation for each of the 2 d − 1 coefficients of p, with d unknowns. If they are solved one
-//! after the other, errors grow tenfold or more at each, and no digits are left at degree 9. The least squares of all
-//! equations lose none. With m_i = q_i w_i equation r is
+//! m' w − m w' = p gives one equation for each of the 2 d − 1 coefficients of p, with d unknowns. If d of them are solved one
+//! after the other, errors grow tenfold or more at each step, and no digits are left at degree 9. The least-squares solution of
+//! all equations loses none. With m_i = q_i w_i equation r is
 //!
 //! ```text
 //! Σ (b − a) w_a w_b (q_b − q_a) = p_r,   a < b, a + b = r + 1,
 //! ```
 //!
-//! Divided by the sum of its factors it is a mean of differences. The rounding of p_r is relative to that sum too, so each
-//! equation has the weight that its accuracy deserves.
+//! Divided by the sum of the factors (b − a) w_a w_b its left side is a weighted mean of differences. The rounding of p_r is
+//! relative to that sum too, so each equation has the weight that suits its accuracy.
 
 /// Rows and columns of the greatest system: degree 9.
 const ROWS: usize = 17;
 const COLUMNS: usize = 9;
-/// The first unknowns are solved from their own equations exactly, so that small values near 0 keep their digits.
+/// The unknowns of the leading zeros of p, and this many more, are solved exactly from their own equations, so that small values
+/// near 0 keep their digits.
 const EXACT: usize = 2;
 
 /// Writes the scaled coefficients of m, m(0) = 0, with (m/w)' = p/w²; `p` has 2 d − 1 coefficients, `w` d + 1.
@@ -60,7 +61,7 @@ pub fn over_weight(p: &[f64], w: &[f64], m: &mut [f64]) {
     }
 }
 
-/// The least-squares solution by Householder's reflections.
+/// The least-squares solution by Householder reflections.
 fn least_squares(
     columns: &mut [[f64; ROWS]],
     right: &mut [f64; ROWS],
@@ -83,7 +84,7 @@ fn least_squares(
                 }
             }
         }
-        // The diagonal of the triangle; the reflection is done with.
+        // The diagonal of the triangle; the reflection vector is not needed any more.
         own[top] = diagonal;
     }
     for n in (0..count).rev() {
@@ -104,7 +105,7 @@ mod tests {
             weights in prop::collection::vec(-4.6..4.6_f64, 10),
             degree in 2..10_usize,
         ) {
-            // Weights over four decades on a way that goes to and fro.
+            // Weights over four decades; the path goes back and forth.
             type Any = Polynomial<20>;
             let weights: Vec<f64> = weights[..=degree].iter().map(|w| w.exp()).collect();
             let weight = Any::from_bernstein(weights.iter().map(|w| w / weights[0]));

@@ -1,9 +1,9 @@
-//! A polynomial on a part of [0, 1], as a polynomial on [0, 1].
+//! A polynomial on a part of [0, 1], transformed to [0, 1].
 
 use super::{Polynomial, BINOMIALS};
 
 impl<const C: usize> Polynomial<C> {
-    /// p on [0, t] and on [t, 1], each on [0, 1] again (de Casteljau): both agree at t to the last bit.
+    /// p on [0, t] and on [t, 1], each transformed to [0, 1] (de Casteljau); both agree at t to the last bit.
     #[inline(always)]
     pub fn split(&self, t: f64) -> (Self, Self) {
         let n = self.n;
@@ -27,10 +27,10 @@ impl<const C: usize> Polynomial<C> {
         (Self { n, c: left }, right)
     }
 
-    /// p on [0, t], on [0, 1] again.
+    /// p on [0, t], transformed to [0, 1].
     #[inline(always)]
     pub fn left(&self, t: f64) -> Self {
-        // As a polynomial of z = (1 − x)/x: scaled by t, shifted by 1 − t.
+        // As a polynomial of z = (1 − x)/x: z is scaled by t and shifted by 1 − t.
         let mut c = self.c;
         let used = &mut c[..=self.n];
         let (mut power, rest) = (1.0, 1.0 - t);
@@ -46,7 +46,7 @@ impl<const C: usize> Polynomial<C> {
         Self { n: self.n, c }
     }
 
-    /// p on [t, 1], on [0, 1] again.
+    /// p on [t, 1], transformed to [0, 1].
     #[inline(always)]
     pub fn right(&self, t: f64) -> Self {
         let mut c = self.c;
@@ -54,7 +54,7 @@ impl<const C: usize> Polynomial<C> {
             c[0] = (1.0 - t) * c[0] + t * c[1];
             return Self { n: 1, c };
         }
-        // As a polynomial of z = x/(1 − x): scaled by 1 − t, shifted by t.
+        // As a polynomial of z = x/(1 − x): z is scaled by 1 − t and shifted by t.
         let used = &mut c[..=self.n];
         let (mut power, rest) = (1.0, 1.0 - t);
         for c in used[..self.n].iter_mut().rev() {
@@ -69,7 +69,7 @@ impl<const C: usize> Polynomial<C> {
         Self { n: self.n, c }
     }
 
-    /// p on [a, b], on [0, 1] again.
+    /// p on [a, b], transformed to [0, 1].
     #[inline(always)]
     pub fn part(&self, a: f64, b: f64) -> Self {
         if self.n == 0 || (a == 0.0 && b == 1.0) {

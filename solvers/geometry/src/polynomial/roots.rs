@@ -1,4 +1,4 @@
-//! The changes of sign of a polynomial in [0, 1], by Descartes' rule on Bernstein coefficients, halving, and Newton's method.
+//! The sign changes of a polynomial in [0, 1], by Descartes' rule on Bernstein coefficients, bisection and Newton's method.
 
 use super::Polynomial;
 use crate::tolerance::LAST_STEP;
@@ -7,7 +7,7 @@ use crate::tolerance::LAST_STEP;
 const MAX_DEPTH: u32 = 52;
 
 impl<const C: usize> Polynomial<C> {
-    /// First x in [0, 1] after which the polynomial is negative; 0 if it starts negative.
+    /// The first x in [0, 1] after which the polynomial is negative; 0 if it starts negative, None if it is nowhere negative.
     #[inline(always)]
     pub fn first_root(&self) -> Option<f64> {
         let (before, after) =
@@ -31,7 +31,7 @@ impl<const C: usize> Polynomial<C> {
 
     /// The root of a polynomial with one change of sign, from positive to negative: Newton's method inside a bracket.
     ///
-    /// With z = x/(1 − x) the polynomial is Σ c_i z^i over (1 + z)^n. A root beyond ½ is searched from the other end.
+    /// With z = x/(1 − x) the polynomial is Σ c_i z^i over (1 + z)^n. If the root is beyond ½, it is searched from the other end.
     fn single_root(&self) -> f64 {
         // Without the roots at 0 and at 1.
         let c = self.coefficients();
@@ -49,15 +49,15 @@ impl<const C: usize> Polynomial<C> {
     }
 }
 
-/// A polynomial on an interval of [0, 1] that comes from halving.
+/// A polynomial on an interval of [0, 1] that results from bisection.
 struct Interval<const C: usize> {
     p: Polynomial<C>,
-    /// The sums of the absolute values of the terms of which the coefficients are sums.
+    /// For each coefficient, the sum of the absolute values of the terms that were added up.
     size: Polynomial<C>,
-    /// A coefficient below this fraction of its terms may be rounding, and has no sign.
+    /// A coefficient below this fraction of its terms may be rounding, and counts as having no sign.
     ///
-    /// Leaving out signs never adds changes, so at any depth at most n/2 intervals have several changes, as without
-    /// rounding. If signs of rounding counted, such intervals would multiply with the depth.
+    /// Leaving out signs never adds sign changes, so at any depth at most n/2 intervals have several changes, as without
+    /// rounding. If the signs of rounding errors counted, such intervals would multiply with the depth.
     noise: f64,
     from: f64,
     to: f64,
@@ -74,7 +74,7 @@ impl<const C: usize> Interval<C> {
         let (left, right) = self.p.split(0.5);
         let (left_size, right_size) = self.size.split(0.5);
         let middle = 0.5 * (self.from + self.to);
-        // n sums and two changes between scaled and plain coefficients.
+        // n sums, and two conversions between scaled and plain coefficients.
         let noise = self.noise + 0.5 * (self.p.n + 3) as f64 * f64::EPSILON;
         let depth = self.depth + 1;
         (
@@ -94,7 +94,7 @@ impl<const C: usize> Interval<C> {
         }
     }
 
-    /// The first and the last sign, 0 for none, and how often it changes.
+    /// The first and the last sign (0 if there is none) and the number of sign changes.
     #[inline(always)]
     fn signs(&self) -> (f64, f64, usize) {
         let (mut first, mut last, mut changes) = (0.0, 0.0, 0);
@@ -132,7 +132,7 @@ impl<const C: usize> Interval<C> {
         }
     }
 
-    /// Calls `found` with each change of sign; `before` is the last sign before the interval, and then that of its end.
+    /// Calls `found` with each sign change. `before` is the last sign before the interval; it is set to the last sign in it.
     fn sign_changes(&self, before: &mut f64, found: &mut impl FnMut(f64)) {
         let (first, last, changes) = self.signs();
         if changes > 1 && self.depth < MAX_DEPTH {
@@ -151,12 +151,12 @@ impl<const C: usize> Interval<C> {
     }
 }
 
-/// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once, to that of its value at 1.
+/// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once; `at_one` is its value at z = 1.
 #[inline(always)]
 fn root_below_one(c: impl Fn(usize) -> f64, n: usize, at_one: f64) -> f64 {
     let falls = at_one < 0.0;
     let (mut low, mut high) = (0.0, 1.0);
-    // Start: the root of the parabola with the same values at both ends and the same slope at 0.
+    // Start: the root of the parabola with the same values at both ends and the same slope at z = 0.
     let (half, bend) = (0.5 * c(1), at_one - c(0) - c(1));
     let q = -(half + (half * half - bend * c(0)).max(0.0).sqrt().copysign(half));
     let mut z = [c(0) / q, q / bend].into_iter().find(|z| (0.0..1.0).contains(z)).unwrap_or(0.5);

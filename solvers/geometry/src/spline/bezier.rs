@@ -1,8 +1,8 @@
-//! Value and derivatives of a Bézier piece to the third, its parts, the same piece of a higher degree or reversed; all by
-//! corner cutting.
+//! The value and the first three derivatives of a Bézier piece, its parts, and the same piece of higher degree or reversed; all
+//! by corner cutting.
 //!
-//! Control points are first taken relative to the nearer end of the piece. So a small piece far from the origin loses no
-//! digits of its derivatives, and both ends are exact.
+//! Control points are first taken relative to the nearer end of the piece. So the derivatives of a small piece far from the
+//! origin keep their digits, and both ends are exact.
 
 use fearless_simd::{dispatch, Level, Simd};
 
@@ -29,7 +29,7 @@ macro_rules! with_count {
     };
 }
 
-/// C, C', C'' and C''' at u, by u.
+/// C, C', C'' and C''' with respect to u, at u.
 #[inline]
 pub fn derivatives<const M: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
     with_count!(piece.control.len(), N, derivatives_of::<M, N>(piece, u))
@@ -70,10 +70,10 @@ fn derivatives_of<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [
     c
 }
 
-/// De Casteljau's triangle: its last four rows hold the value and the derivatives by t.
+/// De Casteljau's triangle, whose last four rows give the value and the derivatives with respect to t.
 #[inline(always)]
 fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f64; M]; 4] {
-    // This form of the mean takes no differences, so weights of different magnitudes keep their digits.
+    // This form of the mean has no differences, so that weights of different magnitudes keep their digits.
     let (d, s) = ((N - 1) as f64, 1.0 - t);
     let cut = |b: &mut [[f64; M]; N], left: usize| {
         for i in 0..left {
@@ -107,7 +107,7 @@ fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f
     out
 }
 
-/// C', C'' and C''' by u at four places: the same numbers as by `derivatives`.
+/// C', C'' and C''' with respect to u at four places: the same numbers as from `derivatives`.
 #[inline]
 pub fn derivatives_at_four<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[Lanes; 3]; M] {
     if piece.is_rational() {
@@ -120,7 +120,7 @@ pub fn derivatives_at_four<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[L
     }
 }
 
-/// Derivatives of each axis at four places, compiled in this crate for any number of axes.
+/// Derivatives of each axis at four places; not generic, so that it is compiled once, for any number of axes.
 fn axes_at_four(control: &[f64], t: [f64; 4], scale: f64, c: &mut [[Lanes; 3]]) {
     let axes = c.len();
     with_count!(control.len() / axes, N, {
@@ -132,7 +132,7 @@ fn axes_at_four(control: &[f64], t: [f64; 4], scale: f64, c: &mut [[Lanes; 3]]) 
     });
 }
 
-/// The numbers of axis k of so many.
+/// The coordinates of N control points on axis k of `axes`.
 #[inline(always)]
 fn axis<const N: usize>(control: &[f64], axes: usize, k: usize) -> [f64; N] {
     let mut numbers = [0.0; N];
@@ -142,7 +142,7 @@ fn axis<const N: usize>(control: &[f64], axes: usize, k: usize) -> [f64; N] {
     numbers
 }
 
-/// `triangle` for one axis at four places, and by u.
+/// The derivatives of `triangle` for one axis at four places, with respect to u.
 #[inline(always)]
 fn triangle_at_four<S: Simd, const N: usize>(
     simd: S,
@@ -176,7 +176,7 @@ fn triangle_at_four<S: Simd, const N: usize>(
     out
 }
 
-/// A step of de Casteljau's algorithm at t = 1 − s: one number fewer.
+/// One step of de Casteljau's algorithm at t = 1 − s; it leaves one number fewer.
 #[inline(always)]
 fn cut<S: Simd>(b: &mut [Register<S>], s: Register<S>, t: Register<S>) {
     for i in 0..b.len() - 1 {
@@ -184,7 +184,7 @@ fn cut<S: Simd>(b: &mut [Register<S>], s: Register<S>, t: Register<S>) {
     }
 }
 
-/// |C'|² by u, at four places.
+/// |C'|² with respect to u, at four places.
 #[inline]
 pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
     let scale = 1.0 / piece.width;
@@ -198,7 +198,7 @@ pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
     sum.map(|sum| sum * (scale * scale))
 }
 
-/// |C'|² by t of a polynomial piece, compiled in this crate for any number of axes.
+/// |C'|² with respect to t of a polynomial piece; not generic, so that it is compiled once, for any number of axes.
 fn axes_speeds_sq(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
     with_count!(control.len() / axes, N, {
         dispatch!(Level::new(), simd => {
@@ -218,7 +218,7 @@ fn axes_speeds_sq(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
     })
 }
 
-/// The same of a rational piece.
+/// |C'|² with respect to t of a rational piece.
 fn rational_speeds_sq(control: &[f64], axes: usize, weights: &[f64], t: [f64; 4]) -> [f64; 4] {
     with_count!(weights.len(), N, {
         let of = |numbers: [f64; N]| {
@@ -243,7 +243,7 @@ fn rational_speeds_sq(control: &[f64], axes: usize, weights: &[f64], t: [f64; 4]
     })
 }
 
-/// Value and derivative by t of a polynomial in Bernstein form, at four places.
+/// Value and derivative with respect to t of a polynomial in Bernstein form, at four places.
 #[inline(always)]
 fn value_and_slope<S: Simd, const N: usize>(mut b: [Register<S>; N], t: Register<S>) -> [Register<S>; 2] {
     let s = Register::all(t.simd(), 1.0) - t;
@@ -317,7 +317,7 @@ pub fn elevate<const M: usize>(piece: &Piece<M>, by: usize, curve: &mut Composit
     let mut polygon = Polygon::new(piece);
     for _ in 0..by {
         let n = polygon.count;
-        // The new point i is the mean of the old i − 1 and i; the last stays and moves up by one.
+        // The new point i is a mean of the old points i − 1 and i; the last one keeps its value at the next index.
         let (first, weight) = (polygon.points[0], polygon.weights[0]);
         let (last, last_weight) = (polygon.points[n - 1], polygon.weights[n - 1]);
         polygon.cut(n - 1, |i| (n - 1 - i) as f64 / n as f64);

@@ -1,9 +1,8 @@
-//! The cusps of a piece, where C' is 0, from Bernstein coefficients; all are found, for nothing is sampled.
+//! Finds all cusps of a piece, where C' is 0, by bisection with bounds from Bernstein coefficients; nothing is sampled.
 //!
-//! The hodograph is C', or on rational pieces its numerator, which has the same zeros. It is halved again and again. An
-//! interval has no cusp if each Bernstein coefficient of the hodograph's square is above the threshold, for then the square
-//! is above it too. The hodograph is halved and not its square, so that |C'| is known to ε of its greatest value and not
-//! to √ε.
+//! The hodograph is C', or on rational pieces its numerator, which has the same zeros. It is halved repeatedly. An interval has
+//! no cusp if all Bernstein coefficients of the hodograph's square are above the threshold, because then the square is above it
+//! too. The hodograph itself is halved, not its square, so that |C'| is known to ε of its greatest value and not to √ε.
 
 use super::rational::Hodograph;
 use super::{Piece, MAX_HODOGRAPH, MAX_SQUARE};
@@ -11,11 +10,12 @@ use crate::polynomial::binomial;
 use crate::quadratic::dot;
 use crate::tolerance::SQUARE_ROUNDING;
 
-/// Greatest number of halvings: intervals are then as short as the spacing of numbers near 1.
+/// The greatest number of halvings: intervals are then as short as the spacing of numbers near 1.
 const MAX_DEPTH: u32 = 52;
 
-/// The cusps of a piece by t = u / width in [0, 1]: places where |C'| is at most a part `tolerance` of its greatest value on the
-/// piece, of neighbours the one with the least |C'|. Ends count; a piece of length zero has one, at its start.
+/// The cusps of a piece as t = u / width in [0, 1]: places where |C'| is at most `tolerance` times its greatest value on the
+/// piece; in an interval of such places the one with the least |C'|. Ends count; a piece of length zero has one cusp, at its
+/// start.
 pub fn piece_cusps<const M: usize>(piece: &Piece<M>, tolerance: f64) -> Vec<f64> {
     let hodograph = Hodograph::new(piece);
     let h = hodograph.coefficients();
@@ -35,7 +35,7 @@ pub fn rests_at_ends<const M: usize>(piece: &Piece<M>) -> [bool; 2] {
     [control[0] == control[1], control[last - 1] == control[last]]
 }
 
-/// Adds to `slow` the intervals of [lo, hi] where |h|² may be at most `threshold`.
+/// Appends to `slow` the parts of [lo, hi] where |h|² may be at most `threshold`.
 fn search<const M: usize>(
     h: &[[f64; M]],
     lo: f64,
@@ -81,8 +81,8 @@ fn search<const M: usize>(
     search(&right[..=n], middle, hi, depth + 1, threshold, slow);
 }
 
-/// The t of the least |h| in [lo, hi], which is so short that h is nearly linear: the best of its ends, its middle and two
-/// Gauss–Newton steps from there.
+/// The t of the least |h| in [lo, hi], an interval so short that h is nearly linear: the best of its ends, its middle and two
+/// Gauss–Newton steps from the middle.
 fn least<const M: usize>(h: &[[f64; M]], [lo, hi]: [f64; 2]) -> f64 {
     let mut places = vec![lo, hi, 0.5 * (lo + hi)];
     for _ in 0..2 {

@@ -1,7 +1,7 @@
-//! The Bézier pieces of a B-spline or NURBS, one for each span, in linear time.
+//! The Bézier pieces of a B-spline or NURBS, one per span, in linear time.
 //!
-//! With the blossom f of a span [a, b] the Bézier points are f(aᵈ⁻ʳ, bʳ). Two triangles of corner cutting make them from the
-//! d + 1 control points of the span: de Boor's triangle at a gives f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}), and the second one replaces
+//! With the blossom f of a span [a, b] the Bézier points are f(aᵈ⁻ʳ, bʳ). Two triangles of corner cutting compute them from the
+//! d + 1 control points of the span: de Boor's triangle at a gives f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}), and the second triangle replaces
 //! the later knots by b.
 
 use super::knots::Spline;
@@ -10,8 +10,8 @@ use super::{CompositeCurve, MAX_DEGREE};
 use crate::quadratic::{norm, sub};
 use crate::tolerance::COINCIDENT;
 
-/// The pieces of a spline, one for each span that is not empty; the width is that of the span. A curve with a gap is
-/// refused by a sentence.
+/// The pieces of a spline, one for each span that is not empty, with the width of the span. If the curve has a gap, the error is
+/// a sentence about it.
 pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, String> {
     let (d, t) = (spline.degree, &spline.knots);
     let mut curve = CompositeCurve::default();
@@ -43,7 +43,7 @@ pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, 
                     d + 1
                 ));
             }
-            // Both spans give the point where they meet, up to rounding: the first one holds.
+            // Both spans give the point where they meet, up to rounding: the point of the first one is used.
             points[0] = last;
         }
         curve.push(&points[..=d], weights, t[k + 1] - t[k]);
@@ -56,13 +56,13 @@ pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, 
 fn bezier_points<const M: usize>(knots: &[f64], points: &mut [[f64; M]], weights: &mut [f64]) {
     let d = points.len() - 1;
     let (a, b) = (knots[d - 1], knots[d]);
-    // Each level has one point less and leaves the last one where it is: f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}) at j.
+    // Each level has one point fewer and leaves the last one unchanged: f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}) at j.
     for r in 1..=d {
         cut_corners(points, weights, d + 1 - r, |p| {
             (a - knots[p + r - 1]) / (knots[p + d] - knots[p + r - 1])
         });
     }
-    // From the other end, so that each level leaves the first one where it is: f(aᵈ⁻ʳ, bʳ).
+    // From the other end, so that each level leaves the first one unchanged: f(aᵈ⁻ʳ, bʳ).
     points.reverse();
     weights.reverse();
     for r in 1..=d {
@@ -81,7 +81,7 @@ mod tests {
     use crate::spline::bezier::point;
     use proptest::prelude::*;
 
-    /// De Boor's recurrence by the definition of the basis functions.
+    /// De Boor's recurrence, directly from the definition of the basis functions.
     fn basis(t: &[f64], i: usize, d: usize, x: f64) -> f64 {
         if d == 0 {
             return f64::from(u8::from(t[i] <= x && x < t[i + 1]));

@@ -1,14 +1,14 @@
-//! A B-spline or NURBS curve from control points, knots and weights as users give them: checked, and unrolled
-//! if it is periodic. What is wrong is one sentence with place, value, limit and remedy.
+//! Checks a B-spline or NURBS curve given by users as control points, knots and weights, and unrolls it if it is periodic. Each
+//! error is one sentence with place, value, limit and remedy.
 //!
 //! n control points of degree d have knots t₀ … t_{n+d}; the curve is on [t_d, t_n]. Knots may be clamped or not.
 
 use super::MAX_DEGREE;
 use crate::tolerance::KNOT_SPAN;
 
-/// Greatest coordinate in mm, far beyond any machine: the square of a hodograph must not overflow.
+/// The greatest coordinate in mm, far beyond any machine: the square of a hodograph must not overflow.
 const MAX_COORDINATE: f64 = 1e60;
-/// Greatest and least weight: fourth powers must not overflow.
+/// The greatest and least weight: fourth powers must not overflow.
 const MAX_WEIGHT: f64 = 1e30;
 const MIN_WEIGHT: f64 = 1e-30;
 
@@ -45,8 +45,8 @@ impl<const M: usize> Spline<M> {
         Ok(Self { degree, knots, control, weights })
     }
 
-    /// A closed curve by n control points and the n + 1 knots of one period. The first span has the first d + 1 points, each
-    /// later span those that begin one later, cyclically.
+    /// A closed curve from n control points and the n + 1 knots of one period. The first span uses the first d + 1 points; each
+    /// later span begins one point later, cyclically.
     pub fn periodic(
         degree: usize,
         knots: Vec<f64>,
@@ -72,7 +72,7 @@ impl<const M: usize> Spline<M> {
                 let place = i as isize - degree as isize;
                 let turn = place.div_euclid(n as isize);
                 let within = knots[place.rem_euclid(n as isize) as usize];
-                // The end of the period is the given number exactly.
+                // The end of the period is exactly the given number.
                 if place == n as isize {
                     knots[n]
                 } else {
@@ -99,7 +99,7 @@ fn check_degree(degree: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Degree, coordinates and weights of control points.
+/// Checks the degree, the coordinates and the weights of control points.
 pub fn check_points<const M: usize>(
     degree: usize,
     control: &[[f64; M]],

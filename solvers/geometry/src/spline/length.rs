@@ -1,7 +1,7 @@
-//! The length of a curve of any degree, and the place at a given length, from one table (`arc_length`) for each piece.
+//! The length of a curve of any degree, and the place at a given length, from one table (`arc_length`) per piece.
 //!
-//! Panels are halved towards cusps, and towards places that are nearly cusps. The error bound of quadratic pieces is in
-//! closed form (`QuadraticSpeed`); that of others comes from `speed`.
+//! Panels are halved towards cusps and near-cusps. The error bound of quadratic pieces is in closed form (`QuadraticSpeed`); that
+//! of other pieces comes from `speed`.
 
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ instances! {
 #[derive(Clone, Copy, Debug)]
 enum PieceSpeed {
     Quadratic(QuadraticSpeed),
-    /// The ranges of its coefficients in `h` and in `omega`.
+    /// The ranges of its coefficients in `h` and in `omega` of `CurveLength`.
     Curve([usize; 2], [usize; 2]),
 }
 
@@ -39,9 +39,9 @@ pub struct CurveLength<const M: usize> {
     omega: Vec<f64>,
     width: Vec<f64>,
     nodes: Vec<Node>,
-    /// First node of each piece, and the end.
+    /// The first node of each piece; the last entry is the number of nodes.
     tables: Vec<usize>,
-    /// Length up to the start of each piece, and the whole; in mm.
+    /// Length up to the start of each piece, then the total length; in mm.
     starts: Vec<f64>,
     error: f64,
 }
@@ -65,7 +65,7 @@ macro_rules! on_table {
 }
 
 impl<const M: usize> CurveLength<M> {
-    /// The tables of all pieces, at least one, each with an error of `accuracy` times its length.
+    /// The tables of all pieces, of which there must be one at least; the error of each is `accuracy` times its length.
     pub fn new(curve: &CompositeCurve<M>, accuracy: f64, watch: Watch) -> Self {
         let count = curve.len();
         let mut lengths = Self {
@@ -108,7 +108,7 @@ impl<const M: usize> CurveLength<M> {
                 }
             })
             .collect();
-        // Neumaier's sum: the lengths of many pieces are summed without loss.
+        // Neumaier's sum: the rounding errors of many additions are carried along.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for (nodes, bound) in tables {
             let length = nodes[nodes.len() - 1].sum;
@@ -132,18 +132,18 @@ impl<const M: usize> CurveLength<M> {
         self.starts[self.starts.len() - 1]
     }
 
-    /// The bound of the error of each length on the curve in mm: proven for the quadrature, with eight roundings for its
-    /// evaluation.
+    /// The bound of the error of each length on the curve, in mm: it is proven for the quadrature, and includes eight roundings
+    /// for the evaluation.
     pub fn error(&self) -> f64 {
         self.error
     }
 
-    /// Length from the start of the curve to parameter u of a piece in mm.
+    /// Length from the start of the curve to parameter u of a piece, in mm.
     pub fn length(&self, piece: usize, u: f64) -> f64 {
         self.starts[piece] + on_table!(self, piece, table, table.integral(u))
     }
 
-    /// The piece and the parameter at a length, within `tolerance` mm; a length beyond either end gives that end.
+    /// The piece and the parameter at a length, within `tolerance` mm; for a length beyond an end that end.
     pub fn locate(&self, length: f64, tolerance: f64) -> (usize, f64) {
         let last = self.width.len() - 1;
         let piece = self.starts[1..=last].partition_point(|&start| start <= length);
@@ -160,7 +160,7 @@ impl<const M: usize> CurveLength<M> {
         )
     }
 
-    /// Lengths up to many places, in parallel.
+    /// Lengths up to many places, in mm, computed in parallel.
     pub fn lengths(&self, pieces: &[u32], u: &[f64]) -> Vec<f64> {
         pieces
             .par_iter()
@@ -170,13 +170,13 @@ impl<const M: usize> CurveLength<M> {
             .collect()
     }
 
-    /// The places at many lengths, in parallel.
+    /// The places at many lengths, computed in parallel.
     pub fn locate_all(&self, lengths: &[f64], tolerance: f64) -> Vec<(usize, f64)> {
         lengths.par_iter().with_min_len(1024).map(|&length| self.locate(length, tolerance)).collect()
     }
 }
 
-/// The table of one piece and the bound of its error. Each cusp of the piece has a part of the table for itself.
+/// The table of one piece and the bound of its error. Each cusp of the piece has its own part of the table.
 fn table<const M: usize>(speed: Speed<M>, piece: &Piece<M>, accuracy: f64) -> (Vec<Node>, f64) {
     let mut nodes: Vec<Node> = vec![];
     let width = piece.width;

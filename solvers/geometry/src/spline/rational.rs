@@ -1,14 +1,14 @@
-//! Weighted means of points, the numerator of the hodograph, and the quotient rule, for pieces C = M/ω with
+//! Weighted means of points, the numerator of the hodograph, and the quotient rule, for rational pieces C = M/ω with
 //! M = Σ wᵢ Pᵢ Bᵢ, ω = Σ wᵢ Bᵢ.
 //!
-//! Weights are positive, so the factors of each mean are positive. Differences of points are taken before products, so
-//! errors depend on the extent of a piece and not on its coordinates.
+//! Weights are positive, so the factors of each mean are positive. Differences of points are taken before products, so errors are
+//! relative to the extent of a piece and not to its coordinates.
 
 use super::{Piece, MAX_HODOGRAPH};
 use crate::polynomial::binomial;
 use crate::quadratic::{lerp, sub};
 
-/// The point at `alpha` between two points, exactly `b` at 1.
+/// The point at fraction `alpha` between two points, exactly `b` at 1.
 #[inline(always)]
 fn mean<const M: usize>(a: &[f64; M], b: &[f64; M], alpha: f64) -> [f64; M] {
     if alpha == 1.0 {
@@ -18,7 +18,7 @@ fn mean<const M: usize>(a: &[f64; M], b: &[f64; M], alpha: f64) -> [f64; M] {
     }
 }
 
-/// Replaces each of the first `count` points by its mean with the next one at `alpha(i)`; empty weights are ones. This is
+/// Replaces each of the first `count` points by its mean with the next one at `alpha(i)`; empty weights stand for ones. This is
 /// one step of de Casteljau's and de Boor's algorithms, and of degree elevation.
 #[inline(always)]
 pub fn cut_corners<const M: usize>(
@@ -41,7 +41,7 @@ pub fn cut_corners<const M: usize>(
     }
 }
 
-/// Bernstein coefficients of C' on polynomial pieces and of C'ω² on rational ones, by t = u / width.
+/// Bernstein coefficients in t = u / width: of dC/dt on polynomial pieces, of dC/dt ω² on rational ones.
 #[derive(Clone, Copy, Debug)]
 pub struct Hodograph<const M: usize> {
     coefficients: [[f64; M]; MAX_HODOGRAPH],
@@ -79,7 +79,7 @@ impl<const M: usize> Hodograph<M> {
     }
 }
 
-/// The derivatives of M/ω from those of M and ω.
+/// The first three derivatives of M/ω from those of M and ω; index 0 is the value.
 #[inline(always)]
 pub fn quotient<const M: usize>(m: &[[f64; M]; 4], w: &[[f64; 1]; 4]) -> [[f64; M]; 4] {
     let inverse = 1.0 / w[0][0];
@@ -107,7 +107,7 @@ mod tests {
         assert_eq!(Hodograph::new(&piece).coefficients(), [[30.0, 10.0]]);
     }
 
-    /// How far the numerator over the denominator is from the derivative at t.
+    /// The distance of the numerator divided by the denominator from the derivative at t.
     fn error(control: &[[f64; 2]], weights: &[f64], t: f64) -> f64 {
         let piece = Piece { control, weights, width: 1.0 };
         let hodograph = Hodograph::new(&piece);

@@ -1,9 +1,9 @@
-//! The same curve as pieces whose C' is not 0 inside: straight pieces become lines cut where they turn back, curved pieces
-//! are cut in their cusps.
+//! Converts a curve into pieces whose C' is not 0 inside: straight pieces become lines that are cut where they turn back, curved
+//! pieces are cut in their cusps.
 //!
-//! Planners need C' ≠ 0 to compute a speed from a parameter. A straight piece of any degree, polynomial or rational, passes
-//! the same places as the lines of degree 1 between its turns. In the cusp of a curved piece the curvature is unbounded, and
-//! the tool rests: the piece and its run end there.
+//! Planners need C' ≠ 0 to compute a speed from a parameter. A straight piece of any degree, polynomial or rational, follows the
+//! same points as the lines of degree 1 between the places where it turns back. In the cusp of a curved piece the curvature is
+//! unbounded and the tool rests, so the piece and its run end there.
 
 mod cusp_ends;
 mod lines;
@@ -20,10 +20,10 @@ use super::{CompositeCurve, Piece};
 use crate::tolerance::ROUNDING;
 use crate::watch::Watch;
 
-/// The regular pieces of a curve, of each range of its pieces by itself.
+/// The regular pieces of a curve; each range of its pieces is converted separately.
 ///
-/// Pieces without length are left out. Neighbours on one line become one line, unless both are lines already. Parameter
-/// intervals stay; on lines C' is constant.
+/// Pieces without length are left out. Neighbours on one line become one line, unless both are lines already. The widths of
+/// parameter intervals stay the same; on lines C' is constant.
 pub fn regular<const M: usize>(
     given: &CompositeCurve<M>,
     ranges: &[Range<usize>],
@@ -69,8 +69,8 @@ pub fn regular<const M: usize>(
     out
 }
 
-/// Keeps pieces as they are if as a line they would meet a neighbour in a corner that is smooth now: they are so short that
-/// their directions are rounding.
+/// Keeps pieces curved if, as lines, they would meet a neighbour in a corner although they meet it smoothly now. Such pieces are
+/// so short that their directions are rounding.
 fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Form<M>)], rounding: f64) {
     let mut kept = false;
     while !std::mem::replace(&mut kept, true) {
@@ -135,7 +135,7 @@ mod tests {
             assert!((line.curve.control[i][0] - place(t)).abs() < 1e-15);
         }
         assert_eq!(line.curve.len(), 3);
-        // It stands still for a moment and goes on: t³.
+        // It stops for a moment and continues in the same direction: t³.
         assert_eq!(of(&[[0.0], [0.0], [0.0], [1.0]], &[]).curve.control, [[0.0], [1.0]]);
         assert_eq!(of(&[[-1.0], [1.0], [-1.0], [1.0]], &[]).curve.control, [[-1.0], [1.0]]);
     }
@@ -166,13 +166,13 @@ mod tests {
         assert_eq!(made.source, [[0, 2], [2, 3], [4, 4]]);
         assert_eq!((made.curve.control[0], made.curve.control[3]), ([0.1; 2], [0.5; 2]));
         assert!((made.curve.width.iter().sum::<f64>() - 4.000001).abs() < 1e-15);
-        // What is a line already stays one; each is one of its own where they belong to different moves.
+        // A line stays a line; lines that belong to different moves are not joined.
         assert_eq!(regular(&curve, &[0..1, 1..2, 2..5], Watch::default()).ranges, [0..1, 1..2, 2..5]);
     }
 
     #[test]
     fn a_turn_beside_the_end_of_a_piece_stays_a_turn() {
-        // To 1, beyond it by a rounding and back to it; then to 0 in two pieces.
+        // To 1, beyond it by a rounding error and back to 1; then to 0 in two pieces.
         let mut curve = CompositeCurve::default();
         curve.push(&[[0.0], [1.0 + 2e-15], [1.0]], &[], 1.0);
         curve.push(&[[1.0], [0.8], [0.6]], &[], 1.0);
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_turn_within_rounding_is_a_cusp_on_both_sides() {
-        // (s², 1e-10 s + s³) about t = 0.3: the way turns back within 1e-20.
+        // (s², 1e-10 s + s³) about t = 0.3: the path turns back within 1e-20.
         let blossom = |a: f64, b: f64, e: f64| {
             let [a, b, e] = [a, b, e].map(|x| x - 0.3);
             [(a * b + a * e + b * e) / 3.0, 1e-10 * (a + b + e) / 3.0 + a * b * e]
@@ -209,7 +209,7 @@ mod tests {
             .map(|[a, b, e]| blossom(a, b, e));
         let made = of(&control, &[]);
         assert_eq!(made.rests, [[false, true], [true, false]]);
-        // Where the way goes on, it is slow and no more: (s³ + 1e-10 s, s⁴).
+        // Where the path continues in its direction it is only slow there: (s³ + 1e-10 s, s⁴).
         let along = |t: f64| [(t - 0.3).powi(3) + 1e-10 * (t - 0.3), (t - 0.3).powi(4)];
         let rate = |t: f64| [3.0 * (t - 0.3).powi(2) + 1e-10, 4.0 * (t - 0.3).powi(3)];
         let control = {
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn a_short_arc_that_rounding_makes_straight_stays_smooth_for_its_neighbours() {
-        // Ten chords of a circle of 90 mm, of 1e-4 mm each, a metre away: each bows by less than its rounding.
+        // Ten chords of 1e-4 mm of a circle of 90 mm, a metre from the origin: each bulges by less than its rounding.
         let point = |angle: f64| [1000.0 + 90.0 * angle.cos(), 90.0 * angle.sin()];
         let mut curve = CompositeCurve::default();
         for i in 0..10 {
@@ -263,7 +263,7 @@ mod tests {
             let made = of(&control, given.weights);
             prop_assert!(made.curve.pieces().all(|piece| piece.degree() == 1));
             let along = |p: &[f64; 3]| dot(&sub(p, &origin), &direction) / dot(&direction, &direction) / 10.0;
-            // At no place of the piece is it outside the line of that parameter.
+            // No place of the piece is outside the line with the same parameter.
             let breaks: Vec<f64> = made.curve.width.iter().scan(0.0, |sum, w| { *sum += w / 2.0; Some(*sum) }).collect();
             for i in 0..=200 {
                 let t = i as f64 / 200.0;

@@ -1,6 +1,6 @@
 //! |C'| of a piece of any degree, with the bound of its derivatives that a length table needs.
 //!
-//! |C'| = |h|/ω², with the numerator h of the hodograph. The bound is Cauchy's on a disc about the middle m of a panel: with
+//! |C'| = |h|/ω², where h is the numerator of the hodograph. The bound is Cauchy's on a disc about the middle m of a panel. With
 //! S = h·h = s₀ + s₁z + … about m and Σ_{k>0} |s_k| ρᵏ ≤ s₀, S has no zero in |z| < ρ, so √S is analytic there and at most
 //! √(2 s₀). In the same way |ω| is at least ω(m)/2.
 
@@ -12,27 +12,27 @@ use crate::arc_length::{Disc, Integrand};
 use crate::polynomial::binomial;
 use crate::quadratic::dot;
 
-/// Greatest radius of a disc in half panels: the error of one panel is then below rounding.
+/// The greatest radius of a disc, in half panels: the error of one panel is then below rounding.
 const MAX_RATIO: f64 = 64.0;
-/// Bisections of the radius in geometric means: to 4 %.
+/// The number of bisections of the radius, at geometric means: it is then known to 4 %.
 const BISECTIONS: u32 = 7;
 
 /// |C'(u)| of one piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Speed<'a, const M: usize> {
-    /// Bernstein coefficients of h by t = u / width, times binomials.
+    /// Bernstein coefficients of h in t = u / width, times binomials.
     h: &'a [[f64; M]],
-    /// Those of ω; empty for polynomial pieces.
+    /// The same of ω; empty for polynomial pieces.
     omega: &'a [f64],
     width: f64,
-    /// The cusp in this part of the piece, or NaN.
+    /// The cusp in this part of the piece, or NaN if there is none.
     foot: f64,
-    /// |C'| at most `at_foot + slope |u − foot|`.
+    /// |C'| is at most `at_foot + slope |u − foot|`.
     at_foot: f64,
     slope: f64,
 }
 
-/// The coefficients that `Speed` reads, of one piece.
+/// The coefficients of one piece that `Speed` refers to.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients<const M: usize> {
     h: [[f64; M]; MAX_HODOGRAPH],
@@ -55,7 +55,7 @@ impl<const M: usize> Coefficients<M> {
         coefficients
     }
 
-    /// Those of the piece with each axis times a factor.
+    /// The coefficients of the piece with each axis multiplied by a factor.
     pub fn scaled(mut self, factor: &[f64; M]) -> Self {
         for row in &mut self.h {
             *row = std::array::from_fn(|k| factor[k] * row[k]);
@@ -68,7 +68,7 @@ impl<const M: usize> Coefficients<M> {
         &self.h[..self.counts[0]]
     }
 
-    /// Those of the denominator; none where the piece is polynomial.
+    /// Bernstein coefficients of the denominator ω times binomials; none if the piece is polynomial.
     pub fn denominator(&self) -> &[f64] {
         &self.omega[..self.counts[1]]
     }
@@ -79,7 +79,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         Self { h, omega, width, foot: f64::NAN, at_foot: 0.0, slope: 0.0 }
     }
 
-    /// The same for tables without a cusp: the bound of |C'| is its greatest value.
+    /// For tables of parts without a cusp: the bound of |C'| is its greatest value.
     pub fn without_foot(mut self) -> Self {
         self.at_foot = self.greatest(|i| self.plain(i)) * self.inverse_square();
         self
@@ -90,7 +90,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         self.h.iter().all(|row| *row == [0.0; M])
     }
 
-    /// The same for tables with a cusp at u.
+    /// For tables of parts with a cusp at u: |C'| is bounded by its value at u and its greatest slope.
     pub fn with_foot(mut self, u: f64) -> Self {
         let value = self.numerator(u / self.width).0;
         self.foot = u;
@@ -99,7 +99,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         self
     }
 
-    /// At least the slope of |C'|, which is no more than |C''|; infinite on rational pieces.
+    /// An upper bound of the slope of |C'|, which is at most |C''|; infinite on rational pieces.
     pub fn steepest(&self) -> f64 {
         match self.omega {
             [] => self.growth() / (self.width * self.width),
@@ -107,7 +107,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         }
     }
 
-    /// The greatest dh/dt.
+    /// An upper bound of |dh/dt|.
     fn growth(&self) -> f64 {
         let n = self.h.len() - 1;
         self.greatest(|i| {
@@ -124,7 +124,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         (0..self.h.len()).fold(0.0, |most: f64, i| most.max(dot(&vector(i), &vector(i)))).sqrt()
     }
 
-    /// 1/(ω² width) at most.
+    /// An upper bound of 1/(ω² width).
     fn inverse_square(&self) -> f64 {
         let degree = self.omega.len().saturating_sub(1);
         let least = (0..self.omega.len())
@@ -136,7 +136,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         }
     }
 
-    /// h(t), and ω(t), by the scheme of Volk and Schumaker: sums of the terms' positive weights, without a division.
+    /// h(t) and ω(t) by the scheme of Volk and Schumaker: sums of terms with positive factors, without a division.
     #[inline(always)]
     fn numerator(&self, t: f64) -> ([f64; M], f64) {
         let s = 1.0 - t;
@@ -215,13 +215,13 @@ impl<const M: usize> Integrand for Speed<'_, M> {
         self.foot
     }
 
-    // The length of such a panel and its quadrature are between 0 and its width times the bound.
+    // The integral over such a panel and its quadrature are both between 0 and the width times the bound of |C'|.
     fn foot_error(&self, width: f64) -> f64 {
         width * (self.at_foot + self.slope * width)
     }
 }
 
-/// |h|/width of a polynomial piece at several u, in the vectors of the processor.
+/// |h|/width of a polynomial piece at several u, written so that the compiler uses SIMD vectors over the places.
 #[inline(always)]
 fn lengths<const M: usize, const K: usize>(rows: &[[f64; M]], width: f64, mut u: [f64; K]) -> [f64; K] {
     let (mut rest, mut sum, per_width) = ([1.0; K], [0.0; K], 1.0 / width);
@@ -229,7 +229,7 @@ fn lengths<const M: usize, const K: usize>(rows: &[[f64; M]], width: f64, mut u:
         u[l] *= per_width;
         rest[l] -= u[l];
     }
-    // One axis after the other: with all at once the compiler makes vectors of axes.
+    // One axis after the other; otherwise the compiler would build vectors of axes.
     for k in 0..M {
         let (mut h, mut power) = ([rows[0][k]; K], [1.0; K]);
         for row in &rows[1..] {
@@ -248,7 +248,7 @@ fn lengths<const M: usize, const K: usize>(rows: &[[f64; M]], width: f64, mut u:
     sum
 }
 
-/// The greatest radius of a disc without singularities, in half panels; 1 if there is none.
+/// The greatest radius of a disc that is `clear` of singularities, in half panels; 1 if no greater one is.
 pub fn greatest_ratio(clear: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (1.0, MAX_RATIO);
     if clear(high) {
@@ -266,7 +266,7 @@ pub fn greatest_ratio(clear: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Bernstein coefficients on [0, 1] to coefficients of powers of z = (t − middle)/half, up to the sign of z: forward
+/// Turns Bernstein coefficients on [0, 1] into coefficients of powers of z = (t − middle)/half, up to the sign of z, by forward
 /// differences of the part from the middle to the farther end.
 pub fn to_taylor<const M: usize>(b: &mut [[f64; M]], middle: f64, half: f64) {
     let n = b.len() - 1;

@@ -4,22 +4,22 @@ use crate::tolerance;
 use feedplan_geometry::quadratic::{norm, sub};
 use std::f64::consts::{PI, TAU};
 
-/// An arc of more pieces is refused: it would fill the memory.
+/// The greatest number of pieces; an arc that needs more is refused, since it would fill the memory.
 pub const MAX_PIECES: f64 = 1e7;
-/// An arc is refused if its radius changes by more than this times itself per rad: it runs along a radius.
+/// An arc whose radius changes per rad by more than this times itself is refused: it runs along a radius.
 const STEEPEST: f64 = 1e6;
 
-/// An arc in the plane of two axes. All other axes are linear in the angle; so is the radius, where start and end
-/// differ in their distance from the centre.
+/// An arc in the plane of two axes. All other axes are linear in the angle; so is the radius, if start and end differ in their
+/// distance from the centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Arc<const M: usize> {
     pub start: [f64; M],
     pub end: [f64; M],
     /// Centre in the coordinates of `plane`.
     pub centre: [f64; 2],
-    /// The two axes of the plane, turning from the first to the second at a positive sweep.
+    /// The two axes of the plane; a positive sweep turns from the first to the second.
     pub plane: [usize; 2],
-    /// Signed sweep in rad, with all its turns.
+    /// Signed sweep in rad, full turns included.
     pub sweep: f64,
 }
 
@@ -36,17 +36,17 @@ pub enum ArcError {
 
 /// The polar form of an arc about its centre.
 pub struct Polar {
-    /// From the centre to the start, of length 1.
+    /// Unit vector from the centre to the start.
     pub direction: [f64; 2],
     pub radius: f64,
-    /// Change of the radius per rad of |sweep|.
+    /// Change of the radius per rad of |sweep|, in mm.
     pub growth: f64,
-    /// Travel of all other axes per rad of |sweep|.
+    /// Travel of all other axes together per rad of |sweep|, in mm.
     pub pitch: f64,
     pub sweep: f64,
 }
 
-/// The sweep from one radius vector to another, with as many turns as the programmed one; None if they disagree.
+/// The sweep from one radius vector to another, with as many turns as the programmed one; None if both differ by too much.
 pub fn sweep_to(from: &[f64; 2], to: &[f64; 2], programmed: f64) -> Option<f64> {
     let turn = (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1]);
     let correction = (turn - programmed + PI).rem_euclid(TAU) - PI;

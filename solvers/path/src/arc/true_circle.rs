@@ -1,4 +1,4 @@
-//! An arc as a true circle in conic pieces of at most 90°, a helix on the cylinder of such a circle.
+//! An arc as a true circle in conic pieces of at most 90°, and a helix on the cylinder of such a circle.
 //!
 //! Start and end of a programmed arc are rounded, so their distances from the centre c differ a little, and the arc is a
 //! spiral S(x) of radius r₀ + xΔ, x in [0, 1]. It is replaced by the circle through both ends whose centre c + d is
@@ -8,15 +8,14 @@
 //! |S − c − d| − R = g + ε,   g = r₀ + xΔ − |d| cos ψ − R,   0 ≤ ε ≤ |d|²/(2 (r − |d|))
 //! ```
 //!
-//! and the greatest |g| is at an end or where sin ψ = −Δ/(|d| dψ/dx). This bounds the distance both ways, since both
-//! curves share their ends and the angle about c + d grows all along.
+//! and the greatest |g| is at an end or where sin ψ = −Δ/(|d| dψ/dx). This bounds the distance both ways, since both curves share
+//! their ends and the angle about c + d grows monotonically.
 //!
-//! The angles about c and about c + d differ by asin(|d|/r) at most, and so do they at the ends.
+//! The angles about c and about c + d differ by at most asin(|d|/r), also at the ends.
 //!
-//! An axis that is linear in the angle is linear in the parameter of the piece instead. On a piece of the sweep θ, with
+//! An axis that is linear in the angle becomes linear in the parameter of the piece instead. On a piece of sweep θ, with
 //! τ = s tan(θ/4), s = 2t − 1, the angle from the middle is 2 atan τ, and the axis is Z/(1 + τ²) with the parabola Z that
-//! interpolates f = (1 + τ²) atan τ at τ = 0 and ±T, T = tan(θ/4). With f''' = 4/(1 + τ²)², |Z − f| ≤ max|f'''|/3! · T³/2 ≤
-//! T³/3.
+//! interpolates f = (1 + τ²) atan τ at τ = 0 and ±T, T = tan(θ/4). With f''' = 4/(1 + τ²)², |Z − f| ≤ max|f'''|/3! · T³/2 ≤ T³/3.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -30,9 +29,9 @@ use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 struct Circle {
     shift: [f64; 2],
     sweep: f64,
-    /// Bound of the distance from the programmed arc in the plane.
+    /// Bound of the distance from the programmed arc within the plane, in mm.
     radial: f64,
-    /// Bound of the difference of the angles about both centres, each as a fraction of its sweep, in rad.
+    /// Bound of the difference between the angles about both centres, each as a fraction of its sweep, in rad.
     angular: f64,
 }
 
@@ -52,7 +51,7 @@ impl Circle {
         let along = 0.5 * change * (start + end) / dot(&chord, &chord);
         let shift = chord.map(|value| value * along);
         let distance = norm(&shift);
-        // The second condition holds if the angle about the new centre grows all along.
+        // The second condition ensures that the angle about the new centre grows monotonically.
         let near = distance <= tolerance::CENTRE * least
             && distance * change.abs() < polar.sweep.abs() * least * (least - distance);
         if !near {
@@ -87,19 +86,19 @@ impl Circle {
         })
     }
 
-    /// The bound of the distance along the axis from a helix that rises by `rise`, in `count` pieces.
+    /// Bound of the distance along the axis, in mm, between `count` pieces and a helix that rises by `rise`.
     fn axial_error(&self, rise: f64, count: f64) -> f64 {
         let theta = self.sweep.abs() / count;
         rise / count * (2.0 / theta) * (1.0 / 3.0) * (0.25 * theta).tan().power(3.0)
     }
 }
 
-/// The pieces of the circle, and the bound of their distance from the arc; None if that exceeds `tolerance` or takes
-/// too many pieces.
+/// The pieces of the circle, and the bound of their distance from the arc in mm; None if that exceeds `tolerance` or needs too
+/// many pieces.
 pub fn pieces<const M: usize>(arc: &Arc<M>, polar: &Polar, tolerance: f64) -> Option<(Vec<Conic<M>>, f64)> {
     let circle = Circle::new(arc, polar)?;
     let large = polar.radius.max(polar.radius + polar.growth * polar.sweep.abs());
-    // An error of the angle shows along the other axes or along the circle, whichever is less.
+    // An error of the angle is an error along the other axes or along the circle, whichever is smaller.
     let per_angle = polar.pitch.min(large);
     let least = circle.radial + circle.angular * per_angle;
     let rise = circle.sweep.abs() * per_angle;
@@ -128,7 +127,7 @@ fn conics<const M: usize>(arc: &Arc<M>, circle: &Circle, count: f64) -> Vec<Coni
             let (sin, cos) = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)][i % 4];
             (sin * theta.signum(), cos)
         } else {
-            // With the rounding of the product, so that pieces after many turns are of equal size.
+            // The rounding error of the product is added back, so that pieces after many turns have the same size.
             let angle = i as f64 * theta;
             let lost = (i as f64).mul_add(theta, -angle);
             let (sin, cos) = angle.sin_cos();
@@ -147,8 +146,7 @@ fn conics<const M: usize>(arc: &Arc<M>, circle: &Circle, count: f64) -> Vec<Coni
                 end = lerp(&arc.start, &arc.end, i as f64 / count as f64);
                 (end[x], end[y]) = joint(i);
             }
-            // The point where the tangents meet, computed from the chord: so a small piece of a great circle is
-            // symmetric too.
+            // The point where the tangents meet, computed from the chord: a small piece of a large circle is then symmetric too.
             let chord = sub(&end, &start);
             let mut middle = lerp(&start, &end, 0.5);
             middle[x] += bulge * chord[y];

@@ -1,10 +1,11 @@
-//! The lengths of blends, from those that they can use and the lengths between their corners.
+//! Computes the lengths of blends from the greatest lengths that they can use and the lengths between their corners.
 
 /// The length of each blend on either side of its corner, in mm.
 ///
-/// `wanted` is the greatest length that the blend can use (0 where the corner is not rounded), `span[k]` the length between
-/// corner k and corner k + 1. A blend gets half of a span, or the part that the blend at the other end cannot use. A blend
-/// that is short on one side is as short on the other: in two more rounds its neighbours get the rest.
+/// `wanted` is the greatest length that each blend can use (0 where the corner is not rounded), `span[k]` the length between
+/// corner k and corner k + 1. A blend gets half of a span, or what the blend at the other end cannot use, whichever is more. A
+/// blend has the same length on both sides; if one side is short, its neighbour on the other side gets the rest in two more
+/// rounds.
 pub fn share_lengths(wanted: &[f64], span: &[f64]) -> Vec<f64> {
     const ROUNDS: usize = 3;
     let grant = |span: f64, other: f64| (0.5 * span).max(span - other);
@@ -60,7 +61,7 @@ mod tests {
             let length = share_lengths(&wanted, &span);
             for k in 0..12 {
                 assert!(length[k] + length[k + 1] <= span[k] * (1.0 + 1e-15) && length[k] <= wanted[k]);
-                // None has less than its half unless its other side limits it.
+                // Each blend gets half of the shorter span beside it, unless it wants less.
                 let left = if k > 0 { 0.5 * span[k - 1] } else { f64::INFINITY };
                 assert!(length[k] >= wanted[k].min(0.5 * span[k]).min(left));
             }

@@ -1,13 +1,13 @@
-//! The jump of the unit tangent at a corner, and the length of the blend that it allows, from the pieces on both sides.
+//! The jump of the unit tangent at a corner, and the length of the blend that suits it, from the pieces on both sides.
 
 use crate::path_piece::Shape;
 use crate::tolerance;
 use feedplan_geometry::quadratic::norm;
 
-/// A blend gets this many times the length at which it takes the full acceleration of an axis at the feed, so that the
-/// sides have some left for themselves.
+/// A blend gets this many times the length at which it takes the full acceleration of an axis at the feed, so that the curvature
+/// of the sides has some acceleration left.
 const EASE: f64 = 8.0;
-/// The shortest blend in errors of a coordinate.
+/// The shortest blend, in multiples of the rounding error of a coordinate.
 const SHORTEST: f64 = 16.0;
 
 /// What a corner between two lines becomes.
@@ -15,8 +15,8 @@ const SHORTEST: f64 = 16.0;
 pub enum Rounding {
     /// See "Why a parabola" in `corner`.
     Parabola,
-    /// The circle that touches both lines, as many controllers have it. With the turn θ and the radius r it takes
-    /// l = r tan(θ/2) of each line, and the corner is r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away from it.
+    /// The circle that touches both lines, as used by many controllers. With the turn θ and the radius r it takes l = r tan(θ/2)
+    /// of each line, and its distance from the corner is r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)).
     Circle,
 }
 
@@ -27,12 +27,12 @@ pub struct TangentJump<const M: usize> {
     pub change: [f64; M],
     /// |t₊ − t₋| = 2 sin(turn/2).
     pub size: f64,
-    /// Error of a length here by the rounding of coordinates, in mm.
+    /// The rounding error of lengths here, from the coordinates, in mm.
     pub rounding: f64,
 }
 
 impl<const M: usize> TangentJump<M> {
-    /// The jump between two pieces, None where a piece ends without a tangent.
+    /// The jump between two pieces; None where a piece has no tangent at its end.
     pub fn new(before: &Shape<M>, after: &Shape<M>) -> Option<Self> {
         let (out, into) = (before.end_edge(), after.start_edge());
         let (edge_out, edge_into) = (norm(&out), norm(&into));
@@ -55,7 +55,7 @@ impl<const M: usize> TangentJump<M> {
         self.size * self.size >= 4.0 * (1.0 - tolerance::REVERSAL_COSINE.powi(2))
     }
 
-    /// The length in mm beyond which a longer blend is not faster, at `feed`.
+    /// The length in mm above which a longer blend gives no higher speed at `feed`.
     pub fn length_for(
         &self,
         sides: [&Shape<M>; 2],
@@ -78,7 +78,7 @@ impl<const M: usize> TangentJump<M> {
         (1.0 - 0.25 * self.size * self.size).max(0.0).sqrt()
     }
 
-    /// The length of the blend that deviates by `deviation`, in mm.
+    /// The length of the blend whose deviation is `deviation`, both in mm.
     pub fn length_within(&self, deviation: f64, rounding: Rounding) -> f64 {
         match rounding {
             Rounding::Parabola => 4.0 * deviation / self.size,
@@ -86,12 +86,12 @@ impl<const M: usize> TangentJump<M> {
         }
     }
 
-    /// Whether a length is too short to be told from rounding.
+    /// Whether a length is so short that it may be rounding.
     pub fn vanishes(&self, length: f64) -> bool {
         length <= SHORTEST * self.rounding || length <= 0.0
     }
 
-    /// The displacement D of the corner for the lengths of its two sides, in mm.
+    /// The displacement D of the corner for sides of these lengths, in mm.
     pub fn displacement(&self, before: f64, after: f64) -> [f64; M] {
         self.change.map(|x| x / (2.0 / before + 2.0 / after))
     }

@@ -1,19 +1,19 @@
 //! Breaking points and first feature points, from the discrete curvature of the points (Zhang et al. 2010, section 3.1).
 //!
-//! The curvature at a point is that of the circle through it and one point on each side, 1, 2, 4, 8 … points away: the
-//! nearest ones whose chord is off the point by more than the tolerance, so that noise does not count (after Coeurjolly and
-//! Svensson, who use the longest digital segments). If there are none, the curvature is 0. The number of points away is
-//! the *reach* of the curvature.
+//! The curvature at a point is that of the circle through it and one point on each side, 1, 2, 4, 8 … points away. Of these pairs
+//! the nearest one is taken whose chord is farther from the point than the tolerance, so that noise has no effect (after
+//! Coeurjolly and Svensson, who use the longest digital segments). The number of points away is the *reach* of the curvature.
+//! Without such a pair the curvature is 0.
 //!
-//! A point is an *extreme* if its curvature is the greatest between two points where it is a fifth lower, and no sharper
-//! extreme is within its reach. Plateaus and ripples have no extremes.
+//! A point is an *extreme* if its curvature is the greatest between two points where it is lower by the factor PROMINENCE, and no
+//! sharper one lies within its reach. Plateaus and ripples have no extremes.
 //!
 //! Breaking points are
 //!
 //! * both ends of the chain,
-//! * both ends of lines, which are long chords and sequences of colinear points,
-//! * extremes above the threshold of curvature, and
-//! * corners above it, extremes or not.
+//! * both ends of lines, which are long chords and sequences of collinear points,
+//! * extremes whose curvature is above the threshold, and
+//! * corners whose curvature is above it, extremes or not.
 
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ use feedplan_geometry::quadratic::{dot, norm, sub, Segment};
 
 /// Greatest reach of the curvature, in points to each side.
 const WIDEST: usize = 2048;
-/// The curvature at an extreme is this many times the lowest curvature on both sides.
+/// The curvature at an extreme is at least this many times the lowest curvature on both sides.
 const PROMINENCE: f64 = 1.2;
 
 /// A point where one group ends and the next begins.
@@ -38,13 +38,13 @@ pub struct Break {
 }
 
 impl Break {
-    /// The tangent at the point of the circle through it and its sides.
+    /// The unit tangent at the point of the circle through it and its sides.
     pub fn tangent<const M: usize>(&self, chain: &Chain<M>) -> [f64; M] {
         let [a, b] = self.sides;
         let before = sub(&chain.points[self.at], &chain.points[a]);
         let after = sub(&chain.points[b], &chain.points[self.at]);
         let (before_sq, after_sq) = (dot(&before, &before), dot(&after, &after));
-        // Inversion about the point makes the circle a line.
+        // Inversion about the point maps the circle to a line.
         let tangent: [f64; M] = std::array::from_fn(|k| before[k] * after_sq + after[k] * before_sq);
         let length = norm(&tangent);
         match length > 0.0 {
@@ -102,7 +102,7 @@ fn end_of_line<const M: usize>(
     Break { at, sides: [left, right], corner: is_corner(chain, at, [left, right]), line }
 }
 
-/// Whether the path turns both at the point itself and at the scale of the tolerance. Noise turns only at points, a small
+/// Whether the path turns both at the point itself and at the scale of the tolerance. Noise turns only at the point, a small
 /// smooth bend only at the scale of the tolerance.
 fn is_corner<const M: usize>(chain: &Chain<M>, at: usize, [left, right]: [usize; 2]) -> bool {
     chain.is_corner(at)
@@ -111,7 +111,7 @@ fn is_corner<const M: usize>(chain: &Chain<M>, at: usize, [left, right]: [usize;
         && turn_cosine(&chain.points[left], &chain.points[at], &chain.points[right]) < chain.corner_cosine
 }
 
-/// Long chords, and sequences of colinear points whose line the path around them leaves, as ranges of points.
+/// Long chords, and sequences of collinear points from whose line the neighbouring path departs, as ranges of points.
 fn lines<const M: usize>(chain: &Chain<M>, max_chord: f64) -> Vec<(usize, usize)> {
     let Chain { points, along, tolerance: allowed, .. } = *chain;
     let last = points.len() - 1;
@@ -145,8 +145,8 @@ fn lines<const M: usize>(chain: &Chain<M>, max_chord: f64) -> Vec<(usize, usize)
     lines
 }
 
-/// Whether the path leaves the line through two points by more than the tolerance, within half of their distance beyond
-/// either end: a smooth curve would then bend the line by as much. True if the chain ends at both points.
+/// Whether the path beyond either end of the line through two points is off it by more than the tolerance, within half of their
+/// distance: a smooth curve would then bend the line by as much. True if the chain ends at both points.
 fn departs<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     let Chain { points, along, tolerance, .. } = *chain;
     let last = points.len() - 1;
@@ -170,14 +170,14 @@ fn departs<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     })
 }
 
-/// Whether all points between are on the line: small deviations have not added up.
+/// Whether all points between are on the line, so that small deviations have not added up.
 fn is_straight<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     let segment = Segment::new(&chain.points[from], &chain.points[to]);
     let allowed_sq = (tolerance::STRAIGHT * chain.tolerance).powi(2);
     chain.points[from..to].iter().all(|point| segment.distance_sq(point) <= allowed_sq)
 }
 
-/// Appends the extremes strictly between points `a` and `b`, and the breaks among all points there.
+/// Appends the extremes strictly between points `a` and `b`, and the breaks found there.
 fn curve<const M: usize>(
     chain: &Chain<M>,
     a: usize,
@@ -232,8 +232,8 @@ fn curvature<const M: usize>(chain: &Chain<M>, a: usize, b: usize, k: usize) -> 
     }
 }
 
-/// Appends the maxima that are `PROMINENCE` times the minima next to them and the greatest within their reach; `first` is
-/// the point of the first curvature.
+/// Appends the maxima of the curvature that are `PROMINENCE` times the minima next to them and the greatest within their reach;
+/// `first` is the point to which the first curvature belongs.
 fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
     let mut peaks = Vec::new();
     let mut rising = false;

@@ -1,19 +1,19 @@
-//! A rigorous bound of the distance between one step of the spline and its chords, both ways.
+//! A rigorous bound of the distance between one step of the spline and its chords, both ways, by convex hulls.
 //!
 //! The curve is cut at a foot point of each vertex, in order, and at the knot.
 //!
 //! * From curve to polygon: the distance to a segment is convex, so each part of the curve is at most as far from its chord
 //!   as the farthest of its three control points.
-//! * From polygon to curve: the part starts within |C(x_k) − P_k| of one end of the chord and ends as near to the other, so
-//!   by continuity each point of the chord is that near to the part.
+//! * From polygon to curve: the part starts within |C(x_k) − P_k| of one end of the chord and ends within |C(x_{k+1}) − P_{k+1}|
+//!   of the other, so by continuity each point of the chord is within the greatest of these and the part's bound.
 //!
 //! A part whose bound exceeds the tolerance is halved, which makes the bound sharper.
 
 use feedplan_geometry::quadratic::{dot, lerp, sub, Segment};
 
-/// C' along the step is at least this fraction of its mean, so that it neither vanishes nor turns back.
+/// The component of C' along the step is at least this fraction of its mean, so that C' neither vanishes nor turns back.
 const PROGRESS: f64 = 0.1;
-/// Halvings of one part at most. Each makes the excess of the bound four times smaller.
+/// The greatest number of halvings of a part. Each one makes the excess of the bound four times smaller.
 const HALVINGS: u32 = 3;
 
 /// The spline between two adjacent features: C on [0, h], two quadratics that meet at h/2.
@@ -100,7 +100,7 @@ impl<const M: usize> Step<M> {
         ]
     }
 
-    /// The bound of the distance to the chords from point `a`, where the step starts, to point `b`, where it ends.
+    /// The bound of the distance, both ways, between the step and the chords from point `a` at its start to point `b` at its end.
     pub fn certify(
         &self,
         points: &[[f64; M]],
@@ -170,7 +170,8 @@ impl<const M: usize> Step<M> {
         }
     }
 
-    /// A foot point of `p` not before `from`, by Newton's method from `guess`, and its squared distance.
+    /// A parameter not before `from` where the curve is near `p`, by Newton's method from `guess` until the squared distance is
+    /// at most `enough_sq`; and that squared distance.
     #[inline(always)]
     fn foot(&self, halves: &[Half<M>; 2], p: &[f64; M], guess: f64, from: f64, enough_sq: f64) -> (f64, f64) {
         let middle = 0.5 * self.width;
@@ -197,7 +198,7 @@ impl<const M: usize> Step<M> {
     }
 }
 
-/// Bound of the squared distance from the part on [x0, x1], without its two ends, to the segment.
+/// Bound of the squared distance from the part on [x0, x1] to the segment; the distances of its two end points are not included.
 #[inline(always)]
 fn part_bound_sq<const M: usize>(
     half: &Half<M>,

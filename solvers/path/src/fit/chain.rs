@@ -1,17 +1,17 @@
-//! The chain as every step of the fit sees it.
+//! The input of the fit: points with the lengths along their polygon, the tolerance and the angle of corners.
 
 use rayon::prelude::*;
 
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// The input as every step sees it.
+/// The input of the fit.
 pub struct Chain<'a, const M: usize> {
     pub points: &'a [[f64; M]],
-    /// Polygon length from the first point to each.
+    /// Polygon length from the first point to each point, in mm.
     pub along: &'a [f64],
     pub tolerance: f64,
-    /// A turn whose cosine is smaller is a corner.
+    /// A point is a corner if the cosine of its turn is smaller.
     pub corner_cosine: f64,
     pub parallel: bool,
     pub watch: Watch<'a>,
@@ -26,7 +26,7 @@ impl<'a, const M: usize> Chain<'a, M> {
 }
 
 impl<const M: usize> Chain<'_, M> {
-    /// The results in order, computed in parallel if the chain is long.
+    /// Applies f to all items, in parallel if the chain is long; the results are in order.
     pub fn map<T: Sync, R: Send>(
         &self,
         items: &[T],
@@ -58,7 +58,7 @@ impl<const M: usize> Chain<'_, M> {
     }
 }
 
-/// Polygon length from the first point to each.
+/// Polygon length from the first point to each point.
 pub fn lengths_along<const M: usize>(points: &[[f64; M]]) -> Vec<f64> {
     let mut total = 0.0;
     std::iter::once(0.0)

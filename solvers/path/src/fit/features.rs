@@ -1,24 +1,24 @@
 //! The feature points of a group, which the spline interpolates (Zhang et al. 2010, section 3.2, Algorithm 1).
 //!
-//! A quadratic Bézier curve through three features Q1, Q2, Q3 replaces all points between them. If a point is too far
-//! from it, the farthest one becomes a feature and the triple shrinks; if none is, the triple moves on by one. Two
-//! additions keep the cost linear:
+//! A quadratic Bézier curve through three features Q1, Q2, Q3 replaces all points between them. If points are too far from it,
+//! the farthest one becomes a feature and the triple shrinks; otherwise the triple moves on by one feature. Two additions keep
+//! the cost linear:
 //!
-//! * The third feature is at most four steps ahead of the second one, each as long as the step before, so that a failed
+//! * The third feature is ahead of the second one by at most four times the step from the first to the second, so that a failed
 //!   attempt costs no more than what was accepted before.
-//! * A long triple that fails again and again is halved at each fourth attempt.
+//! * A long triple that fails again and again is halved at every fourth attempt.
 
 use super::chain::Chain;
 use feedplan_geometry::quadratic::{dot, Segment};
 
-/// The third feature is this many steps of the triple ahead at most; the first step of a group is FIRST points at most.
+/// The third feature is at most this many steps from Q1 to Q2 ahead of Q2; the first step of a group has at most FIRST points.
 const REACH: usize = 4;
 const FIRST: usize = 32;
 /// Triples of fewer points are never halved: they shrink as in the paper.
 const SMALL: usize = 32;
 
-/// The feature points of the group from point `a` to point `b`, with both; `extremes` are the first ones to try, strictly
-/// between, in order.
+/// The feature points of the group from point `a` to point `b`, both included. The points in `extremes`, strictly between them
+/// and ascending, are tried first.
 pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes: &[usize]) -> Vec<usize> {
     let next_extreme =
         |extremes: &[usize], after: usize| extremes.iter().copied().find(|&next| next > after).unwrap_or(b);
@@ -31,8 +31,8 @@ pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes
             None => return vec![a, b],
         }
     }
-    // Features from q2 on that earlier triples have accepted, the nearest last. There are several after a triple has
-    // stepped back before q2.
+    // Features from q2 on that earlier triples have accepted, the nearest last. There are several of them after a triple has
+    // shrunk to before its q2.
     let mut accepted: Vec<usize> = Vec::new();
     while q2 < b {
         let mut q3 = match accepted.iter().rev().find(|&&next| next > q2) {
@@ -61,7 +61,7 @@ pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes
     features
 }
 
-/// The point between that is farthest from the segment, if it is out of tolerance.
+/// The point between `a` and `b` that is farthest from their segment; None if all are within the tolerance.
 fn farthest_from_chord<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> Option<usize> {
     let segment = Segment::new(&chain.points[a], &chain.points[b]);
     let (mut worst_sq, mut farthest) = (chain.tolerance * chain.tolerance, None);
@@ -74,13 +74,13 @@ fn farthest_from_chord<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> 
     farthest
 }
 
-/// The point between that is farthest from the Bézier curve through the three, if it is out of tolerance.
+/// The point farthest from the Bézier curve through the three features; None if all between are within the tolerance.
 fn worst_point<const M: usize>(chain: &Chain<M>, q1: usize, q2: usize, q3: usize) -> Option<usize> {
     let Chain { points, along, tolerance, .. } = *chain;
     if q3 - q1 == 2 {
         return None;
     }
-    // B(u) = c0 + u c1 + u² c2, at Q2 where u is the fraction of the length before Q2.
+    // B(u) = c0 + u c1 + u² c2 passes Q2 at the u that is the fraction of the length before Q2.
     let length = along[q3] - along[q1];
     let u1 = (along[q2] - along[q1]) / length;
     let (start, end) = (&points[q1], &points[q3]);
@@ -127,7 +127,7 @@ mod tests {
         let features = select(&chain, 0, points.len() - 1, extremes);
         assert!(features.windows(2).all(|pair| pair[0] < pair[1]));
         assert_eq!((features[0], features[features.len() - 1]), (0, points.len() - 1));
-        // What Algorithm 1 promises: the Bézier curve through a triple is near all points between.
+        // The result of Algorithm 1: the Bézier curve through a triple is near all points between.
         for triple in features.windows(3) {
             let [q1, q2, q3] = [triple[0], triple[1], triple[2]];
             let u = (along[q2] - along[q1]) / (along[q3] - along[q1]);
@@ -168,7 +168,7 @@ mod tests {
         let points: Vec<[f64; 2]> = (0..2000).map(|i| [0.01 * i as f64, (0.01 * i as f64).sin()]).collect();
         let counts = [1e-1, 1e-2, 1e-3, 1e-4].map(|tolerance| features(&points, &[], tolerance).len());
         assert!(counts.windows(2).all(|pair| pair[0] < pair[1]), "{counts:?}");
-        // The error of a triple is of third order in its length: ten times tighter is 2.15 times as many.
+        // The error of a triple is of third order in its length: a tenth of the tolerance takes 2.15 times as many features.
         assert!(counts[3] < 3 * counts[2] && counts[0] < 30, "{counts:?}");
     }
 

@@ -1,4 +1,4 @@
-//! The quadratic pieces of a spline from knot to knot, made half a step at a time.
+//! Builds the quadratic pieces of a spline from knot to knot, half a step at a time.
 
 use super::chain::Chain;
 use feedplan_geometry::quadratic::{Quadratic, Segment};
@@ -15,7 +15,7 @@ pub struct FittedPiece<const M: usize> {
     pub spline: u32,
 }
 
-/// The line from point `a` to point `b`, with its distance from the points between.
+/// The line from point `a` to point `b`, with the greatest distance of the points between from it.
 pub fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize, spline: u32) -> FittedPiece<M> {
     let points = chain.points;
     let segment = Segment::new(&points[a], &points[b]);
@@ -24,14 +24,14 @@ pub fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize, spline: u32) -
     FittedPiece { piece: Quadratic::line(points[a], points[b]), first: a, last: b - 1, deviation, spline }
 }
 
-/// The place that the pieces of one spline have reached, and what is known of the next piece.
+/// The place that the pieces of one spline have reached, and width and deviation of the piece that begins there.
 pub struct PieceBuilder<const M: usize> {
     pub point: [f64; M],
     pub tangent: [f64; M],
     /// The chord on which the next piece starts.
     pub chord: usize,
     pub spline: u32,
-    /// Since the last knot, as is the deviation in mm.
+    /// Width since the last knot, and the greatest deviation since then, in mm.
     pub width: f64,
     pub deviation: f64,
 }

@@ -1,15 +1,15 @@
 //! The spline through a block of points between two given tangents, refined until every step is within the tolerance.
 //!
-//! A step is the spline from one feature to the next. In each round a step out of tolerance gets a new feature: its worst
-//! point, or both ends of its worst chord. More features do not help a step of a single chord if the next points on both
+//! A step is the part of the spline from one feature to the next. In each round a step out of tolerance gets new features: its
+//! worst point, or both ends of its worst chord. More features do not help a step of a single chord if the next points on both
 //! sides are features already. Such a step is mended by the first of these that is possible:
 //!
 //! 1. the spline is broken at the sharper end of the chord, if that is a corner;
 //! 2. it passes the ends of the chord at an offset, so that its bulge is shared between points and chords;
-//! 3. the tangent at its end is given up: a given one becomes free, a free one that of the chord;
+//! 3. the tangent at its end is given up: a given tangent becomes free, a free one gets the direction of the chord;
 //! 4. the chord becomes a line.
 //!
-//! No change is taken back, so their number is bounded. The number of rounds is bounded as well.
+//! No change is taken back, so the number of changes is bounded. The number of rounds is bounded as well.
 
 use super::certificate::{Defect, Step, StepBound};
 use super::chain::{turn_cosine, Chain};
@@ -18,13 +18,13 @@ use super::spline::{interpolate, EndCondition};
 use crate::tolerance;
 use feedplan_geometry::quadratic::{norm, sub};
 
-/// From this round on, a step out of tolerance is halved as well.
+/// From this round on, a step out of tolerance also gets its middle point as a feature.
 const HALVE: usize = 4;
 /// From this round on, a single chord out of tolerance becomes a line at once.
 const LINES: usize = 24;
 /// In this round, each spline that is still out of tolerance becomes lines.
 const LAST: usize = 40;
-/// A deviation is among the worst if it is at least the greatest one divided by this.
+/// The deviation of a step is among the worst if it is at least the greatest one nearby divided by this.
 const LIKE: f64 = 1.1;
 
 /// A group, or a part of a long one.
@@ -81,10 +81,10 @@ impl<const M: usize> Block<M> {
 /// The tangent of a step at one of its features.
 #[derive(Clone, Copy, PartialEq)]
 enum SideTangent {
-    /// That on the other side of the feature.
+    /// The same as on the other side of the feature.
     Smooth,
     Free,
-    /// Along the chord, where a free one bulges too far.
+    /// Along the chord; set where a free tangent bulges too far.
     Along,
 }
 
@@ -97,9 +97,9 @@ struct StepState<const M: usize> {
     line: bool,
     /// The tangents at the start and at the end.
     tangents: [SideTangent; 2],
-    /// The vector from the first feature to where the spline passes it, if that is not at the feature.
+    /// The offset of the spline from the feature at the start of the step, if it does not pass through it.
     offset: Option<[f64; M]>,
-    /// Set by `interpolate`; None for a step that is new or has a new neighbour.
+    /// The step and its bound by `interpolate`; None for a step that is new or has a new neighbour.
     fitted: Option<(Step<M>, StepBound)>,
 }
 
@@ -144,7 +144,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         splines
     }
 
-    /// The condition at the start (`side` 0) or the end (1) of step `j`, where a spline starts or ends.
+    /// The end condition of a spline that starts (`side` 0) or ends (1) with step `j`.
     fn end(&self, j: usize, side: usize) -> EndCondition<M> {
         let step = &self.steps[j];
         let neighbour = match step.tangents[side] {
@@ -160,15 +160,15 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
     }
 
-    /// Where the spline passes the feature at the start of step `j`.
+    /// The point at which the spline passes the feature at the start of step `j`.
     fn passage(&self, j: usize) -> [f64; M] {
         let step = &self.steps[j];
         let point = &self.chain.points[step.from];
         step.offset.map_or(*point, |offset| std::array::from_fn(|k| point[k] + offset[k]))
     }
 
-    /// The offset at point `at`: half of the bulge of a smooth curve through the points over their chords, towards the
-    /// inside of the turn. So the deviation is shared between points and chords.
+    /// The offset at point `at`, towards the inside of the turn. It is half of the bulge that a smooth curve through the points
+    /// has over their chords, so that the deviation is shared between points and chords.
     fn inward(&self, at: usize) -> [f64; M] {
         let points = self.chain.points;
         let (before, after) = (sub(&points[at], &points[at - 1]), sub(&points[at + 1], &points[at]));
@@ -180,7 +180,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         inside.map(|value| share * value)
     }
 
-    /// Computes each spline that has changed, and its bounds.
+    /// Computes each spline that has changed, and the bounds of its steps.
     fn interpolate(&mut self) {
         let chain = self.chain;
         let mut features = Vec::new();
@@ -206,7 +206,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
     }
 
-    /// Adds features or breaks splines where steps are out of tolerance; false if none is.
+    /// Adds features or breaks splines where steps are out of tolerance. Returns false if no step is.
     fn improve(&mut self, round: usize) -> bool {
         let mut added: Vec<usize> = Vec::new();
         let mut changed = false;
@@ -263,7 +263,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         changed
     }
 
-    /// The deviation of a step that is out of tolerance, else 0.
+    /// The deviation in mm of a step that is out of tolerance, otherwise 0.
     fn excess(&self, j: usize) -> f64 {
         match self.steps[j].fitted {
             Some((_, StepBound { defect: Some(_), deviation: [a, b], .. })) => a.max(b),
@@ -271,7 +271,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
     }
 
-    /// Whether each smooth curve bulges over the chord of step `j` by too much for an offset.
+    /// Whether every smooth curve would bulge over the chord of step `j` by more than an offset can compensate.
     fn is_hopeless(&self, j: usize) -> bool {
         let StepState { from, to, .. } = self.steps[j];
         let points = self.chain.points;
@@ -285,11 +285,11 @@ impl<'a, const M: usize> Refinement<'a, M> {
         bulge.min(self.excess(j)) > tolerance::HOPELESS * self.chain.tolerance
     }
 
-    /// Mends step `j` of the spline `[first, end)`, a single chord that no feature helps.
+    /// Mends step `j` of the spline `[first, end)`, a single chord that more features do not help.
     fn break_at(&mut self, first: usize, j: usize, end: usize, round: usize) {
         let StepState { from, to, .. } = self.steps[j];
         let points = self.chain.points;
-        // The cosine of the turn at an end of the chord where the spline can be broken.
+        // The cosine of the turn at a corner where the spline can be broken; 1 elsewhere.
         let corner = |at: usize, inside: bool| match inside && self.chain.is_corner(at) {
             true => turn_cosine(&points[at - 1], &points[at], &points[at + 1]),
             false => 1.0,
@@ -329,7 +329,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         self.refit(j - 1);
     }
 
-    /// Marks step `j` and its neighbours as changed.
+    /// Marks step `j` and its neighbours to be computed again.
     fn refit(&mut self, j: usize) {
         for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
             self.steps[k].fitted = None;

@@ -1,25 +1,25 @@
 //! The C1 quadratic B-spline through feature points, from one tridiagonal system (Zhang et al. 2010, section 3.3).
 //!
-//! Features F_j have the parameters t_j with steps h_j = |F_{j+1} − F_j|, so that |C'| is near 1, and a knot is in the
-//! middle of each step. The unknowns are the slopes s_j = C'(knot j). C' is linear between knots, so the tangent at a
-//! feature is m_j = (h_j s_{j−1} + h_{j−1} s_j)/(h_{j−1} + h_j), and the integral of C' over step j gives
+//! The features F_j have the parameters t_j with steps h_j = |F_{j+1} − F_j|, so that |C'| is near 1. A knot is in the middle of
+//! each step. The unknowns are the slopes s_j = C'(knot j). C' is linear between knots, so the tangent at a feature is
+//! m_j = (h_j s_{j−1} + h_{j−1} s_j)/(h_{j−1} + h_j), and the integral of C' over step j gives
 //!
 //! ```text
 //! m_j + 2 s_j + m_{j+1} = 4 (F_{j+1} − F_j)/h_j
 //! ```
 //!
-//! This system is tridiagonal in s with the diagonal 2 + (1 − a) + (1 − c) and off-diagonals a, c in [0, 1]: diagonally
-//! dominant for any spacing, which the system in control points is not. At a free end the knot next to it is left out:
-//! its slope is that of the chord. So three features with two free ends give the Bézier curve of Algorithm 1.
+//! This system is tridiagonal in s with the diagonal 2 + (1 − a) + (1 − c) and off-diagonals a, c in [0, 1]. It is diagonally
+//! dominant for any spacing, which the system in control points is not. At a free end the knot next to it is left out: its slope
+//! is that of the chord. So three features with two free ends give the Bézier curve of Algorithm 1.
 
 use feedplan_geometry::quadratic::{norm, sub};
 
 /// The tangent of the spline at one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EndCondition<const M: usize> {
-    /// None is given.
+    /// No tangent is given.
     Free,
-    /// C' is this.
+    /// The given C'.
     Tangent([f64; M]),
 }
 
@@ -40,7 +40,7 @@ pub fn interpolate<const M: usize>(
     let count = features.len() - 1;
     let h: Vec<f64> = features
         .windows(2)
-        // Features at one place need a step too; the certificate asks for points between them later.
+        // Features at the same place need a positive step too; the certificate asks for points between them later.
         .map(|f| norm(&sub(&f[1], &f[0])).max(f64::MIN_POSITIVE * 1e10))
         .collect();
     let chord: Vec<[f64; M]> =
@@ -101,7 +101,7 @@ pub fn interpolate<const M: usize>(
     Spline { step: h, slope, tangent }
 }
 
-/// The line through `far` and `near`, extended beyond `near` by this ratio.
+/// The line through `far` and `near`, extended beyond `near` by `by` times their distance.
 fn extrapolate<const M: usize>(near: &[f64; M], far: &[f64; M], by: f64) -> [f64; M] {
     std::array::from_fn(|k| near[k] + by * (near[k] - far[k]))
 }
@@ -153,7 +153,7 @@ mod tests {
                 interpolate(&points, EndCondition::Tangent([0.0, 1.0]), EndCondition::Tangent([0.0, -1.0]));
             let middle = count / 2;
             let [x, y] = spline.tangent[middle];
-            // At the top the tangent is (−1, 0), by symmetry in direction; its length tells the error.
+            // By symmetry the direction of the tangent at the top is (−1, 0); its length shows the error.
             assert!(y.abs() < 1e-12);
             (x + 1.0).abs()
         };

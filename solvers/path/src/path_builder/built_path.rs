@@ -1,4 +1,4 @@
-//! The path of a program as it is built, and what the axes allow on it.
+//! The path of a program, as it is built, and the limits of the axes that it is built for.
 
 use super::chunk::Chunk;
 use super::travel::{outside, Outside};
@@ -6,7 +6,7 @@ use crate::moves::Moves;
 use crate::program_pieces::FitCounts;
 use crate::smooth_fit::Offsets;
 
-/// What the axes allow.
+/// The limits of the axes that matter for a path.
 pub struct Axes<const M: usize> {
     /// In mm/s and mm/s².
     pub max_velocity: [f64; M],
@@ -21,20 +21,20 @@ pub struct Axes<const M: usize> {
 pub struct BuiltPath<const M: usize> {
     /// The pieces in order, in the chunks that were made in parallel.
     pub chunks: Vec<Chunk<M>>,
-    /// Index of the first piece of each run, and the number of pieces.
+    /// Index of the first piece of each run; the last entry is the number of pieces.
     pub runs: Vec<usize>,
     /// Upper bound of the distance between path and program, both ways, in mm.
     pub deviation: f64,
-    /// The side of the program on which a smooth path lies, and its distance.
+    /// For a smooth path: on which side of the program it lies, and how far away.
     pub offsets: Option<Offsets>,
     pub fit: FitCounts,
     /// The first place outside the travel of an axis.
     pub outside: Option<Outside>,
-    /// Where a smooth path stops without being told to.
+    /// Where a smooth path stops although the program does not ask for it.
     pub not_smooth: NotSmooth,
 }
 
-/// Where a smooth path stops without being told to.
+/// Where a smooth path stops although the program does not ask for it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NotSmooth {
     /// Moves at whose end the path turns back and stops.
@@ -45,7 +45,7 @@ pub struct NotSmooth {
 }
 
 impl<const M: usize> BuiltPath<M> {
-    /// From pieces and runs, with what is measured on them.
+    /// From pieces and runs; finds the deviation and the first place outside the travel.
     pub fn new(
         chunks: Vec<Chunk<M>>,
         runs: Vec<usize>,

@@ -1,4 +1,4 @@
-//! The moves of a program as chords, for a smooth curve that is fitted to all of them alike.
+//! The moves of a program as chords, the input of a smooth curve that is fitted to all moves alike.
 //!
 //! Arcs and splines are halved until their chords are within a small fraction of the tolerance; the fit gets the rest.
 
@@ -11,10 +11,10 @@ use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub, Segment};
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 
-/// Halvings of a piece of an arc or a spline at most.
+/// The greatest number of halvings of a piece of an arc or a spline.
 const DEPTH: u32 = 14;
 
-/// A chord of one move or more.
+/// A chord along one or more moves.
 #[derive(Clone, Copy, Debug)]
 pub struct Chord {
     /// First and last move.
@@ -23,14 +23,14 @@ pub struct Chord {
     pub feed: f64,
     /// Allowed distance between path and moves, in mm.
     pub tolerance: f64,
-    /// Bound of the distance between chord and moves, in mm: so much of the tolerance is used.
+    /// Bound of the distance between chord and moves, in mm: this part of the tolerance is used.
     pub used: f64,
-    /// The greatest angle between the chord and its curve at their common ends, in rad; None for a line.
+    /// The greatest angle between chord and curve at their common ends, in rad; None for a line.
     pub end_angle: Option<f64>,
 }
 
 impl Chord {
-    /// The rest of the tolerance, for the fit.
+    /// The part of the tolerance that is left to the fit, in mm.
     pub fn rest(&self) -> f64 {
         (self.tolerance - self.used).max(LEFT_TO_FIT * self.tolerance)
     }
@@ -40,17 +40,17 @@ impl Chord {
     }
 }
 
-/// Chords from point to point; there is one point more than chords.
+/// Chords from point to point; there is one more point than chords.
 pub struct Chords<const M: usize> {
     pub points: Vec<[f64; M]>,
     pub chords: Vec<Chord>,
-    /// The first move, and the least feed, of moves too short for a chord before the first chord.
+    /// Moves before the first chord that are too short for a chord: the first of them, and their least feed.
     skipped: Option<(u32, f64)>,
 }
 
 impl<const M: usize> Moves<'_, M> {
-    /// The chords of moves of which each starts where the one before ends. The tolerance of moves that ask for the exact
-    /// path is the exact tolerance.
+    /// The chords of consecutive moves, each of which starts where the one before ends. For moves that ask for the exact path the
+    /// exact tolerance is used.
     pub fn chords(&self, options: &PathOptions, range: Range<usize>) -> Result<Chords<M>, MoveError> {
         let start = vec![self.origin(range.start)];
         let mut out = Chords { points: start, chords: vec![], skipped: None };
@@ -95,7 +95,7 @@ impl<const M: usize> Moves<'_, M> {
 impl<const M: usize> Chords<M> {
     fn append_conic(&mut self, piece: &Conic<M>, limit: f64, depth: u32, chord: &Chord) {
         let [a, b, c] = &piece.control;
-        // The middle of the piece is the farthest from the chord.
+        // The middle of the piece is farthest from the chord.
         let off = Segment::new(a, c).distance_sq(b).sqrt() * piece.weight / (1.0 + piece.weight);
         if off <= limit || depth == 0 {
             let end_angle = angle(&sub(b, a), &sub(c, a)).max(angle(&sub(c, b), &sub(c, a)));
@@ -126,7 +126,7 @@ impl<const M: usize> Chords<M> {
         }
     }
 
-    /// Appends a chord, or gives its moves to its neighbour if it is too short.
+    /// Appends a chord; if it is too short, its moves are added to the neighbouring chord instead.
     fn push(&mut self, point: [f64; M], mut chord: Chord) {
         let length = norm(&sub(&point, &self.points[self.points.len() - 1]));
         if length > SAME_POINT * chord.tolerance {

@@ -5,8 +5,8 @@ use crate::path_piece::{PathPiece, Shape, Spline};
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 
-/// Consecutive pieces of a path that one task makes, with the pieces of splines that are not the program's: cut or bent
-/// at corners, or fitted.
+/// Consecutive pieces of a path that one parallel task makes. `made` has the pieces of splines that are not the program's: they
+/// are cut or bent at corners, or fitted.
 #[derive(Clone, Debug)]
 pub struct Chunk<const M: usize> {
     pub pieces: Vec<PathPiece<M>>,
@@ -20,13 +20,14 @@ impl<const M: usize> Default for Chunk<M> {
 }
 
 impl<const M: usize> Chunk<M> {
-    /// The control points of a spline of this chunk; `splines` are the program's. Its width is that of `spline`.
+    /// The control points of a spline of this chunk; `splines` are the program's. The width to use is that of `spline`, not that
+    /// of the returned piece.
     pub fn spline<'a>(&'a self, spline: &Spline<M>, splines: &'a CompositeCurve<M>) -> Piece<'a, M> {
         let source = if spline.made { &self.made } else { splines };
         source.piece(spline.index as usize)
     }
 
-    /// Appends a polynomial piece that is `like` another one in all but its shape.
+    /// Appends a polynomial piece with the properties of `like` except its shape.
     pub fn push(&mut self, control: &[[f64; M]], width: f64, like: PathPiece<M>) {
         if let [start, end] = *control {
             self.pieces.push(PathPiece { shape: Shape::Conic(Conic::line(start, end)), ..like });

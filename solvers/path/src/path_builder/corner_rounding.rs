@@ -1,13 +1,13 @@
 //! Rounds the corners of a path within the tolerance: each blend replaces the ends of the pieces on both sides of it.
 //!
-//! A corner is a place between two pieces that do not meet smoothly, a halt, or an end of the path. Span k is the pieces
-//! between corner k and corner k + 1; its stations are sums of widths. All is done for many corners in parallel and joined
-//! in order, so the path does not depend on the number of threads:
+//! A corner is a place between two pieces that do not meet smoothly, a halt, or an end of the path. Span k consists of the pieces
+//! between corner k and corner k + 1; its stations are sums of widths. Each step is done for many corners in parallel, with the
+//! results in order, so the path does not depend on the number of threads:
 //!
-//! 1. the greatest length that the blend of each corner can use, by feed, accelerations and tolerance;
+//! 1. the greatest length that the blend of each corner can use, from feed, accelerations and tolerance;
 //! 2. the lengths of blends that share the spans between them (`share_lengths`);
-//! 3. shorter lengths, until the deviation of each blend is within the tolerance;
-//! 4. the path: blends, and the rest of the spans between them. A corner without a blend is a stop, unless the machine
+//! 3. shorter lengths where needed, until the deviation of each blend is within the tolerance;
+//! 4. the path: blends, and the rest of the spans between them. The tool stops at a corner without a blend, unless the machine
 //!    allows a velocity jump.
 
 use rayon::prelude::*;
@@ -20,21 +20,21 @@ use crate::tolerance;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
-/// Corners and spans of a task at most.
+/// The greatest number of corners or spans in a task.
 const TASK: usize = 1024;
 
 /// Where one span ends and the next begins.
 struct Corner<const M: usize> {
     /// The first piece after it.
     at: usize,
-    /// None at a halt, in a cusp, at the ends of the path and where there is no tangent: these are stops.
+    /// None at a halt, in a cusp, at the ends of the path and where there is no tangent: the tool stops there.
     jump: Option<TangentJump<M>>,
 }
 
 /// The pieces of a path with their corners still sharp.
 struct CornerRounding<'a, const M: usize> {
     pieces: &'a [PathPiece<M>],
-    /// The program's.
+    /// The splines of the program.
     splines: &'a CompositeCurve<M>,
     corners: Vec<Corner<M>>,
     /// The station of each piece in its span.
@@ -44,10 +44,10 @@ struct CornerRounding<'a, const M: usize> {
     rounding: Rounding,
 }
 
-/// The stations where a blend begins in the span before the corner and ends in the span after it.
+/// The station where a blend begins in the span before the corner, and the one where it ends in the span after it.
 type Cuts = [f64; 2];
 
-/// The pieces with rounded corners, and the first piece of each run, with the number of pieces at the end.
+/// The pieces with rounded corners, and the index of the first piece of each run followed by the number of pieces.
 pub fn round_corners<const M: usize>(
     pieces: &[PathPiece<M>],
     splines: &CompositeCurve<M>,
@@ -127,8 +127,8 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         (before.iter().rev(), after.iter())
     }
 
-    /// The length of the blend of corner `k` that the feed passes, or the longest one that the tolerance allows on both
-    /// sides; 0 where the corner is not rounded.
+    /// The greatest length that the blend of corner `k` can use, in mm: a longer one would not be faster at the feed, or would
+    /// exceed the tolerance or a side. 0 where the corner is not rounded.
     fn wanted_length(&self, k: usize, axes: &Axes<M>) -> f64 {
         let Some(jump) = &self.corners[k].jump else { return 0.0 };
         let at = self.corners[k].at;
@@ -147,7 +147,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
                 &axes.max_acceleration,
             )
             .max(tolerance::SHORTEST_BLEND * before.tolerance.min(after.tolerance));
-        // A circle needs one line on each side; other pieces are bent.
+        // A circle needs a single line on each side; other pieces are bent.
         let lines = [before, after].map(|side| side.shape.conic().filter(|conic| conic.is_line()));
         let mut rounding = Rounding::Parabola;
         if let (Rounding::Circle, [Some(first), Some(second)]) = (self.rounding, lines) {
@@ -167,14 +167,14 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         }
     }
 
-    /// The piece of span `k` at a station.
+    /// The piece of span `k` that contains a station.
     fn piece_at(&self, k: usize, station: f64) -> usize {
         let (start, end) = (self.corners[k].at, self.corners[k + 1].at);
         start + self.station[start..end].partition_point(|&other| other <= station).max(1) - 1
     }
 
-    /// A cut at a station of span `k`, moved to the end of a piece that is next to it, so that no sliver is left. Two
-    /// blends that touch there move it alike, and each keeps its side.
+    /// A cut at a station of span `k`, moved to the end of a piece if that is so near that a sliver would be left. Two blends
+    /// that touch there move their common cut alike, and each keeps its side.
     fn snapped(&self, k: usize, station: f64) -> f64 {
         let i = self.piece_at(k, station);
         let (from, to) = (self.station[i], self.end_station(k, i));
@@ -189,8 +189,8 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         }
     }
 
-    /// Appends span `k` between two stations. Pieces of splines that are cut, and all those that are to be `bent`, become
-    /// pieces of `made`.
+    /// Appends span `k` between two stations. Spline pieces that are cut are copied to `made`; if `bent`, all spline pieces are,
+    /// since they will be bent.
     fn append_span(
         &self,
         k: usize,
@@ -219,7 +219,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         }
     }
 
-    /// Sets `sides` to the pieces on both sides of corner `k` between its cuts.
+    /// Fills `sides` with the pieces on both sides of corner `k` between its cuts.
     fn cut_sides(&self, k: usize, [begin, end]: Cuts, sides: &mut Sides<M>) {
         let Sides { before, after, made } = sides;
         before.clear();
@@ -249,7 +249,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
             if excess <= 1.0 + tolerance::EXCESS {
                 return Some(cuts);
             }
-            // The deviation is in proportion to the length on lines, but not on curved sides.
+            // The deviation is proportional to the length on lines, but not on curved sides.
             let shorter = (1.0 - tolerance::SHORTER) / excess;
             (before, after) = (shorter * before, shorter * after);
             if jump.vanishes(after) {
@@ -259,7 +259,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         None
     }
 
-    /// Blends and the rest of the spans between them, in order, and the first piece of each run.
+    /// Joins the blends and the rest of the spans between them, in order. Returns the chunks and the first piece of each run.
     fn assemble(&self, cuts: &[Option<Cuts>], jump: bool, watch: Watch) -> (Vec<Chunk<M>>, Vec<usize>) {
         let count = self.length.len();
         let tasks: Vec<(Chunk<M>, Vec<usize>)> = (0..count.div_ceil(TASK))
@@ -307,8 +307,8 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
     }
 }
 
-/// The length of a blend, at most `wanted`, that one side of a corner allows by its own length and by what its pieces
-/// have left of their tolerance.
+/// The length of a blend, at most `wanted`, that one side of a corner allows: by its own length, and by the part of the tolerance
+/// that its pieces have left.
 fn allowed_length<'a, const M: usize>(
     side: impl Iterator<Item = &'a PathPiece<M>>,
     jump: &TangentJump<M>,

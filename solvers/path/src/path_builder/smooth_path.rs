@@ -1,14 +1,15 @@
-//! The path of a program as one C4 curve within the tolerance between two stops (`smooth_fit`).
+//! Builds the path of a program as one C4 curve within the tolerance between any two stops (`smooth_fit`).
 //!
 //! The tool stops where
 //!
 //! * the program halts,
-//! * moves that ask for the exact path meet others,
-//! * a rapid meets a feed that is next to rest, and
-//! * the path turns back; along the line that it came on it rests within a run, if nothing else asks for a stop.
+//! * moves that ask for the exact path meet others that do not,
+//! * a rapid meets a feed so low that it counts as rest, and
+//! * the path turns back. If it goes back along the line on which it came and nothing else asks for a stop, it rests there within
+//!   a run.
 //!
-//! Lines that ask for the exact path stay lines, and stop at their corners. Arcs and splines that ask for it, with the
-//! lines that touch them, are followed within the exact tolerance.
+//! Lines that ask for the exact path stay lines, with stops at their corners. Arcs and splines that ask for it, and the lines
+//! that touch them, are followed within the exact tolerance.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -29,7 +30,7 @@ use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// Runs of a section are fitted beside each other in parts of this many chords or more.
+/// The runs of a section are fitted in parallel, in parts of at least this many chords.
 const LEAST_PART: usize = 1000;
 
 /// A part of the path between two stops of the program.
@@ -43,23 +44,23 @@ struct Section<const M: usize> {
     offsets: Offsets,
 }
 
-/// A motion along a path of the same program, to which a smooth path is fitted.
+/// A motion along an earlier path of the same program, to which a smooth path is fitted.
 pub struct Motion<const M: usize> {
     /// First and last move of each run of that path.
     pub runs: Vec<[usize; 2]>,
-    /// The number of places before each run, and of all places.
+    /// The number of places before each run; the last entry is the number of all places.
     pub start: Vec<usize>,
     /// Places as fractions of their run, ascending, and the square of the speed there, in mm²/s².
     pub place: Vec<f64>,
     pub speed_sq: Vec<f64>,
-    /// There, the second and third derivatives that the path should have.
+    /// The second and third derivatives that the path should have at each place.
     pub aim: Vec<[[f64; M]; 2]>,
-    /// Of each axis, in mm/s³; infinite where there is no limit.
+    /// The jerk limit of each axis in mm/s³; infinite where there is none.
     pub max_jerk: [f64; M],
 }
 
 impl<const M: usize> Motion<M> {
-    /// The moments of a run of chords, with the numbers of the axes that move.
+    /// The moments along a run of chords; `moving` has the numbers of the axes that move.
     fn along<const D: usize>(&self, chords: &[Chord], station: &[f64], moving: &[usize]) -> Vec<Moment<D>> {
         let (first, last) = (chords[0].first as usize, chords[chords.len() - 1].last as usize);
         let begin = self.runs.partition_point(|run| run[1] < first);
@@ -80,8 +81,8 @@ impl<const M: usize> Motion<M> {
     }
 }
 
-/// The smooth path of a program. Without a motion it is that of the program alone, and bends keep their size. With one it
-/// is fitted to the speed of the motion, and bends are cut as far as the tolerance allows.
+/// The smooth path of a program. Without a motion it depends on the program only, and bends keep their size. With one it is
+/// fitted to the speed of the motion, and bends are cut as far as the tolerance allows.
 pub fn build_smooth_path<const M: usize>(
     moves: &Moves<M>,
     options: &PathOptions,
@@ -119,7 +120,7 @@ pub fn build_smooth_path<const M: usize>(
     Ok(BuiltPath { offsets: Some(offsets), not_smooth, ..path })
 }
 
-/// The moves between places where the path stops whatever its shape. Rapids and feeds below `crawl` (mm/s) meet in a stop.
+/// Ranges of moves between the places where any smooth path stops, also where a rapid meets a feed below `crawl` (mm/s).
 fn sections<const M: usize>(moves: &Moves<M>, crawl: f64) -> Vec<Range<usize>> {
     let is_rapid = |i: usize| moves.kind[i] == RAPID;
     let crawls = |i: usize| !is_rapid(i) && moves.feed[i] < crawl;
@@ -139,7 +140,7 @@ fn sections<const M: usize>(moves: &Moves<M>, crawl: f64) -> Vec<Range<usize>> {
     sections
 }
 
-/// Whether the path goes back along its own line from one piece to the next, and nothing else asks for a stop.
+/// Whether the path goes back along its own line after a piece, and nothing else asks for a stop.
 fn goes_back<const M: usize>(moves: &Moves<M>, before: &PathPiece<M>, after: &PathPiece<M>) -> bool {
     let (last, first) = (before.last as usize, after.first as usize);
     let halts = (last..first).any(|i| moves.halt[i]);
@@ -153,14 +154,14 @@ fn goes_back<const M: usize>(moves: &Moves<M>, before: &PathPiece<M>, after: &Pa
 struct Rules<'a, const M: usize> {
     exact: bool,
     travel: [[f64; 2]; M],
-    /// Longer chords are straight in the middle, in mm.
+    /// Chords longer than this, in mm, are straight in the middle.
     long: f64,
     max_acceleration: [f64; M],
     motion: Option<&'a Motion<M>>,
 }
 
 impl<const M: usize> Section<M> {
-    /// The path of the moves of a section, in parts of one run or more.
+    /// The path of a section of moves, in parts of one or more runs.
     fn parts(
         moves: &Moves<M>,
         options: &PathOptions,
@@ -191,7 +192,7 @@ impl<const M: usize> Section<M> {
         let part = |(mut first, ends): (usize, &[usize])| {
             let mut part = Self::default();
             for &end in ends {
-                // Other moves than exact ones stop where they turn back.
+                // At this end the path turns back; exact moves are not reported.
                 if end < count && !exact {
                     part.not_smooth.reversals.push(chords.chords[end - 1].last);
                 }
@@ -228,7 +229,7 @@ impl<const M: usize> Section<M> {
         }
     }
 
-    /// Appends a run in which at most D axes move; the others have no part in the fit.
+    /// Appends a run in which at most D axes move; the fit does not see the other axes.
     fn append_curve<const D: usize>(
         &mut self,
         chords: &Chords<M>,
@@ -253,7 +254,7 @@ impl<const M: usize> Section<M> {
         let differ = |a: &Chord, b: &Chord| a.feed != b.feed || a.tolerance != b.tolerance;
         let cut: Vec<bool> =
             (0..=own.len()).map(|i| i > 0 && i < own.len() && differ(&own[i - 1], &own[i])).collect();
-        // The travel is checked again with twice this slack.
+        // The check of the path against the travel allows twice this slack.
         let slack = 0.5 * tolerance::TRAVEL;
         let bounds = |k: usize| match moving.get(k) {
             Some(&axis) => [travel[axis][0] - slack, travel[axis][1] + slack],
@@ -286,12 +287,12 @@ impl<const M: usize> Section<M> {
     }
 }
 
-/// The values of the axes that move, at most D; `rest` beyond them.
+/// The values of the axes that move, at most D; further components are `rest`.
 fn narrow<const M: usize, const D: usize>(values: &[f64; M], moving: &[usize], rest: f64) -> [f64; D] {
     std::array::from_fn(|k| moving.get(k).map_or(rest, |&axis| values[axis]))
 }
 
-/// All of a piece but its shape: it goes along some chords, at most `deviation` from them, in mm.
+/// A piece along some chords, at most `deviation` from them, in mm; its shape is still to be set.
 fn piece_along<const M: usize>(chords: &[Chord], deviation: f64, exact: bool) -> PathPiece<M> {
     let (first, last) = (&chords[0], &chords[chords.len() - 1]);
     let used = chords.iter().map(|chord| chord.used).fold(0.0, f64::max);
@@ -312,12 +313,12 @@ impl<const M: usize> Chords<M> {
         sub(&self.points[i + 1], &self.points[i])
     }
 
-    /// The angle by which the chords turn at point `i`, in rad.
+    /// The angle by which the polygon of the chords turns at point `i`, in rad.
     fn turn(&self, i: usize) -> f64 {
         angle(&self.vector(i - 1), &self.vector(i))
     }
 
-    /// Whether exact moves go on at point `i` without a stop: both lie on one line, or a curve touches its neighbour.
+    /// Whether exact moves continue at point `i` without a stop: two chords lie on one line, or a curve touches its neighbour.
     fn meet(&self, i: usize) -> bool {
         let (before, after) = (&self.chords[i - 1], &self.chords[i]);
         if before.is_line() && after.is_line() {

@@ -1,4 +1,4 @@
-//! The first place of a program and its path that an axis cannot reach, from the travel of the axes.
+//! Finds the first place of a program and its path that is outside the travel of an axis.
 
 use rayon::prelude::*;
 
@@ -8,10 +8,10 @@ use crate::path_piece::Shape;
 use crate::tolerance::TRAVEL;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 
-/// Halvings of a spline piece at most; each brings the control polygon four times nearer to the curve.
+/// The greatest number of halvings of a spline piece; each one brings the control polygon four times nearer to the curve.
 const DEPTH: u32 = 26;
 
-/// A position that an axis cannot reach: the move, the axis and the position in mm.
+/// A position outside the travel: the move, the axis and the position in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside {
     pub index: usize,
@@ -19,8 +19,8 @@ pub struct Outside {
     pub position: f64,
 }
 
-/// The first position outside the travel, on the moves as programmed and on the path. A piece of an arc may be outside by
-/// its deviation, for the arc itself is checked.
+/// The first position outside the travel, on the moves as programmed and on the path. A piece of an arc may be outside by its
+/// deviation, because the arc itself is checked.
 pub fn outside<const M: usize>(
     chunks: &[Chunk<M>],
     moves: &Moves<M>,
@@ -62,8 +62,8 @@ pub fn outside<const M: usize>(
     [targets, arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
 }
 
-/// A position of an axis on a piece outside of two limits. The control points enclose the piece. If some of them are
-/// beyond and both ends are not, the halves are examined.
+/// A position of an axis on a piece outside two limits; None if there is none. The control points enclose the piece. If some of
+/// them are outside and both ends are not, the halves are examined, `depth` times at most.
 fn position_outside<const M: usize>(
     piece: &Piece<M>,
     axis: usize,
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn a_polygon_beyond_the_limit_is_halved_until_the_curve_is_known() {
-        // The polygons reach 2, the parabola 1 of it and the conic w/(1 + w) of it.
+        // The control polygons reach 2; of that the parabola reaches 1 and the conic w/(1 + w).
         let mut curve = CompositeCurve::<1>::default();
         curve.push(&[[0.0], [2.0], [0.0]], &[], 1.0);
         let parabola = curve.clone();

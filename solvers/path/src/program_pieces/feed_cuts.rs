@@ -1,7 +1,7 @@
 //! Cuts a fitted piece at the points where the feed changes, so that each part has one feed.
 //!
-//! The feed of a part is the least of the chords that it covers: those of which some point has its nearest point of the
-//! curve there. In a zigzag below the tolerance a chord can be covered by several parts, out of order.
+//! The feed of a part is the least feed of the chords that it covers. A part covers a chord if the nearest place of the curve to
+//! some point of the chord is in the part. In a zigzag below the tolerance a chord can be covered by several parts, in any order.
 
 use crate::fit::FittedPiece;
 use crate::tolerance::SLIVER;
@@ -22,8 +22,8 @@ pub fn cut_at_feeds<const M: usize>(
     }
     let width = piece.width;
     let inner: Vec<f64> = (first + 1..=last).map(|k| nearest(&piece, &points[k])).collect();
-    // For each chord: the greatest parameter nearest to a point of it or of a chord before, and the least one nearest to a
-    // point of it or of a chord after.
+    // For each chord: the greatest parameter nearest to a point of it or of an earlier chord, and the least parameter nearest to
+    // a point of it or of a later chord.
     let (mut reached, mut left) = (inner.clone(), inner.clone());
     reached.push(width);
     left.insert(0, 0.0);
@@ -33,7 +33,7 @@ pub fn cut_at_feeds<const M: usize>(
     for i in (1..left.len()).rev() {
         left[i - 1] = left[i - 1].min(left[i]);
     }
-    // Each chord is covered by some part, even if all of it is nearest to a cut or an end.
+    // Every chord is covered by some part, even if all its points are nearest to a cut or an end.
     let mut next = first;
     let mut part = |begin: f64, end: f64| {
         let from = next.min(first + reached.partition_point(|&u| u <= begin));
@@ -53,8 +53,8 @@ pub fn cut_at_feeds<const M: usize>(
     part(begin, width);
 }
 
-/// The parameter at which a piece is nearest to a point: by bisection of the derivative of the distance, around the best of
-/// a few samples.
+/// The parameter at which a piece is nearest to a point: around the best of a few samples, by bisection of the derivative of the
+/// distance.
 fn nearest<const M: usize>(piece: &Quadratic<M>, point: &[f64; M]) -> f64 {
     const SAMPLES: usize = 8;
     let (start, end) = piece.end_tangents();
@@ -113,7 +113,7 @@ mod tests {
         let points = [[0.0, 0.0], [6.0, 0.1], [5.0, 0.2], [5.5, 0.1], [10.0, 0.0]];
         let feed = [3.0, 3.0, 8.0, 8.0];
         assert_eq!(parts(&points, &feed), [(0.0, 5.0, 0, 0, 3.0), (5.0, 10.0, 0, 3, 3.0)]);
-        // The cut at 5.5 lies within the chords around the point at 5.0 and within the one that comes back.
+        // The cut at 5.5 lies within the first chord, from 0 to 6, and within the second one, which comes back from 6 to 5.
         let feed = [3.0, 3.0, 3.0, 8.0];
         assert_eq!(parts(&points, &feed), [(0.0, 5.5, 0, 2, 3.0), (5.5, 10.0, 0, 3, 3.0)]);
     }

@@ -1,47 +1,47 @@
-//! Cholesky factor L D Lᵀ of the matrix of the fit: symmetric, positive definite, in blocks of D unknowns, of which each
-//! meets its five neighbours on either side.
+//! Cholesky factor L D Lᵀ of the matrix of the fit. The matrix is symmetric and positive definite, in blocks of D unknowns (one
+//! coefficient); each block is coupled to five neighbours on either side.
 //!
-//! Four rows, a tile, are factored together, so that each row below them is read and written once for the four. All rows of
-//! a tile begin at its first column: vectors of different rows hold the same columns, and what lies before the diagonal does
-//! not count.
+//! Four rows, a tile, are factored together, so that each row below them is read and written once for all four. All rows of a
+//! tile are stored from its first column on, so that equal vectors of its rows hold the same columns; the entries before the
+//! diagonal are not used.
 
 use fearless_simd::Simd;
 use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
 
 use super::spline::ORDER;
 
-/// Added to the diagonal, in parts of it: what rounding may take from it.
+/// Added to the diagonal, in parts of it, against the loss by rounding.
 const REGULAR: f64 = 1e-13;
-/// An unknown whose pivot is below this part of its diagonal stays where it is.
+/// An unknown whose pivot is below this part of its diagonal entry does not move.
 const LEAST_PIVOT: f64 = 1e-15;
 
-/// A row from the first column of its tile on: for D of 2 or more these are the columns of all rows of the tile.
+/// The entries of a row from the first column of its tile on: 8 D columns are enough for all rows of a tile if D ≥ 2.
 type Row<const D: usize> = [[Lanes; D]; 2];
 
 #[derive(Default)]
 pub struct Band<const D: usize> {
-    /// Entries (k, m), k ≤ m, of the symmetric blocks (i, i + b) by b, k and m, those of four i side by side: sums over
-    /// intervals side by side go to places side by side.
+    /// Entries (k, m), k ≤ m, of the symmetric blocks (i, i + b), by i / 4, b, k and m; the lanes hold four consecutive i, so
+    /// that the sums of four consecutive intervals are added as vectors.
     pub blocks: Vec<[[[Lanes; D]; D]; ORDER]>,
-    /// The rows of the matrix, then those of Lᵀ without its diagonal; after the last there are zeros.
+    /// The rows of the matrix; after factoring, those of Lᵀ without its diagonal. Rows of zeros follow the last.
     rows: Vec<Row<D>>,
-    /// 1/D, by tile.
+    /// 1/pivot of each row, by tile.
     inverse: Vec<Lanes>,
 }
 
 impl<const D: usize> Band<D> {
     const WIDTH: usize = ORDER * D;
-    /// The vectors of a row.
+    /// The number of vectors of a row.
     const VECTORS: usize = 2 * D;
 
-    /// A matrix of zeros for four blocks a vector.
+    /// Sets the matrix to zeros: `vectors` × four rows of blocks.
     pub fn clear(&mut self, vectors: usize) {
         self.blocks.clear();
         self.blocks.resize(vectors, [[[Lanes::ZERO; D]; D]; ORDER]);
     }
 
-    /// Writes the rows, `fixed` unknowns taken out: their rows and columns become those of the unit matrix. In place of
-    /// 1/D stands the pivot below which an unknown stays.
+    /// Writes the rows. The rows and columns of `fixed` unknowns become those of the unit matrix. `inverse` gets the pivot below
+    /// which an unknown does not move.
     #[inline(always)]
     fn write(&mut self, fixed: &[bool]) {
         let count = fixed.len();
@@ -78,14 +78,14 @@ impl<const D: usize> Band<D> {
         }
     }
 
-    /// Factors the matrix without `fixed` unknowns.
+    /// Factors the matrix, in which `fixed` unknowns do not move.
     #[inline(always)]
     pub fn factor<S: Simd>(&mut self, simd: S, fixed: &[bool]) {
         self.write(fixed);
         for (tile, inverse) in self.inverse.iter_mut().enumerate() {
             let (own, below) =
                 self.rows[tile * LANES..].split_first_chunk_mut::<LANES>().expect("zeros after the last");
-            // The rows before they are divided by their pivots.
+            // The rows of the tile before the division by their pivots.
             let mut whole = [[[Register::all(simd, 0.0); D]; 2]; LANES];
             for p in 0..LANES {
                 let first = *own[p][0][0].values();
@@ -106,7 +106,7 @@ impl<const D: usize> Band<D> {
                     own[p][0][0].values_mut()[lane] = 0.0;
                 }
             }
-            // The vectors of a row below that lies so many vectors farther are the last ones of these.
+            // The first vector of a row that lies `from` tiles below holds the same columns as vector `from` of these rows.
             for (i, row) in (LANES..Self::WIDTH + LANES - 1).zip(below) {
                 let (from, lane) = (i / LANES, i % LANES);
                 let mut parts = [0.0; LANES];
@@ -124,7 +124,7 @@ impl<const D: usize> Band<D> {
         }
     }
 
-    /// Solves in place; x is made longer by zeros.
+    /// Solves in place; x is extended by zeros.
     #[inline(always)]
     pub fn solve<S: Simd>(&self, simd: S, x: &mut Vec<Lanes>) {
         let tiles = self.inverse.len();
@@ -143,7 +143,7 @@ impl<const D: usize> Band<D> {
             let rows = &self.rows[tile * LANES..(tile + 1) * LANES];
             let (own, rest) = x[tile..tile + Self::VECTORS].split_at_mut(1);
             let own = own[0].values_mut();
-            // First what later tiles take from all rows of this one.
+            // First the contribution of the unknowns of later tiles to all rows of this one.
             let mut sums = [0.0; LANES];
             for p in 0..LANES {
                 let mut sum = Register::all(simd, 0.0);
@@ -186,7 +186,7 @@ mod tests {
         for i in 0..2 * count {
             x[i / LANES].values_mut()[i % LANES] = given(i);
         }
-        // What was left by a matrix of more rows does not count.
+        // The factor of a greater matrix leaves nothing behind.
         for count in [20, count] {
             band.clear(count.div_ceil(LANES));
             for b in 0..ORDER {

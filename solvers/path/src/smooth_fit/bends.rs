@@ -1,61 +1,61 @@
-//! Bends keep their size: vertices away from corners pull the curve to them.
+//! The weights with which the vertices of bends, away from corners, pull the curve to them, so that bends keep their size.
 //!
-//! The least energy alone moves every bend towards its centre by the whole tolerance, so that holes and bosses come out
-//! too small. Therefore the vertices V_i of bends add a term to it,
+//! With the least energy alone, the curve would move every bend towards its centre by the whole tolerance, and holes and bosses
+//! would come out too small. Therefore the vertices V_i of bends add a term to the energy:
 //!
 //! ```text
 //! ∫ |C'''|² du + Σ (l_i / λ⁶) |C(u_i) − V_i|²
 //! ```
 //!
-//! where l_i is the length of the chords at V_i, and λ the length over which the effect of a vertex fades: noise of a wave
-//! shorter than about 2πλ is smoothed out, on a circle of radius r the curve is off by −λ⁶/r⁵, and where a bend begins or
-//! ends by about λ³/r², which fades as exp(−u/2λ).
+//! Here l_i is the mean length of the chords at V_i, and λ the length over which the effect of a vertex fades. Noise with a
+//! wavelength below about 2πλ is smoothed out. On a circle of radius r the curve is off by −λ⁶/r⁵; where a bend begins or ends it
+//! is off by about λ³/r², which fades as exp(−u/2λ).
 //!
-//! Vertices of arcs and splines have no noise: there λ is a part of the chord, and the curve is nearly the best
-//! approximation. λ is not a part of the interval, because intervals near a corner are shorter: the weights would fall by a
-//! factor of four from one to the next, and the effect of the corner on the curve would alternate over many of them.
+//! Vertices of arcs and splines have no noise: there λ is a fixed part of the chord, and the curve is nearly the best
+//! approximation. λ is not a fixed part of the interval, because intervals get shorter towards a corner: the weights would change
+//! by a factor of four from one interval to the next, and the effect of the corner on the curve would alternate over many of
+//! them.
 //!
-//! Points of a program may have noise; with intervals h = √(6 ε r) the end of a bend leaves no more than OFF ε if
+//! Points of a program may have noise. With intervals h = √(6 ε r), the curve is off by at most OFF ε at the end of a bend if
 //!
 //! ```text
 //! λ = h (OFF h / 36 ε)^(1/3)
 //! ```
 //!
-//! At corners and near them nothing is added, so that the curve may use the tolerance on one side.
+//! Corners and the vertices near them have no such term, so that the curve may use the tolerance on one side.
 
 use super::bezier::{point_and_slope, Control};
 use super::polyline::{angle, Hold, Polyline};
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// A vertex at which the polyline turns by more, in rad, is a corner,
+/// A vertex is a corner if the polyline turns by more than this angle, in rad,
 const CORNER: f64 = std::f64::consts::FRAC_PI_6;
-/// if it does so between the places this far from it on both sides, in tolerances. An arc of a radius below about four
-/// tolerances so is a corner, and noise far below the tolerance is not.
+/// between the places at this distance before and after it, in tolerances. So an arc with a radius below about four tolerances is
+/// a corner, and noise far below the tolerance is not.
 const VIEW: f64 = 2.0;
-/// The curve leaves the polyline this far before a corner, in tolerances over the angle in rad.
+/// The curve leaves the polyline at this distance from a corner, in tolerances divided by the angle in rad.
 const REACH: f64 = 10.0;
-/// λ of arcs and splines, in chords, of which an interval on a circle has six,
+/// λ at vertices of arcs and splines, in chords; an interval on a circle has about six chords.
 const EXACT: f64 = 0.18;
-/// and the least, in intervals.
+/// The least λ there, in intervals.
 const LEAST_EXACT: f64 = 0.03;
-/// Of points, by how much the curve may be off at the ends of bends, in tolerances,
+/// At points of a program: the error of the curve at the ends of bends that sets λ, in tolerances.
 const OFF: f64 = 0.2;
-/// the least λ, in intervals,
+/// The least λ there, in intervals.
 const LEAST: f64 = 0.1;
-/// and the number of vertices in an interval below which λ is smaller, since the mean of a few vertices smooths little.
+/// If an interval has fewer vertices than this, λ is smaller, since the mean of a few vertices smooths little.
 const FEW: f64 = 2.0;
-/// The greatest λ of all vertices, in intervals.
+/// The greatest λ at all vertices, in intervals.
 const MOST: f64 = 0.6;
-/// An interval shorter than a chord at a vertex is halved if the curve in it is farther from the vertex than this, in
-/// tolerances.
+/// An interval shorter than a chord at one of its vertices is halved if it is farther from that vertex than this, in tolerances.
 const MISS: f64 = 0.1;
 
 impl Hold {
-    /// l/λ⁶ in mm⁻⁵ of a vertex between two chords, in an interval of length h. At the end of an arc next to a long line the
-    /// shorter chord counts, because the line has no other vertices.
+    /// l/λ⁶ in mm⁻⁵ at a vertex between two chords, in an interval of length h. At vertices of arcs and splines l is the shorter
+    /// chord, because a long line next to an arc has no further vertices.
     pub fn weight(self, chords: [f64; 2], h: f64, tolerance: f64) -> f64 {
-        // Both λ are in parts of h.
+        // λ in parts of h.
         let (length, lambda) = match self {
             Self::Free => return 0.0,
             Self::Exact => {
@@ -72,7 +72,8 @@ impl Hold {
     }
 }
 
-/// The intervals that are too long to pass near the vertices of bends in them; `foot` are the vertices' foot points.
+/// For each interval, whether it is too long to pass near the vertices of bends in it; `foot` has the foot points of all
+/// vertices.
 pub fn missed<const D: usize>(
     line: &Polyline<D>,
     knots: &[f64],
@@ -97,12 +98,13 @@ pub fn missed<const D: usize>(
 }
 
 impl<const D: usize> Polyline<D> {
-    /// Finds the vertices of bends. Chords longer than `long` are lines, and a lone vertex between two of them is a corner;
-    /// `curved` tells which chords stand for arcs or splines.
+    /// Finds the vertices of bends and sets `hold` for them. Chords longer than `long` are lines, and a vertex between two of
+    /// them is a corner if the polyline does not bend on at their other ends. `curved` tells which chords stand for arcs or
+    /// splines.
     pub fn hold_bends(&mut self, long: f64, curved: impl Fn(usize) -> bool, watch: Watch) {
         let last = self.chords();
         let turn = self.turns_in_view(watch);
-        // Vertices within the reach of a corner are free; where several vertices are one corner, the sharpest counts.
+        // Vertices within REACH of a corner are free. Where several vertices make up one corner, the sharpest one sets the reach.
         let mut free = vec![false; last + 1];
         let reach = |i: usize| {
             let sharpest = turn[i] >= turn[i - 1].max(turn[i + 1]);
@@ -130,7 +132,7 @@ impl<const D: usize> Polyline<D> {
         }
     }
 
-    /// The turn at every vertex between the places VIEW tolerances before and after it, in rad; 0 at the ends.
+    /// The angle at every vertex between the places VIEW tolerances before and after it, in rad; 0 at the ends.
     fn turns_in_view(&self, watch: Watch) -> Vec<f64> {
         let last = self.chords();
         let mut turns = vec![0.0; last + 1];
@@ -140,7 +142,7 @@ impl<const D: usize> Polyline<D> {
             let view = VIEW * self.tolerance_at(i);
             let (low, high) =
                 ((self.station[i] - view).max(0.0), (self.station[i] + view).min(self.length()));
-            // Where tolerances change, the places may move back.
+            // Where the tolerance changes, the places may move back.
             while a > 0 && self.station[a] > low {
                 a -= 1;
             }
@@ -160,7 +162,7 @@ impl<const D: usize> Polyline<D> {
         turns
     }
 
-    /// Whether vertex i lies between two long chords, at whose other ends the polyline does not bend in the same sense.
+    /// Whether vertex i lies between two long chords, at whose other ends the polyline does not bend in the same direction.
     fn is_lone(&self, i: usize, long: f64) -> bool {
         if self.chord_length(i - 1) <= long || self.chord_length(i) <= long {
             return false;
@@ -195,7 +197,8 @@ mod tests {
         assert!(
             all[0] == Hold::Free && all[30] == Hold::Free && all[1..30].iter().all(|h| *h == Hold::Point)
         );
-        // Of the radius of a tolerance: a corner. Of 29 degrees a vertex: a bend; of 31: corners.
+        // An arc whose radius is the tolerance is a corner. On a larger one, 29 degrees a vertex is a bend, 31 degrees are
+        // corners.
         assert!(held(circle(0.1, 0.1, 30), 0.1).iter().all(|h| *h == Hold::Free));
         assert!(held(circle(20.0, 0.506, 6), 0.1)[1..6].iter().all(|h| *h == Hold::Point));
         assert!(held(circle(20.0, 0.541, 6), 0.1).iter().all(|h| *h == Hold::Free));
@@ -203,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_corner_frees_as_much_on_both_sides_as_the_curve_needs_to_go_around() {
-        // A right angle at (10, 0) of points 0.1 apart: 10 · 0.1 / (π/2) = 0.64 is six of them on each side.
+        // A right angle at (10, 0), points 0.1 apart: the reach 10 · 0.1 / (π/2) = 0.64 covers six points on each side.
         let side = |i: usize| 0.1 * i as f64;
         let points =
             (0..=200).map(|i| if i <= 100 { [side(i), 0.0] } else { [10.0, side(i - 100)] }).collect();

@@ -1,4 +1,4 @@
-//! A quintic Bézier piece: points, parts, bounds of its distance from a chord and of its speed, by convex hulls.
+//! A quintic Bézier piece: its points, its parts, and bounds of its distance from a chord and of its speed by convex hulls.
 
 use super::polyline::Polyline;
 use super::spline::{DEGREE, ORDER};
@@ -21,7 +21,7 @@ pub fn split<const D: usize>(control: &Control<D>, t: f64) -> (Control<D>, Contr
     (left, right)
 }
 
-/// The point and its derivative at t, by t.
+/// The point and the first derivative with respect to t.
 pub fn point_and_slope<const D: usize>(control: &Control<D>, t: f64) -> ([f64; D], [f64; D]) {
     let mut c = *control;
     for level in 1..DEGREE {
@@ -33,7 +33,7 @@ pub fn point_and_slope<const D: usize>(control: &Control<D>, t: f64) -> ([f64; D
     (lerp(&c[0], &c[1], t), slope.map(|x| DEGREE as f64 * x))
 }
 
-/// The point and its first two derivatives at t, by t.
+/// The point and the first two derivatives with respect to t.
 pub fn derivatives<const D: usize>(control: &Control<D>, t: f64) -> [[f64; D]; 3] {
     let mut c = *control;
     for level in 1..DEGREE - 1 {
@@ -47,8 +47,9 @@ pub fn derivatives<const D: usize>(control: &Control<D>, t: f64) -> [[f64; D]; 3
     [lerp(&lerp(&c[0], &c[1], t), &lerp(&c[1], &c[2], t), t), slope, second]
 }
 
-/// An upper bound of the distance from a chord, refined until it is below `enough` by at most `depth` halvings. The distance
-/// from a segment is a convex function, so that no point is farther than the farthest control point.
+/// An upper bound of the distance of the piece from a chord, in mm. The piece is halved up to `depth` times while the bound is
+/// above `enough`. The distance from a segment is a convex function, so no point of a piece is farther away than its farthest
+/// control point.
 pub fn distance_bound<const D: usize>(
     control: &Control<D>,
     line: &Polyline<D>,
@@ -66,7 +67,8 @@ pub fn distance_bound<const D: usize>(
         .fold(0.0, |most, half| most.max(distance_bound(half, line, chord, enough, depth - 1)))
 }
 
-/// Whether the piece is within the bounds of the axes; where its control points are not, its halves are tested.
+/// Whether the piece is within the bounds of the axes; if its control points are not, its halves are tested, `depth` times at
+/// most.
 pub fn is_inside<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D], depth: u32) -> bool {
     let inside = |point: &[f64; D]| (0..D).all(|k| point[k] >= bounds[k][0] && point[k] <= bounds[k][1]);
     if control.iter().all(inside) {
@@ -79,8 +81,8 @@ pub fn is_inside<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D], d
     is_inside(&left, bounds, depth - 1) && is_inside(&right, bounds, depth - 1)
 }
 
-/// A lower bound of |C'|, refined until it is above `enough`: the least component of the derivative's control points along
-/// the line from end to end.
+/// A lower bound of |C'|, by halving until it is at least `enough`: the least component of the derivative's control points along
+/// the line from the start of a part to its end.
 pub fn speed_bound<const D: usize>(control: &Control<D>, width: f64, enough: f64, depth: u32) -> f64 {
     let way = sub(&control[DEGREE], &control[0]);
     let along = |pair: &[[f64; D]]| dot(&sub(&pair[1], &pair[0]), &way);
@@ -99,7 +101,7 @@ pub fn speed_bound<const D: usize>(control: &Control<D>, width: f64, enough: f64
 mod tests {
     use super::*;
 
-    /// A quintic that follows y = x² over x from 0 to 1 at the speed of x.
+    /// A quintic along y = x² for x from 0 to 1, with x as its parameter.
     const PARABOLA: Control<2> = [[0.0, 0.0], [0.2, 0.0], [0.4, 0.1], [0.6, 0.3], [0.8, 0.6], [1.0, 1.0]];
 
     #[test]
@@ -116,7 +118,7 @@ mod tests {
 
     #[test]
     fn bounds_are_valid_and_close_where_they_must_tell() {
-        // The farthest point from the chord y = x is that at 1/2, 0.25/√2 away; the slowest is the start.
+        // The point at 1/2 is farthest from the chord y = x, at 0.25/√2; the start is the slowest place.
         let line = Polyline::new(vec![[0.0, 0.0], [1.0, 1.0]], vec![1.0]);
         let exact = 0.25 / 2f64.sqrt();
         let close = distance_bound(&PARABOLA, &line, 0, 0.0, DEPTH);

@@ -1,10 +1,10 @@
 //! A proof that curve and polyline are within the tolerance of each other, both ways, and that the curve never stops.
 //!
-//! The curve is cut at foot points u*_i of the vertices V_i, in ascending order. From the curve to the polyline: the part
-//! between u*_i and u*_(i+1) is no farther from chord i than a bound of that distance. From the polyline to the curve: a
-//! point of chord i is the projection of a point of that part, or it lies between a vertex and the projection of C(u*_i) and
-//! is nearer to C(u*_i) than the vertex is. So no distance is above the greatest of these bounds and of |C(u*_i) − V_i|. The
-//! proof holds for any ascending places u*_i.
+//! The curve is cut at ascending places u*_i near the vertices V_i (foot points). From the curve to the polyline: a convex hull
+//! bounds the distance of the part between u*_i and u*_(i+1) from chord i. From the polyline to the curve: a point of chord i is
+//! either the projection of a point of that part, or it lies between a vertex and the projection of C(u*_i), and is then nearer
+//! to C(u*_i) than the vertex is. So no distance is above the greatest of these bounds and of |C(u*_i) − V_i|. The proof holds
+//! for any ascending places u*_i.
 
 use rayon::prelude::*;
 
@@ -14,11 +14,11 @@ use super::spline::ORDER;
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// The least |C'| of a curve that never stops; at a vertex that turns by 135° |C'| is about 0.38, at 177° 0.026.
+/// A curve with |C'| of at least this never stops. At a vertex that turns by 135° |C'| is about 0.38, at 177° 0.026.
 const LEAST_SPEED: f64 = 0.02;
-/// The greatest distance of a foot point from the station of its vertex, in tolerances,
+/// The greatest distance between a foot point and the station of its vertex, in tolerances,
 const SLIP: f64 = 4.0;
-/// and of a curve that is fitted to a motion.
+/// and the same for a curve that is fitted to a motion.
 const FITTED_SLIP: f64 = 15.0;
 const NEWTON_STEPS: usize = 5;
 /// The least number of intervals or vertices that a thread takes at a time.
@@ -28,14 +28,14 @@ const TASK: usize = 256;
 pub struct Certificate {
     /// Foot points of all vertices, ascending.
     pub foot: Vec<f64>,
-    /// For each interval an upper bound of the distances in it, in mm.
+    /// For each interval an upper bound of the distances between curve and polyline in it, in mm.
     pub deviation: Vec<f64>,
     /// Whether the interval is within the tolerance and the bounds of the axes, and never stops.
     pub good: Vec<bool>,
 }
 
 impl Certificate {
-    /// The curve must stay within `bounds` of the axes too.
+    /// Checks a curve, which must also stay within `bounds` of the axes.
     pub fn new<const D: usize>(
         line: &Polyline<D>,
         knots: &[f64],
@@ -72,12 +72,12 @@ impl Certificate {
     }
 }
 
-/// The interval of a parameter.
+/// The interval that contains a parameter.
 fn interval_at(knots: &[f64], u: f64) -> usize {
     knots[1..knots.len() - 1].partition_point(|&knot| knot <= u)
 }
 
-/// A place where the curve is near vertex i, by the method of Gauss and Newton from its station.
+/// A parameter near which the curve is closest to vertex i, by Gauss–Newton steps from the station of the vertex.
 fn foot_point<const D: usize>(line: &Polyline<D>, knots: &[f64], pieces: &[Control<D>], i: usize) -> f64 {
     let slip = if line.pace.fitted { FITTED_SLIP } else { SLIP } * line.tolerance_at(i);
     let low = (line.station[i] - slip).max(0.0);
@@ -95,7 +95,7 @@ fn foot_point<const D: usize>(line: &Polyline<D>, knots: &[f64], pieces: &[Contr
         }
         let step = -width * dot(&away, &slope) / dot(&slope, &slope);
         let next = (u + step).clamp(low, high);
-        // Where C' is 0 the step is not a number.
+        // Where C' is 0 the step is NaN.
         if next.is_nan() || (next - u).abs() <= 1e-4 * slip {
             break;
         }
@@ -104,7 +104,7 @@ fn foot_point<const D: usize>(line: &Polyline<D>, knots: &[f64], pieces: &[Contr
     best.1
 }
 
-/// The greatest distance in interval j, and whether it keeps all limits.
+/// The bound of the distances in interval j, in mm, and whether the tolerance and the least speed are kept.
 fn interval<const D: usize>(
     line: &Polyline<D>,
     knots: &[f64],
@@ -117,7 +117,7 @@ fn interval<const D: usize>(
     let mut deviation = 0.0f64;
     let mut offer = |bound: f64, tolerance: f64| {
         deviation = deviation.max(bound);
-        // A bound that is not a number fails the test.
+        // A NaN fails the test.
         good &= bound <= tolerance;
     };
     let last = line.chords();

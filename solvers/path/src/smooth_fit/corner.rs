@@ -1,31 +1,31 @@
-//! Where no smooth curve is found: the lines, with each corner rounded by a curve of degree 7 of its own.
+//! Rounds each corner of a polyline by a curve of degree 7 between lines, where no smooth curve along the whole run is found.
 //!
-//! Four control points in even steps on each leg make the curve meet the lines with three derivatives. It lies between both
-//! legs. The distance of curve and corner, both ways, is at most that of the middle of the curve from the vertex: a point
-//! V − a t₋ + b t₊ of the curve is at most min(a, b) |t₊ − t₋| from the legs.
+//! Each leg of the corner has four control points in equal steps, so that the curve meets the lines with three continuous
+//! derivatives. The curve lies between both legs. The distance between curve and corner, both ways, is at most that of the
+//! curve's middle from the vertex: a point V − a t₋ + b t₊ of the curve is at most min(a, b) |t₊ − t₋| from the legs.
 
 use super::curve::{Covered, Smooth};
 use super::polyline::Polyline;
 use feedplan_geometry::quadratic::norm;
 
 const DEGREE: usize = 7;
-/// The distances of the control points of a leg from the vertex, in parts of the leg.
+/// The distances of a leg's control points from the vertex, in parts of the length l of the leg.
 const LEG: [f64; 4] = [1.0, 1.0 - 0.65 / 3.0, 1.0 - 1.3 / 3.0, 0.35];
 /// The middle is V + MIDDLE l (t₊ − t₋): (LEG₀ + 7 LEG₁ + 21 LEG₂ + 35 LEG₃)/2⁷.
 const MIDDLE: f64 = (LEG[0] + 7.0 * LEG[1] + 21.0 * LEG[2] + 35.0 * LEG[3]) / 128.0;
-/// The width of a corner of legs of length 1 that meets the lines at speed 1.
+/// The width of a corner with legs of length 1 that has speed 1 where it meets the lines.
 const WIDTH: f64 = DEGREE as f64 * (LEG[0] - LEG[1]);
 /// The part of the tolerance that a corner uses.
 const FILL: f64 = 0.99;
-/// Legs are at most this part of their chord, so that neighbouring corners do not overlap.
+/// A leg is at most this part of its chord, so that neighbouring corners do not overlap.
 const HALF: f64 = 0.5;
-/// Two corners that would leave less than this part of a line between them, or overlap by no more, meet: rounding would
-/// spoil the profile on so short a line.
+/// Two corners on one chord meet if the line between them would be shorter than this part of the chord, or if they overlap by no
+/// more than that: rounding would spoil the profile on so short a line.
 const SLIVER: f64 = 1e-3;
 /// Where |t₊ − t₋| is less than this, the polyline does not turn.
 const STRAIGHT: f64 = 1e-9;
 
-/// Appends lines and corners of the chords from `first` to before `end`.
+/// Appends the lines and corners of the chords from `first` to before `end`.
 pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usize, out: &mut Smooth<D>) {
     let mut from = line.vertex[first];
     let mut begun = 0.0;
@@ -70,7 +70,7 @@ fn at<const D: usize>(line: &Polyline<D>, chord: usize, s: f64) -> [f64; D] {
     line.point(chord, line.station[chord] + s)
 }
 
-/// The length of the legs at a vertex; 0 where it does not turn.
+/// The length of the legs at a vertex, in mm; 0 where the polyline does not turn.
 fn leg<const D: usize>(line: &Polyline<D>, vertex: usize) -> f64 {
     let turn: [f64; D] = std::array::from_fn(|k| line.direction[vertex][k] - line.direction[vertex - 1][k]);
     let size = norm(&turn);
@@ -97,7 +97,7 @@ mod tests {
             [(0, 0), (0, 1), (1, 1)]
         );
         let corner = out.curve.piece(1);
-        // Even steps at the speed of the lines: neither a second nor a third derivative.
+        // Equal steps at the speed of the lines: the second and the third derivative are 0.
         for k in 0..3 {
             for (step, way) in [(k, [1.0, 0.0]), (6 - k, [0.0, 1.0])] {
                 let edge = sub(&corner.control[step + 1], &corner.control[step]);
@@ -110,7 +110,7 @@ mod tests {
         }
         assert!((norm(&sub(&points[0], &[10.0, 0.0])) - 0.099).abs() < 1e-12);
         assert!((out.covered[1].deviation - 0.099).abs() < 1e-12);
-        // Where two corners leave next to nothing of a line they meet.
+        // Two corners that would leave a very short line between them meet.
         let left = 2e-7;
         let mut out = Smooth::default();
         let points = vec![[0.0, 0.0], [0.01, 0.0], [0.01, 0.01 + left], [0.02, 0.01 + left]];
@@ -121,7 +121,7 @@ mod tests {
         let steps = [sub(&before[DEGREE], &before[DEGREE - 1]), sub(&after[1], &after[0])];
         let speeds = [0, 1].map(|i| 7.0 * norm(&steps[i]) / out.curve.piece(i + 1).width);
         assert!(speeds.iter().all(|speed| (speed - 1.0).abs() < 1e-12), "{speeds:?}");
-        // Short chords are shared by halves.
+        // On short chords, each of two neighbouring corners gets one half.
         let zig_zag = (0..9).map(|i| [0.01 * i as f64, 0.01 * (i % 2) as f64]).collect();
         let mut out = Smooth::default();
         append_corners(&Polyline::new(zig_zag, vec![0.1; 8]), 0, 8, &mut out);

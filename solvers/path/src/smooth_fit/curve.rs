@@ -1,18 +1,18 @@
-//! The curve of a run, and what each of its pieces follows.
+//! The curve that is fitted to a run, and for each of its pieces the chords that it follows.
 
 use super::offsets::Offsets;
 use feedplan_geometry::spline::CompositeCurve;
 use std::ops::Range;
 
-/// What a piece of the curve follows.
+/// The chords that a piece of the curve follows, and how closely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Covered {
     /// First and last chord.
     pub first: usize,
     pub last: usize,
-    /// Upper bound of the distances from piece to chords and from chords to piece, in mm.
+    /// Upper bound of the distances from the piece to the chords and from the chords to the piece, in mm.
     pub deviation: f64,
-    /// The curve has a corner before this piece, where the tool stops: no smooth curve was found.
+    /// Whether the tool stops at the start of this piece, because no smooth curve was found there.
     pub stop: bool,
 }
 
@@ -22,12 +22,12 @@ impl Covered {
     }
 }
 
-/// The curve of a run. Pieces of degree 1 are lines, those of degree 5 parts of splines, those of degree 7 corners.
+/// The curve of a run. Pieces of degree 1 are lines, pieces of degree 5 parts of splines, pieces of degree 7 corners.
 #[derive(Clone, Debug, Default)]
 pub struct Smooth<const D: usize> {
     pub curve: CompositeCurve<D>,
     pub covered: Vec<Covered>,
-    /// The numbers of B-splines and lines, and of their polynomials before they are cut.
+    /// The number of B-splines and lines, and the number of their polynomials before these are cut.
     pub splines: usize,
     pub polynomials: usize,
     /// Chords whose corners are rounded one by one, with a stop before and after.
@@ -42,7 +42,7 @@ impl<const D: usize> Smooth<D> {
         self.covered.push(covered);
     }
 
-    /// Calls `append`; the curve stops before the pieces that it appends, unless they are the first.
+    /// Calls `append`, with a stop before the pieces that it appends unless they are the first.
     pub fn after_stop(&mut self, append: impl FnOnce(&mut Self)) {
         let at = self.covered.len();
         append(self);

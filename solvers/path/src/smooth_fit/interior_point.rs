@@ -1,19 +1,23 @@
-//! The curve of least energy in the tolerance tube: a primal-dual interior-point method for a window (Mehrotra 1992).
+//! Solves the convex problem of a window, the curve of least energy in the tolerance tube, by a primal-dual interior-point method
+//! (Mehrotra 1992).
 //!
 //! ```text
 //! minimise ½ xᵀQx − pᵀx   subject to   s₁ = e − (Ax − b) ≥ 0,   s₂ = e + (Ax − b) ≥ 0
 //! ```
 //!
-//! x are the coefficients, of which some are fixed, p is the pull of what the energy aims at; λ₁, λ₂ are the multipliers of
-//! the slacks s₁, s₂. The start need not be feasible. Newton's matrix Q + Aᵀ diag(λ₁/s₁ + λ₂/s₂) A is banded.
+//! x are the coefficients, of which some are fixed; p is the linear part of the energy, which pulls the curve to its aims
+//! (`pace`); λ₁, λ₂ are the multipliers of the slacks s₁, s₂. The start need not be feasible. Newton's matrix
+//! Q + Aᵀ diag(λ₁/s₁ + λ₂/s₂) A is banded.
 //!
-//! Energies of intervals of length h differ as h⁻⁵, so that one complementarity s λ for all rows would be far too great for
-//! some and far too small for others. All rows of an interval aim at s λ = μ d ε²/h⁵ instead, the unit of the interval, d
-//! being the density of the energy (`pace`): the intervals converge together, which takes about half as many iterations.
+//! The energy of an interval of length h grows as h⁻⁵, so that one value of s λ for all rows would be far too great for some
+//! intervals and far too small for others. The rows of each interval therefore aim at s λ = μ d ε²/h⁵, where d is the density of
+//! the energy (`pace`) and d ε²/h⁵ is called the unit of the interval. All intervals then converge together, which takes about
+//! half as many iterations.
 //!
-//! What happens at one place of the curve fades along it. So each group of four intervals, a quad, has its own μ and its own
-//! length of the step. One length for the whole window would be the least of all, so that a single corner would stop the others.
-//! Lengths of neighbours differ little. Where they differ, slacks do not fit their rows exactly; the next steps correct that.
+//! The effect of a change at one place of the curve fades along it. Each group of four intervals, a quad, therefore has its own μ
+//! and its own step length. With one step length for the whole window, the shortest one, a single corner would stop all other
+//! places. The step lengths of neighbouring quads differ little. Where they differ, slacks do not fit their rows exactly; the
+//! next steps correct that.
 
 use fearless_simd::{dispatch, Level, Simd};
 use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
@@ -23,35 +27,35 @@ use super::problem::Problem;
 use super::quads::{Columns, Quads, Share, BEYOND};
 use super::spline::{DEGREE, ORDER};
 
-/// It ends when the sum of all s λ is below this part of the energy,
+/// The iteration ends when the sum of all s λ is below this part of the energy,
 const GAP: f64 = 1e-3;
-/// and when rows, and Newton's other residual, are off by less than this part of their size.
+/// and when the slacks are wrong by less than this part of their limits, and the gradient is below this part of its scale.
 const OFF: f64 = 1e-3;
-/// Where vertices pull, the residuals must be less than the pull of vertices that are off by this part of their limits.
+/// The gradient at a coefficient that vertices pull must be less than their pull if they are off by this part of their limits.
 const OFF_VERTEX: f64 = 1e-2;
-/// The force of a vertex on any coefficient that it moves is at least this part of its pull, when residuals are compared.
+/// For that comparison, the force of a vertex on each coefficient of its interval is at least this part of its pull.
 const LEAST_FORCE: f64 = 1e-3;
-/// The least μ to aim at: the pulls of vertices are some thousandths of a unit or more. It is less where the sum of all s λ
-/// would be more than a tenth of what it may be.
+/// The least μ to aim at, because the pulls of vertices are some thousandths of a unit or more. It is lower where Σ s λ would
+/// otherwise exceed a tenth of the value at which the iteration ends.
 const LEAST_MU: f64 = 1e-6;
-/// The mean μ below which there is nothing but rounding.
+/// If the mean μ is below this, only rounding errors are left, and the iteration ends.
 const ROUNDING: f64 = 1e-9;
 /// μ at the start.
 const START_MU: f64 = 50.0;
-/// The greatest ratio between the μ to aim at of neighbouring quads,
+/// The greatest ratio between the aimed μ of neighbouring quads,
 const MU_RATIO: f64 = 10.0;
-/// and between the lengths of their steps.
+/// and between their step lengths.
 const LENGTH_RATIO: f64 = 1.5;
-/// A slack becomes that of its row, if it has to change by no more than this part of itself.
+/// Before each iteration a slack moves towards the value that x gives for its row, by at most this part of itself.
 const SLACK_CHANGE: f64 = 0.04;
-/// The weight at the start of all targets, in units over the squares of their limits.
+/// The weight of the targets of all rows in the start (`approximate`), in units over the square of the row's limit.
 const START_WEIGHT: f64 = 200.0;
 /// The slacks at the start are at least this part of the limits.
 const START_SLACK: f64 = 0.1;
 const MOST_ITERATIONS: usize = 40;
-/// The part of the way to the boundary that a step goes.
+/// A step goes this part of the way to the first place where a slack or multiplier is 0.
 const STEP: f64 = 0.99;
-/// An energy that is treated as zero, in units; lines have none.
+/// Energies below this, in units, are treated as zero: straight lines have no energy.
 const NO_ENERGY: f64 = 1e-8;
 
 impl<const D: usize> Problem<D> {
@@ -85,8 +89,8 @@ impl<const D: usize> Problem<D> {
         iteration
     }
 
-    /// The pull of vertices that are off by OFF_VERTEX of their limits: the force on each coefficient, and the work of that in
-    /// each interval.
+    /// For vertices that are off by OFF_VERTEX of their limits: the force of their pull on each coefficient, and pull times limit
+    /// summed in each interval.
     fn pulls(&self) -> (Vec<f64>, Vec<f64>) {
         let mut force = vec![0.0; self.x.len()];
         let mut work = vec![0.0; self.start.len() - 1];
@@ -103,7 +107,7 @@ impl<const D: usize> Problem<D> {
     }
 }
 
-/// Ax − b of a row, and slacks, multipliers and 1/s of both its sides, in each direction; steps of both.
+/// A row's Ax − b in each direction; for both of its sides the slacks, multipliers, 1/s, and the steps of slack and multiplier.
 #[derive(Clone, Copy)]
 struct Pairs<const D: usize> {
     off: [Lanes; D],
@@ -111,17 +115,17 @@ struct Pairs<const D: usize> {
     l: [[Lanes; D]; 2],
     inverse: [[Lanes; D]; 2],
     ds: [[Lanes; D]; 2],
-    /// The step of the multiplier; between predictor and corrector the product of both steps.
+    /// The step of the multiplier; between predictor and corrector the product of the predictor's steps of s and λ.
     dl: [[Lanes; D]; 2],
 }
 
 const SIGN: [f64; 2] = [1.0, -1.0];
-/// The coefficient in the middle of the first quad: coefficient i moves intervals i − DEGREE to i.
+/// The index of the coefficient in the middle of the first quad: coefficient i moves the intervals i − DEGREE to i.
 const MIDDLE: f64 = 0.5 * (LANES + DEGREE - 1) as f64;
 
 impl<const D: usize> Pairs<D> {
-    /// Slack, multiplier, 1/s, the error of the slack and Newton's step of it, on a side of direction r in which the place
-    /// moves by `moved`.
+    /// For one side of direction r: slack, multiplier, 1/s, the error of the slack, and Newton's step of the slack if x moves the
+    /// row's place by `moved` in that direction.
     #[inline(always)]
     fn newton<S: Simd>(
         &self,
@@ -147,7 +151,7 @@ struct Residuals {
     worst: f64,
 }
 
-/// Changes each value by a function of itself and of its neighbour, from the first to the last, and back.
+/// Replaces each value by `change` of itself and its neighbour: forwards from the first to the last, then backwards.
 fn between_neighbours(values: &mut [f64], change: impl Fn(f64, f64) -> f64) {
     for i in 1..values.len() {
         values[i] = change(values[i], values[i - 1]);
@@ -165,23 +169,23 @@ struct Newton<'a, const D: usize> {
     x: Columns<D>,
     step: Columns<D>,
     state: Vec<Pairs<D>>,
-    /// What the rows of one quad add.
+    /// What each row of one quad adds to matrix and gradients.
     shares: Vec<Share<D>>,
-    /// The gradient of energy and multipliers, its parts by the sums of both multipliers of each row.
+    /// The gradient of the Lagrangian. `size`, its scale, has the sum of both multipliers of a row in place of their difference.
     gradient: Columns<D>,
     size: Columns<D>,
-    /// What the predictor adds to the gradient.
+    /// The terms that the predictor step adds to the gradient.
     predictor: Columns<D>,
     /// Σ s λ of each interval.
     work: Vec<Lanes>,
     pull: (Vec<f64>, Vec<f64>),
-    /// The mean of s λ in units, then what it is to become, of each quad.
+    /// For each quad: the mean of s λ in units; after `predict` the value to aim at.
     mu: Vec<f64>,
-    /// The length of the step of each quad.
+    /// The step length of each quad.
     length: Vec<f64>,
-    /// Pairs of slack and multiplier of each quad.
+    /// The number of pairs of slack and multiplier in each quad.
     pairs: Vec<f64>,
-    /// Σ s λ at μ = 1.
+    /// Σ s λ if μ = 1 everywhere.
     whole: f64,
     least_energy: f64,
     unknowns: Vec<Lanes>,
@@ -231,8 +235,9 @@ impl<'a, const D: usize> Newton<'a, D> {
         }
     }
 
-    /// Moves x to an approximation of all targets that is smoothed a little. Should intervals be too long for a corner, so that
-    /// there is no solution, the bends of the same window are then near their places.
+    /// Moves x to the weighted least-squares approximation of all targets, with the energy as a slight smoothing. If the
+    /// intervals at a corner are too long, so that the problem has no solution, the bends of the same window are then close to
+    /// their targets.
     #[inline(always)]
     fn approximate<S: Simd>(&mut self, simd: S) {
         self.band.clear(self.quads.count() + BEYOND);
@@ -258,7 +263,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         self.x.add_parts(&self.step, |_| 1.0);
     }
 
-    /// Slacks of x, at least START_SLACK of their limits, and multipliers on the central path.
+    /// Sets the slacks of x, at least START_SLACK of their limits, and multipliers with s λ = START_MU units.
     #[inline(always)]
     fn begin<S: Simd>(&mut self, simd: S) {
         for quad in 0..self.quads.count() {
@@ -279,7 +284,8 @@ impl<'a, const D: usize> Newton<'a, D> {
         }
     }
 
-    /// Takes a part of the last step of slacks and multipliers; then Newton's matrix, the gradients and the residuals.
+    /// Applies the last step to slacks and multipliers, each quad with its own length; then computes Newton's matrix, the
+    /// gradients and the residuals at x.
     #[inline(always)]
     fn linearise<S: Simd>(&mut self, simd: S) -> Residuals {
         let zero = Register::all(simd, 0.0);
@@ -297,7 +303,7 @@ impl<'a, const D: usize> Newton<'a, D> {
                 let place = row.place(simd, &x);
                 let pull = row.pull.load(simd);
                 let mut weight = [pull; D];
-                // Gradient, its size, and what the predictor adds to the gradient.
+                // Gradient, its scale, and what the predictor adds to the gradient.
                 let mut forces = [[zero; D]; 3];
                 let mut product = zero;
                 for r in 0..D {
@@ -347,9 +353,9 @@ impl<'a, const D: usize> Newton<'a, D> {
         Residuals { energy, work: sum, worst: worst.greatest() }
     }
 
-    /// Whether the residuals are small everywhere: the gradient compared with the multipliers, and where vertices pull, the
-    /// gradient and s λ compared with their pull. A corner has much greater multipliers than an arc next to it, so that a
-    /// sum over the window says little about the arc.
+    /// Whether the residuals are small everywhere. The gradient is compared with the multipliers; where vertices pull, the
+    /// gradient and s λ are compared with their pull, because a corner has much greater multipliers than an arc next to it, so
+    /// that a sum over the window says little about the arc.
     fn is_solved(&self, residuals: &Residuals) -> bool {
         let Residuals { energy, work, worst } = *residuals;
         if !(work < GAP * energy.max(self.least_energy) && worst < OFF) {
@@ -374,7 +380,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         LEAST_MU.min(0.1 * GAP * residuals.energy.max(self.least_energy) / self.whole)
     }
 
-    /// The predictor: the pure Newton step, from whose length follows the μ to aim at. It keeps the products of both steps for
+    /// The predictor: the pure Newton step. Its length gives the μ to aim at; the products of its steps of s and λ are stored for
     /// the corrector.
     #[inline(always)]
     fn predict<S: Simd>(&mut self, simd: S, least_mu: f64) {
@@ -382,7 +388,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         let zero = Register::all(simd, 0.0);
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
-            // Greatest −dz/z, and Σ s λ in units after a step of length a: sums of its powers.
+            // The greatest −ds/s or −dλ/λ, and the coefficients of a and a² in Σ s λ (in units) after a step of length a.
             let (mut most, mut first, mut second) = (Register::all(simd, 1e-300), zero, zero);
             for i in self.quads.range(quad) {
                 let (row, pairs) = (&self.quads.rows[i], &mut self.state[i]);
@@ -412,7 +418,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         between_neighbours(&mut self.mu, |mu, beside| mu.max(beside / MU_RATIO));
     }
 
-    /// The corrector: the step towards s λ = μ in units, with the second order of the predictor, and its lengths.
+    /// The corrector: the step towards s λ = μ in units, with the second-order term of the predictor, and the step lengths.
     #[inline(always)]
     fn correct<S: Simd>(&mut self, simd: S) {
         let zero = Register::all(simd, 0.0);
@@ -446,7 +452,7 @@ impl<'a, const D: usize> Newton<'a, D> {
                     for side in 0..2 {
                         let [s, l, inverse, _, ds] = pairs.newton(r, side, half, moved[r]);
                         let dl = (aim - s * l - l * ds - pairs.dl[side][r].load(simd)) * inverse;
-                        // A row of no weight has no multiplier.
+                        // A padding row has the multiplier 0.
                         let per_l = l.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
                         most = most.max(-ds * inverse).max(-dl * per_l);
                         pairs.ds[side][r] = ds.into();
@@ -459,8 +465,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         between_neighbours(&mut self.length, |length, beside| length.min(LENGTH_RATIO * beside));
     }
 
-    /// Moves x by the step. A coefficient is in the middle of the intervals that it moves; between the middles of two quads
-    /// the length of the step is linear.
+    /// Moves x by the step. The step length of a coefficient is interpolated between the middles of the two nearest quads.
     fn advance(&mut self) {
         let last = self.length.len() - 1;
         let part = |i: usize| {
@@ -472,7 +477,7 @@ impl<'a, const D: usize> Newton<'a, D> {
         self.x.add_parts(&self.step, part);
     }
 
-    /// The step of Newton's matrix against the gradient, or against that and what the predictor adds to it.
+    /// Solves for the step: minus the inverse of Newton's matrix times the gradient, or times gradient plus predictor terms.
     #[inline(always)]
     fn downhill<S: Simd>(&mut self, simd: S, predictor: bool) {
         let fixed = &self.problem.fixed;

@@ -8,16 +8,17 @@
 //! Σ −N · (C(u*_i) − V_i) θ_i / Σ θ_i
 //! ```
 //!
-//! over the vertices V_i of bends with the places u*_i of the curve near them. θ_i is the angle by which the curve turns
-//! there over the mean length of the chords, and at most the angle of the polyline, because an arc next to a long line ends
-//! at their vertex. The greatest offsets are those at vertices and between them, also at corners.
+//! The sum is over the vertices V_i of bends; u*_i is the place of the curve near V_i. θ_i is the curvature of the curve there
+//! times the mean length of the two chords, but at most the angle by which the polyline turns: where an arc meets a long line,
+//! the mean chord would be too long. The greatest offsets are taken over all vertices, also those of corners, and places between
+//! them.
 
 use super::bezier::{derivatives, Control};
 use super::polyline::{Hold, Polyline};
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
-/// The number of places in an interval.
+/// The number of places in an interval where the offset is measured.
 const PLACES: usize = 4;
 /// A curve that turns by less than this over the length of a chord, in rad, is straight.
 const STRAIGHT: f64 = 1e-9;
@@ -25,16 +26,16 @@ const STRAIGHT: f64 = 1e-9;
 /// The mean and the greatest offsets, in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Offsets {
-    /// Σ θ and Σ −N · away θ.
+    /// Σ θ, and the weighted sum of the offsets, Σ (−N · away) θ.
     turned: f64,
     moment: f64,
-    /// The greatest distances inside and outside, neither below 0.
+    /// The greatest distances inside and outside, in mm, both at least 0.
     pub inside: f64,
     pub outside: f64,
 }
 
 impl Offsets {
-    /// The mean distance in bends, positive outside; 0 where there are none.
+    /// The mean offset in bends, in mm, positive outside; 0 without bends.
     pub fn mean(&self) -> f64 {
         if self.turned > 0.0 {
             self.moment / self.turned
@@ -50,13 +51,13 @@ impl Offsets {
         self.offer(other.outside);
     }
 
-    /// Takes an offset into the greatest ones; one that is not a number changes nothing.
+    /// Updates the greatest distances by an offset; a NaN changes nothing.
     pub fn offer(&mut self, distance: f64) {
         self.inside = self.inside.max(-distance);
         self.outside = self.outside.max(distance);
     }
 
-    /// The offsets of a curve from a polyline, its vertices near places `foot`.
+    /// The offsets of a curve from a polyline; `foot` has a place of the curve near each vertex.
     pub fn of<const D: usize>(
         line: &Polyline<D>,
         knots: &[f64],
@@ -111,7 +112,7 @@ struct Place<const D: usize> {
 }
 
 impl<const D: usize> Place<D> {
-    /// From the derivatives by the part of an interval of some width.
+    /// From point and derivatives with respect to the fraction of an interval of this width.
     fn new([point, first, second]: &[[f64; D]; 3], width: f64) -> Self {
         let velocity = first.map(|x| x / width);
         let acceleration = second.map(|x| x / (width * width));
@@ -123,7 +124,8 @@ impl<const D: usize> Place<D> {
         }
     }
 
-    /// The distance from a place of the polyline with its sign, and the curvature; 0 where it is straight.
+    /// The offset from a point of the polyline, and the curvature; both 0 where the curve turns by less than STRAIGHT over
+    /// `length`.
     fn distance(&self, from: &[f64; D], length: f64) -> (f64, f64) {
         let curvature = norm(&self.bend);
         if !(curvature * length > STRAIGHT && curvature.is_finite()) {

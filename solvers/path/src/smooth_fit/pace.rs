@@ -1,17 +1,17 @@
-//! Pace: the speed u̇ at which a curve C(u) is followed, and what its derivatives cost at that speed.
+//! Pace: the speed u̇ at which a curve C(u) is followed, and the energy of the curve's derivatives at that speed.
 //!
-//! Where u̇ changes slowly, the acceleration of axis k is C_k'' u̇² and its jerk C_k''' u̇³. The squares of what both differ
-//! by from an aim, in parts of the limits A_k and J_k, summed over time, are the energy that the fit makes least:
+//! Where u̇ changes slowly, the acceleration of axis k is C_k'' u̇² and its jerk C_k''' u̇³. The fit minimises the squares of
+//! their differences from an aim, in parts of the limits A_k and J_k, integrated over time:
 //!
 //! ```text
 //! Σ_k ∫ u̇³ (C_k'' − aim₂)²/A_k² + u̇⁵ (C_k''' − aim₃)²/J_k² du
 //! ```
 //!
-//! Where the tool is slow the curve may bend sharply, and where it is fast it is smooth.
+//! So the curve may bend sharply where the tool is slow, and is smooth where it is fast.
 
 use super::spline::{derivative_rows, gauss, Around, Form, Pull, ORDER};
 
-/// What holds at a station.
+/// Speed and aimed derivatives at a station.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<const D: usize> {
     pub station: f64,
@@ -23,17 +23,17 @@ pub struct Moment<const D: usize> {
 
 #[derive(Clone, Debug)]
 pub struct Pace<const D: usize> {
-    /// By ascending stations; between them all is linear.
+    /// By ascending stations, with linear interpolation between them.
     moments: Vec<Moment<D>>,
     /// 1/A² and 1/J² of each axis.
     per_acceleration_sq: [f64; D],
     per_jerk_sq: [f64; D],
-    /// It is that of a motion.
+    /// Whether it is the pace of a given motion, not the default.
     pub fitted: bool,
 }
 
 impl<const D: usize> Default for Pace<D> {
-    /// The same speed everywhere, limits of jerk that are the same for all axes and none of acceleration.
+    /// Constant speed, the same jerk limit for all axes, no acceleration limit.
     fn default() -> Self {
         let even = Moment { station: 0.0, speed_sq: 1.0, aim: [[0.0; D]; 2] };
         Self { moments: vec![even], per_acceleration_sq: [0.0; D], per_jerk_sq: [1.0; D], fitted: false }
@@ -41,7 +41,7 @@ impl<const D: usize> Default for Pace<D> {
 }
 
 impl<const D: usize> Pace<D> {
-    /// From one moment or more, and the limits of each axis, of which those of jerk may be infinite.
+    /// The pace through one moment or more, with the limits of each axis; limits of jerk may be infinite.
     pub fn new(moments: Vec<Moment<D>>, max_acceleration: [f64; D], max_jerk: [f64; D]) -> Self {
         let per_square = |limits: [f64; D]| limits.map(|limit| 1.0 / (limit * limit));
         Self {
@@ -52,7 +52,7 @@ impl<const D: usize> Pace<D> {
         }
     }
 
-    /// The pace from a station on, its stations from 0.
+    /// The same pace with stations counted from `station`.
     pub fn from(&self, station: f64) -> Self {
         let shifted = |at: &Moment<D>| Moment { station: at.station - station, ..*at };
         Self { moments: self.moments.iter().map(shifted).collect(), ..*self }
@@ -73,14 +73,14 @@ impl<const D: usize> Pace<D> {
         }
     }
 
-    /// The weights of the squares of the second and third derivatives of axis k.
+    /// The weights of the squares of the second and the third derivative of axis k.
     fn weights(&self, at: &Moment<D>, k: usize) -> [f64; 2] {
         let cube = at.speed_sq * at.speed_sq.sqrt();
         [self.per_acceleration_sq[k] * cube, self.per_jerk_sq[k] * cube * at.speed_sq]
     }
 
-    /// The energy of each axis in an interval: the matrix of its form in the coefficients that the interval sees, and the
-    /// pull of its aims on them.
+    /// The energy of each axis in an interval: its matrix in the six coefficients of the interval, and the pull of its aims on
+    /// them (the linear part).
     pub fn energy(&self, t: &Around) -> ([Form; D], [Pull; D]) {
         let derivatives = derivative_rows(t);
         let (mut forms, mut pulls) = ([[[0.0; ORDER]; ORDER]; D], [[0.0; ORDER]; D]);

@@ -10,11 +10,11 @@ pub enum Hold {
     Free,
     /// A point of a program, which may have noise.
     Point,
-    /// A point of an arc or a spline.
+    /// A point of an arc or a spline, without noise.
     Exact,
 }
 
-/// Chords between vertices, none of them without a length.
+/// A polyline: chords between vertices, each of them longer than 0.
 #[derive(Clone, Debug, Default)]
 pub struct Polyline<const D: usize> {
     pub vertex: Vec<[f64; D]>,
@@ -22,19 +22,19 @@ pub struct Polyline<const D: usize> {
     pub station: Vec<f64>,
     /// Unit vector along each chord.
     pub direction: Vec<[f64; D]>,
-    /// The distance that the curve may have from each chord, in mm.
+    /// The greatest distance of the curve from each chord, in mm.
     pub tolerance: Vec<f64>,
-    /// What each vertex is to the curve.
+    /// How each vertex acts on the curve.
     pub hold: Vec<Hold>,
-    /// Bends keep their size: vertices that are held pull the curve to them.
+    /// Whether bends keep their size: vertices that are held then pull the curve to them.
     pub sized: bool,
-    /// How fast it is followed.
+    /// The speed at which the curve is followed.
     pub pace: Pace<D>,
 }
 
 impl<const D: usize> Polyline<D> {
-    /// The polyline through `vertex`, with a tolerance for each chord; all vertices are free, bends of any size,
-    /// and the pace is even.
+    /// The polyline through `vertex`, with a tolerance for each chord. All vertices are free, bends need not keep their size, and
+    /// the pace is constant.
     pub fn new(vertex: Vec<[f64; D]>, tolerance: Vec<f64>) -> Self {
         let mut station = Vec::with_capacity(vertex.len());
         let mut direction = Vec::with_capacity(tolerance.len());
@@ -51,7 +51,7 @@ impl<const D: usize> Polyline<D> {
         Self { vertex, station, direction, tolerance, hold, sized: false, pace: Pace::default() }
     }
 
-    /// The part between two vertices, its stations from 0.
+    /// The part between two vertices, with stations from 0.
     pub fn part(&self, first: usize, last: usize) -> Self {
         let part = Self::new(self.vertex[first..=last].to_vec(), self.tolerance[first..last].to_vec());
         let pace = self.pace.from(self.station[first]);
@@ -76,12 +76,12 @@ impl<const D: usize> Polyline<D> {
         0.5 * (self.station[i + 1] - self.station[i - 1])
     }
 
-    /// The chord at station u.
+    /// The chord that contains station u.
     pub fn chord_at(&self, u: f64) -> usize {
         self.station[1..self.chords()].partition_point(|&station| station <= u)
     }
 
-    /// The point of chord i, or of the line through it, at station u.
+    /// The point at station u of chord i, or of the line through that chord.
     pub fn point(&self, i: usize, u: f64) -> [f64; D] {
         let (s, t) = (u - self.station[i], &self.direction[i]);
         std::array::from_fn(|k| self.vertex[i][k] + s * t[k])
@@ -98,7 +98,7 @@ impl<const D: usize> Polyline<D> {
         self.tolerance[before].min(self.tolerance[after])
     }
 
-    /// The distance of a point from chord i.
+    /// The distance of a point from chord i, in mm.
     pub fn distance(&self, i: usize, point: &[f64; D]) -> f64 {
         let away = sub(point, &self.vertex[i]);
         let along = dot(&away, &self.direction[i]).clamp(0.0, self.chord_length(i));
@@ -106,19 +106,19 @@ impl<const D: usize> Polyline<D> {
     }
 }
 
-/// The angle between two vectors, in rad; 0 where one has no length.
+/// The angle between two vectors, in rad; 0 if one of them has length 0.
 pub fn angle<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     2.0 * half_tangent(a, b).atan()
 }
 
-/// Whether the angle between two vectors is at most this, in rad: mostly without an arc tangent.
+/// Whether the angle between two vectors is at most `most`, in rad; mostly without computing an arc tangent.
 pub fn is_within<const D: usize>(a: &[f64; D], b: &[f64; D], most: f64) -> bool {
     let (half, tangent) = (0.5 * most, half_tangent(a, b));
     // t − t³/3 ≤ atan t ≤ t.
     tangent <= half || (tangent * (1.0 - tangent * tangent / 3.0) <= half && tangent.atan() <= half)
 }
 
-/// The tangent of half the angle between two vectors, which keeps the digits of small turns; 0 where one has no length.
+/// The tangent of half the angle between two vectors, accurate also for small angles; 0 if one of them has length 0.
 fn half_tangent<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     let (p, q) = (norm(a), norm(b));
     if !(p > 0.0 && q > 0.0) {

@@ -1,6 +1,7 @@
-//! The rows of four neighbouring intervals, a quad, side by side in the lanes of the processor's vectors.
+//! The rows and the energy of four neighbouring intervals, a quad, in the four lanes of SIMD vectors.
 //!
-//! The n-th coefficients that the four intervals see are neighbours, so that they are read and written as one vector.
+//! The intervals j to j + 3 have as their n-th coefficients j + n to j + n + 3. These are neighbours, so they are read and
+//! written as one vector.
 
 use std::ops::Range;
 
@@ -12,7 +13,7 @@ use super::problem::Problem;
 use super::rows::Row;
 use super::spline::ORDER;
 
-/// Numbers for the coefficients that the intervals of a quad see, by axis.
+/// Numbers for the six coefficients of each interval of a quad, by axis.
 pub type Around<S, const D: usize> = [[Register<S>; D]; ORDER];
 
 /// A number for each coefficient and axis, in the order of the coefficients; beyond the last there are zeros.
@@ -20,17 +21,17 @@ pub type Around<S, const D: usize> = [[Register<S>; D]; ORDER];
 pub struct Columns<const D: usize>([Vec<Lanes>; D]);
 
 impl<const D: usize> Columns<D> {
-    /// Zeros for so many quads.
+    /// Zeros for a number of quads.
     pub fn zeros(quads: usize) -> Self {
         Self(std::array::from_fn(|_| vec![Lanes::ZERO; quads + BEYOND]))
     }
 
-    /// Coefficients, those beyond the last included.
+    /// The number of coefficients, with the padding after the last.
     pub fn len(&self) -> usize {
         self.0[0].len() * LANES
     }
 
-    /// Adds to each coefficient a part of that of the other.
+    /// Adds to each coefficient i `part(i)` times that of `other`.
     pub fn add_parts(&mut self, other: &Self, part: impl Fn(usize) -> f64) {
         for i in 0..self.len() {
             let part = part(i);
@@ -62,7 +63,7 @@ impl<const D: usize> Columns<D> {
         std::array::from_fn(|k| self.at(i, k))
     }
 
-    /// The coefficients that the intervals of a quad see.
+    /// The six coefficients of each interval of a quad.
     #[inline(always)]
     pub fn around<S: Simd>(&self, simd: S, quad: usize) -> Around<S, D> {
         let mut out = [[Register::all(simd, 0.0); D]; ORDER];
@@ -79,7 +80,7 @@ impl<const D: usize> Columns<D> {
         out
     }
 
-    /// Adds to the coefficients that the intervals of a quad see.
+    /// Adds sums to axis k of the six coefficients of each interval of a quad.
     #[inline(always)]
     pub fn add<S: Simd>(&mut self, simd: S, quad: usize, k: usize, sums: &[Register<S>; ORDER]) {
         let column = &mut self.0[k][quad..quad + BEYOND + 1];
@@ -89,11 +90,12 @@ impl<const D: usize> Columns<D> {
     }
 }
 
-/// The vectors of a column after those of the first coefficients of the quads.
+/// A quad reads its own vector of a column, which begins with its first coefficients, and this many vectors after it.
 pub const BEYOND: usize = 2;
 
-/// Three vectors of a column with the first `count` of some sums: those of the n-th coefficients that the intervals of a quad
-/// see. All are read as they were written, because other parts of them would have to wait for the writing.
+/// Adds the first `count` of the sums to three vectors of a column; the n-th sum belongs to the n-th coefficients of a quad's
+/// intervals. The three vectors are read in the same parts in which they were written: a read across two recent writes would have
+/// to wait for them.
 #[inline(always)]
 fn plus<S: Simd>(
     simd: S,
@@ -125,22 +127,23 @@ fn plus<S: Simd>(
     [a, b, c]
 }
 
-/// A row of each interval of a quad. Where one has fewer rows than the others, its lane holds a row of no weight.
+/// One row of each interval of a quad. Where an interval has fewer rows than the others, its lane holds a padding row of weight
+/// 0.
 #[derive(Clone, Copy)]
 pub struct QuadRow<const D: usize> {
     pub basis: [Lanes; ORDER],
     pub direction: [[Lanes; D]; D],
-    /// Where the target lies in each direction.
+    /// The component of the target along each direction.
     pub target: [Lanes; D],
     pub half: [Lanes; D],
     pub pull: Lanes,
-    /// The unit of complementarity in the interval, and 1/unit; both 0 for a row of no weight.
+    /// The unit of complementarity of the interval, and 1/unit; both are 0 in a padding row.
     pub unit: Lanes,
     pub per_unit: Lanes,
 }
 
 impl<const D: usize> QuadRow<D> {
-    /// All of no weight.
+    /// Padding rows in all lanes.
     const NONE: Self = Self {
         basis: [Lanes::ZERO; ORDER],
         direction: [[Lanes::ZERO; D]; D],
@@ -168,7 +171,7 @@ impl<const D: usize> QuadRow<D> {
         put(&mut self.per_unit, 1.0 / unit);
     }
 
-    /// The place of Σ B x in the directions of the row.
+    /// The point Σ B x of the curve: its components along the directions of the row.
     #[inline(always)]
     pub fn place<S: Simd>(&self, simd: S, x: &Around<S, D>) -> [Register<S>; D] {
         let mut point = [Register::all(simd, 0.0); D];
@@ -186,7 +189,7 @@ impl<const D: usize> QuadRow<D> {
         place
     }
 
-    /// A force in the directions of the row along the axes.
+    /// Turns a force given along the directions of the row into its components along the axes.
     #[inline(always)]
     pub fn along_axes<S: Simd>(&self, simd: S, force: &[Register<S>; D]) -> [Lanes; D] {
         let mut out = [Lanes::ZERO; D];
@@ -200,7 +203,7 @@ impl<const D: usize> QuadRow<D> {
         out
     }
 
-    /// Σ weight n nᵀ over its directions n: entries k ≤ m.
+    /// Σ weight n nᵀ over the directions n of the row: the entries k ≤ m.
     #[inline(always)]
     pub fn form<S: Simd>(&self, simd: S, weight: &[Register<S>; D]) -> [[Lanes; D]; D] {
         let mut out = [[Lanes::ZERO; D]; D];
@@ -217,19 +220,19 @@ impl<const D: usize> QuadRow<D> {
     }
 }
 
-/// What a row adds to matrix and gradients, by axis.
+/// What a row adds to the matrix and to the gradients, before the factors of the basis functions B.
 #[derive(Clone, Copy)]
 pub struct Share<const D: usize> {
-    /// The form of which B Bᵀ comes into the matrix: entries k ≤ m.
+    /// The matrix gets B Bᵀ times this form: entries k ≤ m.
     pub form: [[Lanes; D]; D],
-    /// The forces of which B comes into gradient, size of the gradient, and predictor.
+    /// B times these forces is added to the gradient, its scale, and the terms of the predictor.
     pub forces: [[Lanes; D]; 3],
 }
 
-/// The energy and the rows of all intervals, four intervals side by side.
+/// The energy and the rows of all intervals, by quads.
 pub struct Quads<const D: usize> {
     pub rows: Vec<QuadRow<D>>,
-    /// The number of rows before each quad, and all of them.
+    /// The number of rows before each quad; the last entry is the number of all rows.
     start: Vec<usize>,
     energy: Vec<[[[Lanes; ORDER]; ORDER]; D]>,
     pull: Vec<[[Lanes; ORDER]; D]>,
@@ -272,13 +275,13 @@ impl<const D: usize> Quads<D> {
         self.energy.len()
     }
 
-    /// Room for what the rows of any quad add.
+    /// Storage for the shares of the rows of any one quad.
     pub fn shares(&self) -> Vec<Share<D>> {
         let most = self.start.windows(2).map(|pair| pair[1] - pair[0]).max().unwrap_or(0);
         vec![Share { form: [[Lanes::ZERO; D]; D], forces: [[Lanes::ZERO; D]; 3] }; most]
     }
 
-    /// The rows of a quad.
+    /// The indices of the rows of a quad.
     pub fn range(&self, quad: usize) -> Range<usize> {
         self.start[quad]..self.start[quad + 1]
     }
@@ -288,14 +291,14 @@ impl<const D: usize> Quads<D> {
     pub fn add_forms<S: Simd>(&self, simd: S, quad: usize, shares: &[Share<D>], band: &mut Band<D>) {
         for k in 0..D {
             for m in k..D {
-                // As many sums at a time as the processor has registers for.
+                // In two parts, so that the sums fit the registers of the processor.
                 self.add_blocks::<S, 0, 2>(simd, quad, shares, [k, m], band);
                 self.add_blocks::<S, 2, 4>(simd, quad, shares, [k, m], band);
             }
         }
     }
 
-    /// Adds the entries (k, m) of COUNT blocks from (i, i + FROM) on.
+    /// Adds to the entries (k, m) of the COUNT blocks (i, i + FROM), (i, i + FROM + 1), …
     #[inline(always)]
     fn add_blocks<S: Simd, const FROM: usize, const COUNT: usize>(
         &self,
@@ -330,7 +333,7 @@ impl<const D: usize> Quads<D> {
         }
     }
 
-    /// Adds forces of the rows of a quad, of the three those of a number.
+    /// Adds to `to` the forces of the rows of a quad with this number, of the three in `Share`.
     #[inline(always)]
     pub fn add_forces<S: Simd>(
         &self,
@@ -351,7 +354,7 @@ impl<const D: usize> Quads<D> {
         }
     }
 
-    /// Qx − p, and the energy ½ xᵀQx.
+    /// Writes Qx − p to `out`; returns ½ xᵀQx.
     #[inline(always)]
     pub fn energy_gradient<S: Simd>(&self, simd: S, x: &Columns<D>, out: &mut Columns<D>) -> f64 {
         out.fill(0.0);

@@ -5,11 +5,11 @@ use std::ops::Range;
 use super::spline::{Spline, DEGREE};
 use super::windows::Fit;
 
-/// Intervals around a halved one that are solved again with it.
+/// Intervals on each side of a halved one that are solved again with it.
 const REACH: usize = 8;
 
-/// Halves intervals and their neighbours: the new fit, its other coefficients as they were, and the ranges of its
-/// intervals to solve.
+/// Halves the chosen intervals and their neighbours. Returns the new fit, in which coefficients away from halved intervals keep
+/// their values, and the ranges of its intervals to solve.
 pub fn halved<'a, const D: usize>(
     fit: &Fit<'a, D>,
     halve: &[bool],
@@ -18,13 +18,13 @@ pub fn halved<'a, const D: usize>(
     let count = halve.len();
     let chosen = |j: usize| halve[j.saturating_sub(1)..(j + 2).min(count)].contains(&true);
     let mut knots = Vec::with_capacity(2 * count);
-    // For each interval: whether it is a half, and of which old interval it is the half or the whole.
+    // For each new interval: whether it is a half, and the old interval from which it comes.
     let mut origin: Vec<(bool, usize)> = Vec::with_capacity(2 * count);
     for j in 0..count {
         let (low, high) = (fit.spline.knots[j], fit.spline.knots[j + 1]);
         let middle = 0.5 * (low + high);
         knots.push(low);
-        // Between knots that differ by rounding alone there is no middle.
+        // Knots that differ by rounding only have no number between them.
         let new = chosen(j) && low < middle && middle < high;
         origin.push((new, j));
         if new {
@@ -47,9 +47,9 @@ pub fn halved<'a, const D: usize>(
     (next, ranges)
 }
 
-/// Coefficients of basis functions that are zero on all halved intervals keep their values.
+/// Copies the coefficients of basis functions that are zero on all halved intervals.
 fn keep_coefficients<const D: usize>(old: &Spline<D>, new: &mut Spline<D>, origin: &[(bool, usize)]) {
-    // The last halved interval up to each place.
+    // The last halved interval at or before i.
     let mut last_new = None;
     let count = origin.len();
     for i in 0..count + DEGREE {

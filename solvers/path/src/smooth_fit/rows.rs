@@ -1,17 +1,17 @@
-//! The tolerance tube as linear rows, which keep samples of the curve within the tolerance of their places on the polyline.
+//! The tolerance tube as linear rows: they keep samples of the curve within the tolerance of their places on the polyline.
 //!
 //! ```text
-//! |n · (C(u) − R)| ≤ FILL ε          for each of the D − 1 normals n, divided by √(D − 1)
+//! |n · (C(u) − R)| ≤ FILL ε/√(D − 1)     for each of the D − 1 normals n
 //! |t · (C(u) − R)| ≤ ALONG ε
 //! ```
 //!
 //! R is the place on the polyline at station u, t the direction of the polyline. At a vertex t is the mean direction of both
 //! chords. Vertices that are held pull the curve as well (see `bends`).
 //!
-//! Without a motion the limit along t is ε, less at a vertex that turns by more than SHARP, so that stations and places of the
-//! curve belong together as closely as the tolerance says. A curve that is fitted to a motion may slip along the polyline at
-//! corners by FITTED_ALONG ε: at 0.01 mm its derivatives then are as small as the tube allows, and a corner of 90° is passed
-//! 9 % sooner. On bends that would only change the speed of the parameter.
+//! Without a motion the limit along t is ε, and SHARP_ALONG ε at a vertex that turns by more than SHARP, so that a station of the
+//! curve stays within the tolerance of the same station of the polyline. A curve that is fitted to a motion may slip along the
+//! polyline at corners by FITTED_ALONG ε. With this, at a tolerance of 0.01 mm, its derivatives get as small as the tube allows,
+//! and a corner of 90° is passed 9 % sooner. On bends, slip would only change the speed of the parameter.
 
 use super::polyline::{Hold, Polyline};
 use super::spline::{around, basis, ORDER};
@@ -19,28 +19,28 @@ use feedplan_geometry::quadratic::{dot, norm, sub};
 
 /// The number of samples of an interval, in addition to the vertices in it.
 const SAMPLES: usize = 4;
-/// The part of the tolerance that samples may use, since the curve is farther away between them.
+/// Samples may use this part of the tolerance, since the curve is farther away between them.
 const FILL: f64 = 0.97;
-/// A vertex that turns by more than this, in rad, has other limits.
+/// A vertex that turns by more than this, in rad, has the limits below, in tolerances.
 const SHARP: f64 = 0.436;
 const SHARP_ACROSS: f64 = 0.95;
 const SHARP_ALONG: f64 = 0.25;
 /// The limit along the polyline at corners of a curve that is fitted to a motion, in tolerances.
 const FITTED_ALONG: f64 = 10.0;
 
-/// A sample with the limits in D orthogonal directions, the last of them along the polyline.
+/// A sample of the curve with its limits in D orthogonal directions, the last of them along the polyline.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<const D: usize> {
     pub basis: [f64; ORDER],
     pub target: [f64; D],
     pub direction: [[f64; D]; D],
     pub half: [f64; D],
-    /// The weight of half the square of the distance.
+    /// The weight in the energy of half the squared distance from the target.
     pub pull: f64,
 }
 
 impl<const D: usize> Row<D> {
-    /// Widens the limits so that the place of these coefficients has a slack of this part of the limit.
+    /// Widens the limits so that the point with coefficients x keeps them with a margin of at least `room` times its distance.
     pub fn admit(&mut self, x: &[[f64; D]], room: f64) {
         let place: [f64; D] =
             std::array::from_fn(|k| self.basis.iter().zip(x).map(|(basis, x)| basis * x[k]).sum());
@@ -51,7 +51,8 @@ impl<const D: usize> Row<D> {
     }
 }
 
-/// The rows of the intervals from `first` on, one for each `density` of energy, and the number of rows before each of them.
+/// The rows of the intervals from `first` on, one interval for each `density` of energy, and the number of rows before each
+/// interval. Targets are relative to `origin`.
 pub fn rows<const D: usize>(
     line: &Polyline<D>,
     knots: &[f64],
@@ -65,7 +66,7 @@ pub fn rows<const D: usize>(
         let (along, limits) = limits(line, chord, vertex);
         (frame(&along), std::array::from_fn(|r| if r + 1 == D { limits[1] } else { limits[0] }))
     };
-    // Most samples lie between the vertices of the same chord as the one before.
+    // Most samples are inside the same chord as the sample before, so its frame and limits are kept.
     let mut inside = (chord, limits_in(chord, None));
     for (j, density) in (first..).zip(density) {
         let (t, low, high) = (around(knots, j), knots[j], knots[j + 1]);
@@ -100,7 +101,7 @@ pub fn rows<const D: usize>(
     (rows, start)
 }
 
-/// How strongly a vertex pulls the curve in an interval of length h, per density of energy.
+/// The weight of a vertex in an interval of length h, divided by the density of energy; 0 if bends need not keep their size.
 fn pull<const D: usize>(line: &Polyline<D>, vertex: usize, h: f64) -> f64 {
     if !line.sized {
         return 0.0;
@@ -109,7 +110,7 @@ fn pull<const D: usize>(line: &Polyline<D>, vertex: usize, h: f64) -> f64 {
     line.hold[vertex].weight(chords, h, line.tolerance_at(vertex))
 }
 
-/// The direction of the polyline at a place, and the limits across and along it.
+/// The direction of the polyline at a place, and the limits across and along it, in mm.
 fn limits<const D: usize>(line: &Polyline<D>, chord: usize, vertex: Option<usize>) -> ([f64; D], [f64; 2]) {
     let across = 1.0 / (D.max(2) as f64 - 1.0).sqrt();
     let after = line.direction[chord];
@@ -141,7 +142,8 @@ fn slip<const D: usize>(line: &Polyline<D>, chord: usize) -> f64 {
     }
 }
 
-/// An orthonormal frame whose last direction is the given one: Gram and Schmidt from the axes farthest from it.
+/// An orthonormal frame whose last direction is the given one: Gram–Schmidt, each time with the axis that leaves the longest
+/// remainder.
 fn frame<const D: usize>(along: &[f64; D]) -> [[f64; D]; D] {
     let mut out = [[0.0; D]; D];
     out[D - 1] = *along;

@@ -4,8 +4,9 @@
 //! h(u)  the largest w with w · angle(V − P(u − w), P(u + w) − V) ≤ C ε, w growing by 1.5
 //! ```
 //!
-//! The polyline so leaves an interval by no more than a few tolerances, and noise below the tolerance does not shorten
-//! intervals. Neighbours differ little: |h'| ≤ GRADE.
+//! V is a vertex and P(u) the polyline. Over the length of an interval the polyline therefore deviates from a straight line by no
+//! more than a few tolerances, and noise below the tolerance does not shorten intervals. Neighbouring intervals differ little:
+//! |h'| ≤ GRADE.
 
 use super::polyline::{is_within, Polyline};
 use feedplan_geometry::elementary::Elementary;
@@ -15,12 +16,12 @@ use feedplan_geometry::quadratic::sub;
 const TURN: f64 = 6.0;
 /// The greatest |h'|.
 const GRADE: f64 = 0.25;
-/// The first w, in tolerances: an interval need not be shorter, however sharp the turn.
+/// The least h, in tolerances, however sharp the turn.
 const LEAST: f64 = 0.5;
 const GROWTH: f64 = 1.5;
-/// The greatest interval, in parts of the length from which a chord is long;
+/// The greatest interval, in parts of the length above which a chord is long.
 const GREATEST: f64 = 0.8;
-/// in a long chord, in parts of it, so that enough intervals lie in its middle to make it straight.
+/// The greatest interval in a long chord, in parts of that chord: enough intervals lie in its middle to make it straight.
 const SHARE: f64 = 0.05;
 /// The least number of intervals of a run.
 const FEWEST: usize = 4;
@@ -50,18 +51,18 @@ pub fn knots<const D: usize>(line: &Polyline<D>, long: f64) -> Vec<f64> {
         knots.push(line.station[chord] + grades[chord].place(aim - before));
     }
     knots.push(line.length());
-    // On coordinates that are large for their tolerance, rounding may make neighbours equal.
+    // Where coordinates are large compared with the tolerance, rounding may make neighbouring knots equal.
     knots.dedup_by(|b, a| *b <= *a);
     knots
 }
 
-/// h along a chord and the integral of 1/h: h rises with slope GRADE, stays at its peak and falls with slope GRADE.
+/// h along a chord and the integral of 1/h: h rises with slope GRADE, is constant at its peak and falls with slope GRADE.
 struct Grade {
     length: f64,
     start: f64,
     end: f64,
     peak: f64,
-    /// The integrals over the three parts.
+    /// The integral of 1/h over each of these three parts.
     parts: [f64; 3],
 }
 
@@ -78,7 +79,7 @@ impl Grade {
         self.parts.iter().sum()
     }
 
-    /// Where the integral from the start has a value.
+    /// The distance from the start of the chord at which the integral of 1/h reaches `value`.
     fn place(&self, value: f64) -> f64 {
         let [rise, flat, _] = self.parts;
         let s = if value <= rise {
@@ -100,7 +101,7 @@ fn sizes<const D: usize>(line: &Polyline<D>, greatest: f64) -> Vec<f64> {
     let mut h: Vec<f64> = epsilon.iter().map(|&e| (LEAST * e).min(greatest)).collect();
     let mut open: Vec<u32> = (1..count as u32 - 1).collect();
     let mut w = LEAST * least * GROWTH;
-    // The ends do not turn.
+    // The polyline does not turn at its ends.
     (h[0], h[count - 1]) = (greatest, greatest);
     while !open.is_empty() && w < GROWTH * greatest {
         let (mut a, mut b) = (0, 0);

@@ -1,14 +1,14 @@
 //! A C4 quintic B-spline over strictly increasing knots, its ends clamped.
 //!
-//! Interval j lies between knots j and j + 1; on it the basis functions of the coefficients j to j + 5 are not zero: these
-//! are the coefficients that it sees.
+//! Interval j lies between knots j and j + 1. The basis functions of the coefficients j to j + 5 are not zero on it: these are
+//! called the coefficients of the interval.
 
 use feedplan_geometry::quadratic::{lerp, sub};
 
 pub const DEGREE: usize = 5;
-/// The number of basis functions, and so of coefficients, of an interval.
+/// The number of basis functions, and of coefficients, of an interval.
 pub const ORDER: usize = DEGREE + 1;
-/// The number of knots on which the basis in an interval depends: five on each side, the ends repeated beyond them.
+/// The number of knots on which the basis in an interval depends: five on each side; at the ends the end knot is repeated.
 const LOCAL: usize = 2 * DEGREE;
 
 #[derive(Clone, Debug, Default)]
@@ -17,7 +17,7 @@ pub struct Spline<const D: usize> {
     pub coefficient: Vec<[f64; D]>,
 }
 
-/// The knots around an interval, which is [t₄, t₅].
+/// The knots around an interval; the interval itself is [t₄, t₅].
 pub type Around = [f64; LOCAL];
 
 /// The knots around interval j.
@@ -26,7 +26,8 @@ pub fn around(knots: &[f64], j: usize) -> Around {
     std::array::from_fn(|k| knots[(j + k).clamp(DEGREE - 1, last + DEGREE - 1) - (DEGREE - 1)])
 }
 
-/// The mean of the five inner knots of coefficient i: linear functions have their own values there as coefficients.
+/// The mean of the five inner knots of coefficient i (Greville abscissa): the coefficients of a linear function are its values
+/// there.
 pub fn greville(knots: &[f64], i: usize) -> f64 {
     let last = knots.len() - 1;
     (i + 1..=i + DEGREE).map(|k| knots[k.clamp(DEGREE, last + DEGREE) - DEGREE]).sum::<f64>() / DEGREE as f64
@@ -53,13 +54,13 @@ fn basis_of_degree(t: &Around, u: f64, degree: usize, out: &mut [f64]) {
     }
 }
 
-/// A quadratic form in the coefficients that an interval sees.
+/// A quadratic form in the six coefficients of an interval.
 pub type Form = [[f64; ORDER]; ORDER];
 
-/// A linear form in the coefficients that an interval sees.
+/// A linear form in the six coefficients of an interval.
 pub type Pull = [f64; ORDER];
 
-/// Places in an interval and their weights, after Gauss: exact for the square of a cubic.
+/// Four Gauss nodes in an interval with their weights: exact for the square of a cubic.
 pub fn gauss(t: &Around) -> [(f64, f64); 4] {
     // Abscissae and weights on [−1, 1].
     const NODES: [(f64, f64); 4] = [
@@ -72,7 +73,7 @@ pub fn gauss(t: &Around) -> [(f64, f64); 4] {
     NODES.map(|(x, weight)| (middle + half * x, half * weight))
 }
 
-/// C'' and C''' at u as linear forms of one axis.
+/// C'' and C''' at u as linear forms in the coefficients of the interval, for one axis.
 pub fn derivative_rows(t: &Around) -> impl Fn(f64) -> [Pull; 2] + '_ {
     let differences = [derivative_coefficients::<2>(t), derivative_coefficients::<3>(t)];
     move |u| {
@@ -85,8 +86,8 @@ pub fn derivative_rows(t: &Around) -> impl Fn(f64) -> [Pull; 2] + '_ {
     }
 }
 
-/// The coefficients of the derivative of an order, a spline of a lower degree, from those of C; rows beyond them are of
-/// no use.
+/// The matrix from the coefficients of C to those of its R-th derivative, a spline of degree DEGREE − R; rows after its first
+/// DEGREE − R + 1 are not used.
 fn derivative_coefficients<const R: usize>(t: &Around) -> [[f64; ORDER]; ORDER] {
     let mut rows = [[0.0; ORDER]; ORDER];
     for (a, row) in rows.iter_mut().enumerate() {
@@ -118,17 +119,17 @@ impl<const D: usize> Spline<D> {
             }
             pieces.push(piece);
         }
-        // Both ends are the coefficients themselves.
+        // The spline begins and ends at its first and last coefficient.
         let last = pieces.len() - 1;
         (pieces[0][0], pieces[last][DEGREE]) = (self.coefficient[0], self.coefficient[last + DEGREE]);
         pieces
     }
 
-    /// The Bernstein control points of interval j: the blossom at its ends.
+    /// The Bézier control points of interval j: the values of the blossom at its ends.
     fn piece(&self, j: usize) -> [[f64; D]; ORDER] {
         let t = around(&self.knots, j);
         let (a, b) = (t[4], t[5]);
-        // Distances from one point of the interval keep the digits far from the origin.
+        // Distances from a point near the interval keep their digits far from the origin.
         let anchor = self.coefficient[j + 2];
         let local: [[f64; D]; ORDER] = std::array::from_fn(|k| sub(&self.coefficient[j + k], &anchor));
         std::array::from_fn(|k| {

@@ -1,8 +1,8 @@
-//! A spline fitted to a run in windows of intervals that are solved in parallel, and then the seams between them.
+//! Fits a spline to a run in windows of intervals that are solved in parallel, then solves the seams between them.
 //!
-//! All windows share one knot vector, so that the spline is C4 whatever its coefficients. Where the coefficients of two
-//! windows meet, the curve may leave the tolerance tube; so the intervals around the seam are solved once more, with the
-//! coefficients at their ends held.
+//! All windows share one knot vector, so that the spline is C4 whatever its coefficients. Where the coefficients of two windows
+//! meet, the curve may leave the tolerance tube. So the intervals around each seam are solved once more, with the coefficients at
+//! their ends held.
 
 use rayon::prelude::*;
 
@@ -18,16 +18,16 @@ use std::ops::Range;
 const WINDOW: usize = 300;
 /// The number of intervals by which a window reaches over its ends, and by which a seam reaches to each side.
 const OVERLAP: usize = 20;
-/// Long chords are straight but for this part of their length at each end,
+/// Long chords are straight except for this part of their length at each end.
 const BENT: f64 = 0.25;
-/// or for this part if the curve is fitted to a motion: more room for corners, and still straight lines.
+/// The same for a curve that is fitted to a motion: corners have more room, and the lines are still straight.
 const FITTED_BENT: f64 = 0.35;
-/// which is at most so many times the length from which a chord is long.
+/// The greatest length of these ends, in multiples of the length above which a chord is long.
 const MOST_BENT: f64 = 4.0;
-/// The least slack of a row with held coefficients, in parts of its limit: the window that they come from may exceed the limit a
-/// little.
+/// The least slack of a row with held coefficients, in parts of its limit, because the window that they come from may exceed the
+/// limit a little.
 const ROOM: f64 = 0.01;
-/// In place of a chord: the coefficient is free.
+/// The value of `pin` for a coefficient that is not held on a long chord.
 pub const FREE: u32 = u32::MAX;
 
 /// The fit of a run.
@@ -39,7 +39,7 @@ pub struct Fit<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Fit<'a, D> {
-    /// The polyline itself as coefficients; those in the middle of chords longer than `long` are held there.
+    /// Starts with the polyline as coefficients. Those in the middle of chords longer than `long` are held there.
     pub fn new(line: &'a Polyline<D>, knots: Vec<f64>, long: f64) -> Self {
         let count = knots.len() - 1 + DEGREE;
         let bent = if line.pace.fitted { FITTED_BENT } else { BENT };
@@ -60,7 +60,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         Self { line, spline: Spline { knots, coefficient }, pin }
     }
 
-    /// Solves the problem in ranges of intervals that are far from each other; other coefficients stay as they are.
+    /// Solves the problem in ranges of intervals that are far from each other. Coefficients outside the ranges keep their values.
     pub fn solve(&mut self, ranges: &[Range<usize>], watch: Watch) {
         let (mut windows, mut seams) = (Vec::new(), Vec::new());
         for range in ranges {
@@ -70,7 +70,7 @@ impl<'a, const D: usize> Fit<'a, D> {
                 let own = cut(i)..cut(i + 1);
                 let wide =
                     range.start.max(own.start.saturating_sub(OVERLAP))..range.end.min(own.end + OVERLAP);
-                // Half of the coefficients around a cut are taken from the window on each side.
+                // Of the coefficients around a cut, the window on each side supplies half.
                 let first = if i == 0 { wide.start } else { own.start + DEGREE / 2 };
                 let end = if i + 1 == parts { wide.end + DEGREE } else { own.end + DEGREE / 2 };
                 let hold = [i == 0, i + 1 == parts];
@@ -105,7 +105,7 @@ impl<'a, const D: usize> Fit<'a, D> {
         }
     }
 
-    /// The coefficients of the basis functions on the intervals of a window.
+    /// Solves a window; returns the coefficients of the basis functions on its intervals.
     fn window(&self, window: &Window, band: &mut Band<D>) -> Vec<[f64; D]> {
         let Window { intervals, hold, .. } = window;
         let (first, end) = (intervals.start, intervals.end);
@@ -155,7 +155,7 @@ impl<'a, const D: usize> Fit<'a, D> {
 /// Intervals that are solved together.
 struct Window {
     intervals: Range<usize>,
-    /// Whether the coefficients that reach over the start, and over the end, keep their values.
+    /// Whether the coefficients that it shares with the intervals before it, and with those after it, keep their values.
     hold: [bool; 2],
     /// The coefficients that are taken from the solution.
     keep: Range<usize>,

@@ -1,4 +1,4 @@
-//! Curved pieces cut in their cusps, so that C' is exactly 0 at both ends there.
+//! Cuts curved pieces in their cusps, and makes C' exactly 0 at ends of pieces that are cusps.
 
 use super::lines::{form, Form};
 use super::pieces::{is_smooth, near, Regular};
@@ -23,8 +23,8 @@ pub fn cut_in_cusps<const M: usize>(source: usize, piece: &Piece<M>, rounding: f
     }
 }
 
-/// The same curve with the control points next to a cusp moved into it, on both sides, so that C' is exactly 0 there. Pieces
-/// that become straight by this become lines.
+/// The same curve with the control points next to a cusp moved into it, on both sides, so that C' is exactly 0 there. Pieces that
+/// become straight by this are replaced by lines.
 pub fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64) -> CompositeCurve<M> {
     let sides = |piece| [false, true].map(|at_end| turns_in_cusp(&piece, at_end, rounding));
     let sides: Vec<[Option<bool>; 2]> = curve.pieces().map(sides).collect();
@@ -57,15 +57,15 @@ pub fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64)
     out
 }
 
-/// The distance from an end of a piece within which the next control point makes a cusp. The path turns there within
-/// reach² over the length of the piece, which is rounding; and no point is moved by more than `CUSP` times the greatest
+/// If the control point next to an end of a piece is within this distance, in mm, the end is a cusp. The path turns there within
+/// reach² divided by the length of the piece, which is a rounding error. No point is moved by more than `CUSP` times the greatest
 /// coordinate.
 fn cusp_reach<const M: usize>(piece: &Piece<M>, rounding: f64) -> f64 {
     let size = rounding / ROUNDING;
     (rounding * piece.extent()).sqrt().min(CUSP * size).max(rounding)
 }
 
-/// Whether the path turns in the cusp at an end of a piece, or its direction there is rounding; None if there is no cusp.
+/// For a cusp at an end of a piece: whether the path turns in it, or its direction there is only rounding. None without a cusp.
 fn turns_in_cusp<const M: usize>(piece: &Piece<M>, at_end: bool, rounding: f64) -> Option<bool> {
     let (control, last, reach) = (piece.control, piece.degree(), cusp_reach(piece, rounding));
     let away = |n: usize| match at_end {
@@ -80,7 +80,7 @@ fn turns_in_cusp<const M: usize>(piece: &Piece<M>, at_end: bool, rounding: f64) 
     Some(norm(&edge) <= rounding || !is_smooth(&edge, &long, rounding))
 }
 
-/// Moves the points that follow the first one within reach of it to it.
+/// Moves the points that follow the first one to it, as long as they are within `reach` of it.
 fn join_first<'a, const M: usize>(mut points: impl Iterator<Item = &'a mut [f64; M]>, reach: f64) {
     let Some(&mut first) = points.next() else { return };
     for point in points.take_while(|point| near(point, &first, reach)) {

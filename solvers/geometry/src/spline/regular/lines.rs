@@ -1,4 +1,4 @@
-//! The form of a piece, and straight pieces of any degree, or neighbours on one line, as lines from turn to turn.
+//! Recognises straight pieces of any degree, and turns them and their neighbours on the same line into lines from turn to turn.
 
 use super::pieces::{near, Regular};
 use crate::polynomial::Polynomial;
@@ -8,7 +8,7 @@ use crate::spline::{Piece, MAX_HODOGRAPH};
 
 /// The form of a piece.
 pub enum Form<const M: usize> {
-    /// Its start, its turns and its end.
+    /// Its start, the places where it turns back, and its end.
     Straight(Vec<LinePoint<M>>),
     Curved,
     /// It has no length.
@@ -19,7 +19,7 @@ pub enum Form<const M: usize> {
 #[derive(Clone, Copy)]
 pub struct LinePoint<const M: usize> {
     pub point: [f64; M],
-    /// The parameter from the start of the first of them.
+    /// The parameter, counted from the start of the first of the pieces.
     u: f64,
     /// The pieces before and after it.
     pieces: [usize; 2],
@@ -33,7 +33,7 @@ struct Line<const M: usize> {
 }
 
 impl<const M: usize> Line<M> {
-    /// Through two of the points that are far apart; None if all are equal.
+    /// The line through two of the points that are far apart; None if all points are equal.
     fn through(points: impl Iterator<Item = [f64; M]> + Clone) -> Option<Self> {
         let farthest = |from: &[f64; M]| {
             let apart = |point: &[f64; M]| norm(&sub(point, from));
@@ -49,7 +49,7 @@ impl<const M: usize> Line<M> {
         dot(&sub(point, &self.origin), &self.direction)
     }
 
-    /// Whether a point is on it, up to rounding.
+    /// Whether a point is on the line, up to rounding.
     fn contains(&self, point: &[f64; M], rounding: f64) -> bool {
         let (offset, along) = (sub(point, &self.origin), self.along(point));
         norm(&std::array::from_fn::<f64, M, _>(|k| offset[k] - along * self.direction[k])) <= rounding
@@ -76,7 +76,7 @@ pub fn form<const M: usize>(i: usize, piece: &Piece<M>, rounding: f64) -> Form<M
 }
 
 impl<const M: usize> Form<M> {
-    /// Its first line, or with `at_end` its last; None if it is not straight.
+    /// The first line of a straight form, or with `at_end` the last; None if the form is not straight.
     pub fn edge(&self, at_end: bool) -> Option<[f64; M]> {
         let Self::Straight(points) = self else { return None };
         let i = if at_end { points.len() - 2 } else { 0 };
@@ -97,7 +97,7 @@ impl<const M: usize> Default for Straight<M> {
 }
 
 impl<const M: usize> Straight<M> {
-    /// Adds a straight piece if it begins at the last point and is on the same line; false if not.
+    /// Adds a straight piece if it begins at the last point and is on the same line; otherwise returns false.
     pub fn extend(&mut self, next: &[LinePoint<M>], rounding: f64) -> bool {
         let Some((line, end)) = self.line.as_ref().zip(self.points.last().copied()) else {
             self.points.extend_from_slice(next);
@@ -108,7 +108,7 @@ impl<const M: usize> Straight<M> {
             return false;
         }
         let points = || self.points.iter().chain(next).map(|place| place.point);
-        // Beyond twice the length of the known line its direction may be wrong: it is computed again.
+        // If a point is beyond twice the length of the known line, its direction may be inaccurate: it is computed again.
         let known = |place: &LinePoint<M>| {
             let reached = line.along(&place.point);
             line.contains(&place.point, rounding) && reached.abs() <= 2.0 * line.length
@@ -148,7 +148,7 @@ impl<const M: usize> Straight<M> {
     }
 }
 
-/// The derivative, or on rational pieces its numerator, of a linear function of the points.
+/// The derivative (on rational pieces its numerator) of a linear function of the points along the piece.
 fn rate<const M: usize>(
     piece: &Piece<M>,
     along: impl Fn(&[f64; M]) -> f64,
@@ -164,7 +164,7 @@ fn rate<const M: usize>(
     }
 }
 
-/// Removes turns between which the path is no longer than rounding, the shortest first. Both ends stay where they are.
+/// Removes turns between which the path is not longer than `rounding`, the shortest first. Both ends stay where they are.
 fn drop_rounding<T>(points: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f64) {
     loop {
         let way = |i: usize| (along(&points[i + 1]) - along(&points[i])).abs();
@@ -175,11 +175,11 @@ fn drop_rounding<T>(points: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f6
         let last = points.len() - 1;
         let step = |i: usize| along(&points[i + 1]) - along(&points[i]);
         match shortest {
-            // Two turns between which the path is rounding: it goes on in the same direction.
+            // The path between two turns is rounding: it continues in the same direction.
             i if i > 0 && i + 1 < last && step(i - 1) * step(i + 1) > 0.0 => drop(points.drain(i..i + 2)),
-            // Two points of one turn.
+            // Two points at one turn.
             i if i > 0 && i + 1 < last => drop(points.remove(i)),
-            // All of the path is rounding.
+            // The whole path is rounding.
             _ if last == 1 => drop(points.drain(..)),
             0 => drop(points.remove(1)),
             i => drop(points.remove(i)),
