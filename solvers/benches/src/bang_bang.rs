@@ -1,4 +1,5 @@
-//! Time per piece of the exact planner on one thread, from ten pieces to a million: it should not depend on the number.
+//! Measures the time per piece of the exact planner on one thread, for ten pieces to a million: it should not depend on their
+//! number.
 
 use std::time::Duration;
 
@@ -9,7 +10,7 @@ use feedplan_geometry::spline::CompositeCurve;
 use feedplan_planner::problem::Problem;
 use feedplan_planner::Exact as _;
 
-/// A C1 quadratic B-spline as a CAM system's points give it: edges of 0.3 to 3 mm, small turns, 8 % sharp ones.
+/// A C1 quadratic B-spline like those through points of a CAM system: edges of 0.3 to 3 mm, small turns, 8 % of them sharp.
 fn cam_path(count: usize, seed: u64) -> Vec<Quadratic<3>> {
     let mut random = Random(seed);
     let mut direction = [1.0, 0.0, 0.0];

@@ -1,5 +1,5 @@
-//! Time of the fit per chain: a smooth finishing pass as a CAM system posts it, sizes from 500 to 500 000
-//! points on one thread and on all, and two chains that need much refinement.
+//! Measures the time of the fit per chain: a smooth finishing pass like those of CAM systems, of 500 to 500 000 points, on one
+//! thread and on all, and two chains that need much refinement.
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_geometry::watch::Watch;
@@ -12,8 +12,7 @@ const OPTIONS: FitOptions = FitOptions {
     corner_angle: std::f64::consts::FRAC_PI_6,
 };
 
-/// A freeform relief, cut back and forth with steps of about 0.25 mm, on a grid of 1 µm as programs are
-/// written.
+/// A freeform relief, cut back and forth with steps of about 0.25 mm, on a grid of 1 µm, the usual resolution of programs.
 fn finishing(count: usize) -> Vec<[f64; 3]> {
     let grid = |value: f64| (value * 1000.0).round() / 1000.0;
     let mut points: Vec<[f64; 3]> = (0..count)
@@ -29,7 +28,7 @@ fn finishing(count: usize) -> Vec<[f64; 3]> {
     points
 }
 
-/// Noise above the tolerance on a line: no smooth curve through the points holds it.
+/// A line with noise greater than the tolerance: no smooth curve follows the points within the tolerance.
 fn rough(count: usize) -> Vec<[f64; 3]> {
     let mut state = 1_u64;
     let mut random = || {
@@ -39,8 +38,7 @@ fn rough(count: usize) -> Vec<[f64; 3]> {
     (0..count).map(|i| [0.02 * i as f64, 0.06 * random(), 0.06 * random()]).collect()
 }
 
-/// Chords of a spiral of growing radius: no extremes, no breaks, and the outer chords too long for the
-/// tolerance.
+/// Chords of a spiral of growing radius, without extremes and breaks; the outer chords are too long for the tolerance.
 fn spiral(count: usize) -> Vec<[f64; 3]> {
     (0..count)
         .map(|i| {

@@ -1,5 +1,5 @@
-//! The number of blocks that are read in a second: straight moves, arcs, calls and expressions. A line counts each time
-//! that it is run.
+//! Measures the number of blocks read per second: straight moves, arcs, calls and expressions. A line counts each time that it is
+//! run.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -20,7 +20,7 @@ fn lines() -> String {
     text + "M30\n"
 }
 
-/// The shortest text of modal blocks.
+/// Modal blocks with as little text as possible.
 fn short_lines() -> String {
     let mut text = String::from("G21G90G17\nG0Z5\nG1F2000\n");
     for i in 0..BLOCKS {

@@ -1,5 +1,6 @@
-//! Time per interval and iteration of the jerk-limited planner in three axes on one thread: of whole plans, preparation and
-//! checks between the stations included, and of iterations alone, from two plans that differ in their number only.
+//! Measures the time per interval and iteration of the jerk-limited planner in three axes on one thread: of whole plans,
+//! including preparation and checks between the stations, and of iterations alone, from two plans that differ only in the number
+//! of iterations.
 
 use std::time::{Duration, Instant};
 
@@ -36,7 +37,7 @@ impl Geometry<3> for Winding {
     }
 }
 
-/// The numbers of iterations of the two plans; neither converges in them.
+/// The numbers of iterations of the two plans; both are too few to converge.
 const ITERATIONS: [usize; 2] = [3, 12];
 
 fn jerk_limited(criterion: &mut Criterion) {

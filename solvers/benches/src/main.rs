@@ -1,4 +1,5 @@
-//! Times of kernels: `cargo run --release -p feedplan-benches -- --bench NAME`, the name of a group or a part of it.
+//! Measures the times of kernels: `cargo run --release -p feedplan-benches -- --bench NAME`, where NAME is the name of a group or
+//! a part of it.
 
 mod bang_bang;
 mod fit;

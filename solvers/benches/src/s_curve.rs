@@ -1,5 +1,5 @@
-//! Time per segment of the jerk-limited profiler by segment length, as short segments need more of them to stop; and of
-//! the path dynamics before it.
+//! Measures the time per segment of the jerk-limited profiler for several segment lengths, since stopping takes more segments if
+//! they are short; and the time of the path dynamics before it.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_jerk::path_limits::{allowable, bounded, sampled, AxisLimits, Curve};
 use feedplan_jerk::s_curve::{Limits, Profiler, Segment};
 
-/// Segments of about a length with speeds of 30 to 100 mm/s.
+/// Segments of about this length with speeds of 30 to 100 mm/s.
 fn segments(count: usize, length: f64) -> Vec<Segment> {
     let limits = Limits { acceleration: 1000.0, jerk: 50_000.0 };
     (0..count)

@@ -1,8 +1,8 @@
-//! Time per setpoint with all derivatives, by the law of the phases, and per inversion of a length table.
+//! Measures the time per setpoint with all derivatives, for each law of the phases, and per inversion of a length table.
 //!
-//! The path is one C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each, the same with its degree
-//! raised, and with weights that change the parameter; its profile is synthetic (no planner takes part): constant
-//! feed, or X speeding up and slowing down piece by piece.
+//! The path is a C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each; also with its degree raised, and with
+//! weights that change the parameter. Its profile does not come from a planner: constant feed, or X speeding up and slowing down
+//! in turn from piece to piece.
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_geometry::spline::bezier::elevate;
@@ -31,7 +31,7 @@ fn spline() -> CompositeCurve<3> {
     curve
 }
 
-/// The same points with the degree raised, and with the weights 1, r, r²: X is no longer linear in u.
+/// The same points with the degree raised by `by`, and with the weights 1, r, r²: X is no longer linear in u.
 fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
     let mut raised = CompositeCurve::default();
     for piece in curve.pieces() {

@@ -1,5 +1,5 @@
-//! The time per point of a curve: derivatives to the third, lengths and points at lengths; and per piece: extraction,
-//! length table, cusps. Cubics in three axes, polynomial and rational.
+//! Measures the time per point of a curve: derivatives up to the third, lengths, and points at lengths; and the time per piece:
+//! extraction, length table, cusps. Cubics in three axes, polynomial and rational.
 
 use criterion::{criterion_group, Criterion, Throughput};
 use feedplan_geometry::spline::bezier::derivatives;

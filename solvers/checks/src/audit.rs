@@ -1,23 +1,24 @@
-//! An audit of a profile against all limits, from the control points and the columns of the profile alone.
+//! Audits a profile against all limits, only from the control points and the columns of the profile.
 
 use feedplan_planner::phases::Phases;
 
 use super::cases::Case;
 
-/// The worst figures of a profile; those of limits are value/limit − 1.
+/// The worst figures of a profile; for the limits these are value/limit − 1.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Audit {
     pub acceleration: f64,
     pub velocity: f64,
     pub feed: f64,
     pub chord: f64,
-    /// The greatest margin to the nearest limit over all phases.
+    /// The greatest distance from the nearest limit, |value/limit − 1|, over all samples: everywhere some limit should be
+    /// reached.
     pub idle: f64,
     /// The greatest jump of v², relative to the greatest v² nearby.
     pub jump: f64,
     /// The greatest deviation of p at the end of a phase from the law of the phase, relative to p.
     pub ends: f64,
-    /// The greatest deviation of a duration from its integral over small steps, relative to the whole time.
+    /// The greatest deviation of a duration from that computed from the law of the phase, relative to the whole time.
     pub duration: f64,
 }
 
@@ -73,8 +74,8 @@ pub fn audit<const M: usize>(case: &Case<M>, phases: &Phases, samples: usize) ->
                 worst.ends = worst.ends.max((end.p - p).abs() / p.max(end.p).max(f64::MIN_POSITIVE));
             }
         }
-        // u is rounded: on a short phase, near a cusp, and where the axis of the phase hardly moves, this part of the
-        // figures is rounding.
+        // The part of the figures that comes from the rounding of u: large on a short phase, near a cusp, and where the axis of
+        // the phase hardly moves.
         let longest = arc.left.iter().chain(&arc.right).fold(0.0, |most: f64, g| most.max(g.abs()));
         let shortest = ends[0].d.min(ends[1].d).sqrt();
         let axis = match phases.kind[row] {
@@ -114,7 +115,7 @@ pub fn audit<const M: usize>(case: &Case<M>, phases: &Phases, samples: usize) ->
                 let limit = if radius > delta { 2.0 * radius * delta - delta * delta } else { delta * delta };
                 let ratio = v_sq / (speed * speed * limit);
                 worst.chord = worst.chord.max(ratio - 1.0 - grain);
-                // The planner keeps p below a straight line, which is below the limit by up to this fraction.
+                // The planner keeps v² below a straight line, which is below the limit by up to this fraction.
                 if ratio > 1.0 - 2e-3 {
                     nearest = 0.0;
                 }
@@ -146,7 +147,7 @@ struct ArcLaw<'a, const M: usize> {
     right: [f64; M],
     bend: [f64; M],
     twist: f64,
-    /// The start of the constant acceleration: u and v_k² there.
+    /// The end of the phase where v_k² is smaller, from which p is computed: u and v_k² there.
     anchor: (f64, f64),
 }
 
@@ -198,7 +199,7 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
             0 => {
                 let from = self.tangent(self.anchor.0)[k];
                 let p = (self.anchor.1 + value * (from + g[k]) * (u - self.anchor.0)) / (g[k] * g[k]);
-                // In a form without the difference value − c p, which cancels.
+                // In a form without the difference value − c p, which loses digits by cancellation.
                 let acceleration = std::array::from_fn(|l| {
                     let twist = c[k] * g[l] - c[l] * g[k];
                     (g[l] * value - twist * p) / g[k]
@@ -228,7 +229,7 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
         Place { g, d, p, acceleration }
     }
 
-    /// The time by its definition: gained speed over acceleration, length over speed, or the integral of du/√p.
+    /// The duration [s]: change of the axis's speed divided by its acceleration, or the integral of du/√p.
     fn duration(&self) -> f64 {
         let row = self.row;
         let (u0, u1) = (self.phases.u0[row], self.phases.u1[row]);

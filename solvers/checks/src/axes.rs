@@ -1,4 +1,4 @@
-//! Numbers of axes: those of random cases, and those that kernels are compiled for.
+//! The numbers of axes of random cases, and those for which kernels are compiled.
 
 /// Runs an expression for one of `AXES`, known at run time: `for_axes!(count, M, expression)`.
 #[macro_export]
@@ -17,13 +17,13 @@ macro_rules! for_axes {
     };
 }
 
-/// The numbers of axes of cases: with 1 and 2 there are axes that rest.
+/// The numbers of axes of cases; with 1 and 2, some axes of the kernels rest.
 pub const AXES: [usize; 4] = [1, 2, 3, 6];
 
-/// Those for the kernels of curves.
+/// The numbers of axes of cases for the kernel of curves.
 pub const FEW_AXES: [usize; 3] = [1, 2, 3];
 
-/// The number of axes that kernels are compiled for, as in the Python module.
+/// The number of axes for which kernels are compiled, as in the Python module.
 pub const PADDED: usize = 3;
 
 /// The values of all axes, with `still` for axes that rest.

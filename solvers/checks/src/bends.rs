@@ -1,4 +1,5 @@
-//! Plane paths of smooth bends: the curvature is a sum of bumps, so that everything has a closed form.
+//! Plane paths of smooth bends, for which the jerk-limited planner needs only closed forms: the curvature is a sum of sech²
+//! bumps.
 
 use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 
@@ -27,7 +28,7 @@ impl Bends {
         Self { knots, bends, theta: 0.3, feed: f64::INFINITY }
     }
 
-    /// The same with another direction at the start.
+    /// From bends as for `new`, with the direction `theta` [rad] at the start.
     pub fn turned(length: f64, bends: Vec<Bend>, theta: f64) -> Self {
         Self { theta, ..Self::new(length, bends) }
     }

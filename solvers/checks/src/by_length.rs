@@ -81,7 +81,7 @@ impl<C: Curve<M>, const M: usize> Geometry<M> for ByLength<C, M> {
 
     fn at(&self, piece: usize, s: f64) -> PathPoint<M> {
         let (start, end) = (self.knots[piece], self.knots[piece + 1]);
-        // At a knot, the derivatives are those of the piece that is asked for.
+        // At a knot, the derivatives are those of the given piece.
         let inside = 1e-9 * (end - start);
         let t = self.parameter(piece, s.clamp(start + inside, end - inside));
         let [_, d1, d2, d3] = self.curve.at(t);

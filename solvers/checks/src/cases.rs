@@ -21,8 +21,8 @@ pub struct Case<const M: usize> {
 }
 
 impl<const M: usize> Case<M> {
-    /// The path with these tangents dC/du at both ends of each piece, its middle control points at the origin so
-    /// that the tangents come out of the control points without a loss.
+    /// The path with these tangents dC/du at both ends of each piece. The middle control points are at the origin, so that the
+    /// control points give back the tangents without rounding.
     pub fn from_tangents(tangents: &[([f64; M], [f64; M])], width: &[f64]) -> Self {
         let pieces: Vec<Quadratic<M>> = tangents
             .iter()
@@ -147,7 +147,7 @@ pub fn random_case<const M: usize>(seed: u64) -> Case<M> {
     case_of_kinds(seed, 9)
 }
 
-/// The same without cusps that are exact up to rounding, and without axes that hardly move.
+/// Like `random_case`, but without near cusps and without axes that hardly move.
 pub fn milder_case<const M: usize>(seed: u64) -> Case<M> {
     case_of_kinds(seed, 7)
 }
@@ -215,7 +215,7 @@ fn case_of_kinds<const M: usize>(seed: u64, kinds: usize) -> Case<M> {
             }
         }
     }
-    // Every piece has a length.
+    // Pieces of length 0 get a length.
     for (left, right) in &mut tangents {
         if left.iter().chain(right.iter()).all(|&x| x == 0.0) {
             left[0] = 1.0;
@@ -237,7 +237,7 @@ fn case_of_kinds<const M: usize>(seed: u64, kinds: usize) -> Case<M> {
         *limit = if stops { 0.0 } else { random.between(0.05, 0.5) };
     }
     if random.chance(0.3) {
-        // α = 8 δ/T² near the accelerations, δ from far below to far above the radii.
+        // α = 8 δ/T² near the acceleration limits, δ from far below to far above the radii of curvature.
         case.chord_tolerance = random.exponential(-10.0, 1.0);
         let alpha = strength * random.exponential(-3.0, 1.0);
         case.period = (8.0 * case.chord_tolerance / alpha).sqrt();

@@ -92,8 +92,8 @@ pub fn random_curves<const M: usize>(seed: u64) -> CurveCase<M> {
     for i in 0..count {
         let degree = 2 + random.below(most - 1);
         let width = random.exponential(-2.0, 2.0);
-        // Tangents as a polynomial of degree − 1 in Bernstein form, smooth at the ends of pieces unless the kind says
-        // otherwise.
+        // Tangents as a polynomial of degree − 1 in Bernstein form, continuous at the ends of pieces unless the kind of the
+        // case breaks it.
         let mut rates: Vec<[f64; M]> = (0..degree).map(|_| random.normals()).collect();
         rates[0] = tangent.map(|x| x * width);
         match kind {

@@ -1,4 +1,4 @@
-//! Cases as problems of the planner: of quadratic pieces with their degree or an elevated one; and their plans.
+//! Turns cases of quadratic pieces into problems of the planner, with degree 2 or an elevated one, and plans them.
 
 use feedplan_geometry::quadratic::{lerp, norm, sub};
 use feedplan_geometry::spline::bezier::elevate;
@@ -11,7 +11,7 @@ use feedplan_planner::Exact as _;
 use super::axes::padded;
 use super::cases::Case;
 
-/// A problem of one run from rest to rest, on pieces alone, with these greatest velocities and accelerations.
+/// A problem of one run from rest to rest, without a chord-error limit, with these greatest velocities and accelerations.
 pub fn problem<'a, const P: usize>(
     curve: &'a CompositeCurve<P>,
     runs: &'a [usize; 2],
@@ -40,7 +40,7 @@ pub fn problem<'a, const P: usize>(
     }
 }
 
-/// The curve of such a problem in P axes; axes that the case does not have rest.
+/// The curve of a case in P axes; axes that the case does not have rest.
 pub struct Elevated<const P: usize> {
     curve: CompositeCurve<P>,
     runs: [usize; 2],

@@ -3,7 +3,7 @@
 use crate::axes::{padded, PADDED};
 use feedplan_jerk::jerk_limited::{self, Effort, Fault, Geometry, Limits, PathPoint, Plan, Problem};
 
-/// A path of any kind, with axes that rest for those that it does not have.
+/// A path of any kind in `PADDED` axes; those that it does not have rest.
 struct Path<'a>(Box<dyn Fn(usize, f64) -> PathPoint<PADDED> + Sync + 'a>, &'a [f64]);
 
 impl Geometry<PADDED> for Path<'_> {
@@ -16,7 +16,7 @@ impl Geometry<PADDED> for Path<'_> {
     }
 }
 
-/// `jerk_limited::plan`.
+/// Calls `jerk_limited::plan` with the problem in `PADDED` axes.
 pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
     let at = |piece, s| {
         let PathPoint { first, second, third, speed_cap } = problem.geometry.at(piece, s);

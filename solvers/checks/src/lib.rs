@@ -1,5 +1,5 @@
-//! What tests of kernels share: random problems, curves and polylines, curves by their length, and an audit of profiles that
-//! shares no formula with the planner.
+//! The parts that tests of kernels have in common: random problems, curves and polylines, curves by their length, and an audit of
+//! profiles that shares no formula with the planner.
 
 mod audit;
 mod axes;

@@ -46,8 +46,8 @@ pub fn to_segment<const D: usize>(a: &[f64; D], b: &[f64; D], p: &[f64; D]) -> f
     distance(p, &std::array::from_fn(|k| a[k] + t * (b[k] - a[k])))
 }
 
-/// The greatest distance of samples of the curve from the chords they follow, three more on each side, and of samples
-/// of the chords from the curve.
+/// The greatest distance of samples of the curve from the chords that they follow (or from three more chords on each side), and
+/// of samples of the chords from the curve.
 pub fn dense<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>) -> f64 {
     const NEAR: usize = 3;
     let (mut worst, mut samples) = (0.0f64, Vec::new());

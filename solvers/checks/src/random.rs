@@ -17,12 +17,12 @@ impl Random {
         low + (high - low) * self.uniform()
     }
 
-    /// e to a random power between these two.
+    /// e to a random power between `low` and `high`.
     pub fn exponential(&mut self, low: f64, high: f64) -> f64 {
         self.between(low, high).exp()
     }
 
-    /// 10 to a random power between these two.
+    /// 10 to a random power between `low` and `high`.
     pub fn power(&mut self, low: f64, high: f64) -> f64 {
         10f64.powf(self.between(low, high))
     }

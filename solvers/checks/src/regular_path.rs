@@ -4,7 +4,7 @@ use feedplan_geometry::spline::regular::regular;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
-/// The pieces of such a path, in one run.
+/// The pieces of a path that the planner accepts, in one run.
 pub struct RegularPath<const M: usize> {
     pub curve: CompositeCurve<M>,
     /// For each piece, the given piece that it is a part of.
@@ -14,7 +14,7 @@ pub struct RegularPath<const M: usize> {
 }
 
 impl<const M: usize> RegularPath<M> {
-    /// From the given pieces, each by itself, and the greatest speeds at their ends.
+    /// From the given pieces, each processed alone, and the greatest speeds at their ends.
     pub fn new(given: &CompositeCurve<M>, speeds: &[f64]) -> Self {
         let each: Vec<_> = (0..given.len()).map(|i| i..i + 1).collect();
         let found = regular(given, &each, Watch::default());

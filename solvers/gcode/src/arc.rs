@@ -1,6 +1,6 @@
-//! The centre and the sweep of a G2 or G3 arc, from its centre offsets or its radius.
+//! Computes the centre and the sweep of a G2 or G3 arc from its centre offsets or its radius.
 //!
-//! Tolerances are LinuxCNC's defaults, so that a program that runs there is read here. Points are in the plane of the
+//! Tolerances are LinuxCNC's defaults, so that every program that runs there is accepted here. Points are in the plane of the
 //! arc, in the order that makes it right-handed: (X, Y), (Z, X), (Y, Z).
 
 use std::f64::consts::TAU;
@@ -11,7 +11,7 @@ use super::tolerance::{
     HALF_CHORD, RADIUS_SLACK, SAME_ANGLE, SAME_POINT, SPIRAL_INCH, SPIRAL_MM, SPIRAL_MOST, SPIRAL_RELATIVE,
 };
 
-/// The words that an arc is programmed by.
+/// How an arc is programmed.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// The centre, and whether the program is in inches.
@@ -65,7 +65,7 @@ fn check_radii(start: Point2, end: Point2, centre: Point2, inches: bool) -> Outc
     Ok(())
 }
 
-/// The centre on that side of the chord which the direction and the sign of the radius choose.
+/// The centre of an arc with an R word: the direction and the sign of the radius determine on which side of the chord it is.
 fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcome<Point2> {
     let chord = minus(end, start);
     let length = distance(start, end);
@@ -79,8 +79,8 @@ fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcom
             radius.abs()
         );
     }
-    // A radius that exceeds half the chord by no more than the rounding of coordinates is half the chord: the square root
-    // would turn that rounding into a visible height.
+    // A radius that exceeds half the chord by no more than the rounding of coordinates is taken as half the chord: the square
+    // root would turn that rounding into a visible height.
     let largest = [start[0], start[1], end[0], end[1]].iter().fold(half, |most, value| most.max(value.abs()));
     let rounding = HALF_CHORD * largest;
     let excess = if radius.abs() - half > rounding { radius.abs() - half } else { 0.0 };

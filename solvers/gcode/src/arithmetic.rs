@@ -4,7 +4,7 @@ use super::fault::Outcome;
 use super::number::{behind_word, spaces};
 use super::tolerance::EQUAL;
 
-/// What the name of a function stands for.
+/// A function, by its kind of argument.
 #[derive(Clone, Copy)]
 pub enum Function {
     /// A function of one number.
@@ -38,7 +38,7 @@ pub fn function_at(source: &[u8], at: usize) -> Option<(Function, &'static str, 
     })
 }
 
-/// An operator: its name, how tightly it binds, and what it makes of two numbers.
+/// An operator: its name, its precedence (a greater one binds more tightly), and its result for two numbers.
 pub struct Operator {
     pub name: &'static str,
     pub binding: u8,
@@ -49,7 +49,7 @@ const fn operator(name: &'static str, binding: u8, result: fn(f64, f64) -> f64) 
     Operator { name, binding, result }
 }
 
-/// In this order the first name that a text begins with is the right one.
+/// In this order, the first name that matches the start of a text is the right one: `**` comes before `*`.
 static OPERATORS: [Operator; 15] = [
     operator("**", 5, f64::powf),
     operator("*", 4, |a, b| a * b),
@@ -80,7 +80,7 @@ impl Operator {
     }
 }
 
-/// A value; a fault where it is not finite, with the formula that it is the value of.
+/// Returns the value; a fault that names its formula if it is not finite.
 pub fn finite(value: f64, formula: impl Fn() -> String) -> Outcome<f64> {
     if value.is_finite() {
         return Ok(value);
@@ -96,7 +96,7 @@ fn equal(a: f64, b: f64) -> bool {
     (a - b).abs() < EQUAL
 }
 
-/// The remainder from 0 to the size of the divisor, whatever the signs.
+/// The remainder of a/b, at least 0 and less than |b| whatever the signs.
 fn modulo(a: f64, b: f64) -> f64 {
     let rest = a % b;
     if rest < 0.0 {

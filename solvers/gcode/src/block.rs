@@ -1,7 +1,7 @@
 //! The words of one block of a program, and the modal groups that G and M codes belong to.
 //!
-//! A G code is a number of tenths (G5.1 is 51). Two codes of one group exclude each other in a block. The groups are those
-//! of RS-274/NGC; a code in no group is not read.
+//! A G code is a number of tenths (G5.1 is 51). Two codes of one group exclude each other in a block. The groups are those of
+//! RS-274/NGC; a code in no group is an error.
 
 use super::fault::Outcome;
 use super::number::integer;
@@ -117,7 +117,7 @@ const GROUP_OF: [u8; 1541] = {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum MGroup {
-    /// Codes that only some machine knows; a block may have several.
+    /// Codes whose meaning depends on the machine; a block may have several.
     Other = 0,
     Call = 1,
     Saved = 2,
@@ -171,7 +171,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Forgets all words; their values stay until they are written over.
+    /// Removes all words; their values stay in memory until they are overwritten.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.words = 0;
@@ -191,8 +191,8 @@ impl Block {
         self.polar.iter().any(Option::is_some)
     }
 
-    /// Drops the words of a block without G codes that begins with an M code of unknown meaning: they belong to that
-    /// code. Codes below M100 leave F, S and T.
+    /// Removes the words of a block that has no G code and begins with an M code of unknown meaning: they are arguments of that
+    /// code. With codes below M100, F, S and T stay.
     pub fn leave_to(&mut self, code: u16) {
         if self.groups == 0 {
             self.words &= if code < 100 { bits(b"FST") } else { 0 };
@@ -261,7 +261,7 @@ impl Block {
         }
         if self.groups & (1 << group) != 0 {
             let other = self.codes[group as usize];
-            // Posts write G80 beside the motion that replaces the cycle: the motion is taken.
+            // Some postprocessors write G80 in the same block as the motion that replaces the cycle: then the motion counts.
             match (other, code) {
                 (800, _) if group == Group::Motion as u8 => {}
                 (_, 800) => return Ok(()),

@@ -1,9 +1,10 @@
-//! Cutter compensation, G41 and G42: the tool moves beside the programmed path, at the distance of its radius.
+//! Cutter compensation, G41 and G42: the tool's centre moves parallel to the programmed path, at the distance of the tool's
+//! radius.
 //!
-//! As in LinuxCNC, the first move ends beside its programmed end. At a corner that turns away from the tool, an arc about
-//! the corner joins the offsets. At a corner that turns towards the tool, each offset ends where it meets the other. A
-//! corner of less than `NO_CORNER` changes nothing. After G40 the tool stays beside the path until the next straight
-//! move, which ends on the programmed path.
+//! As in LinuxCNC, the first move ends at this distance from its programmed end. At a corner that turns away from the tool, an
+//! arc about the corner joins the offsets. At a corner that turns towards the tool, each offset ends where it meets the other. A
+//! corner of less than `NO_CORNER` changes nothing. After G40 the tool stays beside the path until the next straight move, which
+//! ends on the programmed path.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,8 +17,8 @@ use super::moves::Kind;
 use super::plane::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
 use super::tolerance::{ENTRY_BEND, NO_CORNER, WHOLE_TURNS};
 
-/// The vector from the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for each of the
-/// sides 0 to 9 that may cut.
+/// The vector from the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for each cutting side 0 to
+/// 9.
 const ORIGINS: [Point2; 10] = [
     [0.0, 0.0],
     [1.0, -1.0],
@@ -31,7 +32,7 @@ const ORIGINS: [Point2; 10] = [
     [0.0, 0.0],
 ];
 
-/// How the tool's path goes on at a corner.
+/// How the tool's path continues at a corner.
 struct Corner {
     /// The start of the next element.
     start: Point2,
@@ -40,7 +41,7 @@ struct Corner {
 }
 
 impl Interpreter<'_> {
-    /// The compensation between G41 or G42 and G40.
+    /// The compensation after G41 or G42; None after G40.
     fn compensating(&self) -> Option<&Compensation> {
         self.compensation.as_deref().filter(|on| on.phase != Phase::Leaving)
     }
@@ -50,7 +51,7 @@ impl Interpreter<'_> {
         self.compensating().map_or(400, |on| 415 - (5.0 * on.side) as u16)
     }
 
-    /// G40 to G42.1.
+    /// Executes G40, G41, G42, G41.1 and G42.1.
     pub fn set_compensation(&mut self, block: &Block, code: u16) -> Outcome<()> {
         if code == 400 {
             if let Some(mut on) = self.compensation.take().filter(|on| on.phase != Phase::Entering) {
@@ -109,7 +110,8 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// After a tool change the position of the machine is the programmed one.
+    /// At a tool change, ends a compensation that G40 has cancelled: from then on the position of the machine is the programmed
+    /// one.
     pub fn forget_compensation(&mut self) {
         if self.compensation.as_ref().is_some_and(|on| on.phase == Phase::Leaving) {
             self.compensation = None;
@@ -140,7 +142,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// A straight move of the programmed path.
+    /// Adds the tool's path for a straight move of the programmed path to `target`.
     #[cold]
     pub fn go_beside(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
         let Some(mut on) = self.compensation.take() else { return Ok(()) };
@@ -190,7 +192,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// An arc of the programmed path about `centre`, by its signed sweep.
+    /// Adds the tool's path for an arc of the programmed path about `centre` with the signed sweep `angle` in radians.
     pub fn arc_beside(&mut self, target: &Point, centre: Point2, angle: f64, feed: f64) -> Outcome<()> {
         let Some(mut on) = self.compensation.take() else { return Ok(()) };
         if on.phase == Phase::Leaving {
@@ -215,7 +217,7 @@ impl Interpreter<'_> {
         let (start, middle, sweep) = if entering {
             let middle = self.entry_centre(&on, here, end, new_end, out)?;
             if on.origin != [0.0; 2] {
-                // A lathe tool first moves its centre to the place of its point.
+                // A lathe tool first moves its centre to where its programmed point is.
                 let mut place = self.moves.position;
                 on.put(&mut place, here);
                 self.moves.straight(Kind::Line, &place, feed, &control, line)?;
@@ -279,7 +281,8 @@ impl Interpreter<'_> {
         Ok([new_end[0] - radius * out[0], new_end[1] - radius * out[1]])
     }
 
-    /// How the tool's path goes on at the programmed point `from`, along a unit vector, with the offset `next`.
+    /// The corner at the programmed point `from`, after which the path goes along the unit vector `along` and the tool along
+    /// `next`.
     fn corner(&self, on: &Compensation, from: Point2, along: Point2, next: Shape) -> Outcome<Corner> {
         let here = on.centre(&self.moves.position);
         let after = [-on.side * along[1], on.side * along[0]];
@@ -307,7 +310,8 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Ends the last element where the next begins, or adds the arc about the corner; a rapid goes straight.
+    /// Moves the end of the last element to the start of the next one, or adds the arc about the corner; for a rapid, a straight
+    /// move.
     fn turn_corner(
         &mut self,
         on: &Compensation,
@@ -327,7 +331,7 @@ impl Interpreter<'_> {
         }
         self.settle(on);
         let mut place = self.moves.position;
-        // Axes other than X, Y and Z make their move on the arc.
+        // Axes other than X, Y and Z move during the arc.
         place[3..].copy_from_slice(&target[3..]);
         on.put(&mut place, corner.start);
         if kind == Kind::Rapid {
@@ -339,7 +343,7 @@ impl Interpreter<'_> {
         self.moves.arc(arc, &place, feed, &control, line)
     }
 
-    /// Takes the last turn from a full circle that a corner has made longer than its turns, as LinuxCNC does.
+    /// Removes one turn from an arc that a corner has made longer than its programmed number of turns, as LinuxCNC does.
     fn settle(&mut self, on: &Compensation) {
         if self.moves.drop_turn(on.last.row, on.last.turns) {
             self.warn(

@@ -39,7 +39,7 @@ pub struct Compensation {
     pub normal: usize,
     /// The vector from the centre of a lathe tool's tip to the point that is programmed without compensation; 0 for mills.
     pub origin: Point2,
-    /// The point of the programmed path.
+    /// The current point of the programmed path.
     pub programmed: Point,
     pub last: Last,
 }

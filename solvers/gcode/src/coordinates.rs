@@ -1,5 +1,5 @@
-//! Positions, tool directions, and what axis words are: joint positions or the tool's tip, which the machine's kinematics
-//! converts into each other.
+//! Positions, tool directions, and the meaning of axis words: joint positions, or positions of the tool's tip. The machine's
+//! kinematics converts them into each other.
 
 /// A point of the machine: X Y Z A B C U V W in mm and degrees.
 pub type Point = [f64; 9];
@@ -10,7 +10,7 @@ pub type Direction = [f64; 3];
 /// The tool direction at the start of a program.
 pub const UPRIGHT: Direction = [0.0, 0.0, 1.0];
 
-/// The coordinates that axis words are, with the numbers of the Python package.
+/// The meaning of axis words, with the numbers of the Python package.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum CoordinateMode {
@@ -28,7 +28,7 @@ pub type Place = (Point, Direction);
 
 /// The kinematics of a machine. A tool length is in mm, NaN for that of the machine file.
 pub trait TipControl {
-    /// Refuses a mode in which the machine cannot be programmed, by a sentence why.
+    /// Fails, with the reason as a sentence, if the machine cannot be programmed in this mode.
     fn check(&self, mode: CoordinateMode) -> Result<(), String>;
 
     /// The joint positions at the end of a path in the coordinates of a mode, which begins at the joints `entry`.

@@ -9,7 +9,7 @@ use super::moves::{Arc, Kind};
 use super::tolerance::ON_ONE_LINE;
 
 impl Interpreter<'_> {
-    /// Keeps the corner of a block whose move has been added.
+    /// Stores the corner of a block whose move has been added, until the next move.
     pub fn set_corner(&mut self, block: &Block, start: &Point, feed: f64) -> Outcome<()> {
         let Some((letter, value)) = block.corner else { return Ok(()) };
         let size = value * self.state.unit();
@@ -38,7 +38,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// Cuts the corner that waits, before the straight move to `target`.
+    /// Cuts the stored corner before the straight move to `target`: shortens the move before it and adds the chamfer or rounding.
     #[cold]
     pub fn cut_corner(&mut self, kind: Kind, target: &Point) -> Outcome<()> {
         let Some(corner) = self.corner else { return Ok(()) };

@@ -12,7 +12,8 @@ use super::modal::FeedMode;
 use super::moves::{Control, Kind, Mode};
 use super::tolerance::MOST_REPEATS;
 
-/// The height above the last depth at which G73 and G83 stop, unless D gives it, in mm: 0.010 inch.
+/// The height above the last depth to which G73 retracts, and at which the rapid down of G83 ends, unless D gives it, in mm:
+/// 0.010 inch.
 const PECK_CLEARANCE: f64 = 0.254;
 
 /// One hole: its cycle, the tool axis, and heights along it in machine coordinates.
@@ -21,7 +22,7 @@ struct Hole {
     normal: usize,
     feed: f64,
     initial: f64,
-    /// Retract height and bottom in the numbers of the program; `peck` is in them too.
+    /// Retract height and bottom in the coordinates and units of the program; `peck` is in these units too.
     own: [f64; 2],
     retract: f64,
     bottom: f64,
@@ -139,7 +140,7 @@ impl Interpreter<'_> {
             sticky.dwell = block.get(b'P').or(sticky.dwell.filter(|_| again || taps));
         }
         let initial = *sticky.initial.get_or_insert(current);
-        // The heights in the numbers of the program, then in machine coordinates.
+        // The heights in the coordinates of the program, then in machine coordinates.
         let own = if absolute {
             [sticky.retract, sticky.bottom]
         } else {
@@ -188,7 +189,7 @@ impl Interpreter<'_> {
         if pecks > f64::from(MOST_REPEATS) {
             return fault!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion));
         }
-        // Depths are added in the numbers of the program, so that rounding makes as many pecks as on a control.
+        // Depths are summed in the units of the program, so that rounding gives the same number of pecks as on a control.
         let (unit, zero) = (self.state.unit(), self.state.offsets.sum()[normal]);
         let mut reached = hole.own[0] - hole.peck;
         while reached > hole.own[1] {

@@ -6,9 +6,9 @@ use std::collections::HashMap;
 pub const MESSAGE: u8 = b'(';
 pub const COMMENT: u8 = b';';
 
-/// The events in order, as columns: the number of moves before each, its line, its letter and number, and its words P and
-/// Q, NaN where they are missing. M6 has the number of its tool as P, G4 its seconds. A message has the letter `(`, a
-/// comment `;`, and the index of its text in `texts` as number; a text that comes again is kept once.
+/// The events in order, as columns: the number of moves before each, its line, its letter and number, and its words P and Q, NaN
+/// where they are missing. M6 has the number of its tool as P, G4 its seconds. A message has the letter `(`, a comment `;`, and
+/// the index of its text in `texts` as number; a text that is repeated in a loop is stored once.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
     pub moves: Vec<i64>,
@@ -35,7 +35,7 @@ impl Events {
         self.q.push(q.unwrap_or(f64::NAN));
     }
 
-    /// The index of a text in a line, which is kept once if it comes again.
+    /// The index in `texts` of the text of a line; a text of a line that is run again is stored once.
     pub fn index_of(&mut self, text: String, line: u32) -> usize {
         let next = self.texts.len();
         let index = if line as i32 > self.furthest {

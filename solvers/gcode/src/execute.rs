@@ -234,7 +234,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A stop at which a cycle turns the spindle otherwise, told as M3, M4 or M5. One that stands is left alone.
+    /// Adds a stop at which a cycle changes the motion of the spindle and, if the spindle is on, an event M3, M4 or M5.
     pub fn turn_spindle(&mut self, spindle: Spindle) {
         self.moves.stop(Stop::Switch);
         if self.state.spindle_on {
@@ -256,7 +256,7 @@ impl Interpreter<'_> {
         self.dwell(block, letter, seconds)
     }
 
-    /// A pause of the seconds that a word gives.
+    /// Adds a pause of `seconds`; `letter` is the word that gives them.
     pub fn dwell(&mut self, block: &Block, letter: u8, seconds: f64) -> Outcome<()> {
         if !(0.0..=MOST_DWELL).contains(&seconds) {
             let word =
@@ -283,7 +283,7 @@ impl Interpreter<'_> {
         self.place(block, self.position(), &zero)
     }
 
-    /// The place that axis words name, with G91 from `place`.
+    /// The position that the axis words of a block give; with G91 they are relative to `place`.
     #[inline(always)]
     pub fn place(&mut self, block: &Block, mut place: Point, zero: &Point) -> Outcome<Point> {
         let absolute = self.state.absolute;

@@ -1,7 +1,7 @@
 //! The arithmetic of RS-274/NGC: `[1 + acos[0] - [#3 ** [4.0/2]]]`, parameters and their assignment.
 //!
-//! Operators from the one that binds least: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Operators that bind alike
-//! are applied from left to right, powers too.
+//! Operators from the one that binds least: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Operators of equal precedence are
+//! applied from left to right, including powers.
 
 use super::arithmetic::{finite, function_at, operator_at, Function};
 use super::fault::Outcome;
@@ -59,7 +59,7 @@ pub fn expression(source: &[u8], at: usize, values: &Interpreter) -> Outcome<Opt
     Ok(Some((value, formula.at)))
 }
 
-/// The number at `at`, plain or computed, and the place after it; None where there is none, or has no value.
+/// The number at `at`, plain or computed, and the place after it; None where there is none, or where it has no value.
 #[cold]
 pub fn number(source: &[u8], at: usize, values: &Interpreter) -> Outcome<Option<(f64, usize)>> {
     let found = match decimal(source, at) {
@@ -223,7 +223,8 @@ impl Formula<'_> {
         })
     }
 
-    /// The truth of `EQ #0` or `NE #0` behind a parameter: #0 stands for a parameter without value.
+    /// The result of `EQ #0` or `NE #0` after a parameter, where #0 stands for a parameter without value; None where another text
+    /// follows.
     fn beside_nothing(&mut self, name: &Name) -> Outcome<Option<f64>> {
         let Name::Number(number) = name else { return Ok(None) };
         self.peek();
@@ -239,7 +240,7 @@ impl Formula<'_> {
         Ok(None)
     }
 
-    /// Takes `#0`, if it comes next.
+    /// Skips `#0` if it comes next; returns whether it did.
     fn nothing(&mut self) -> bool {
         if self.peek() == b'#' {
             if let Some((0.0, end)) = decimal(self.source, self.at + 1) {
@@ -266,14 +267,14 @@ impl Formula<'_> {
         }
     }
 
-    /// The start of what is left of the line, for a message.
+    /// The start of the rest of the line, for a message.
     fn rest(&self) -> String {
         excerpt(self.source, self.at)
     }
 }
 
-/// The text from `at` to the end of the line, quoted, in at most 24 characters that can be printed; the first character
-/// alone, by its number, where it cannot be printed.
+/// The text from `at` to the end of the line in quotes, at most 24 printable characters of it; if its first character that is not
+/// a blank is a control character, the number of that character.
 pub fn excerpt(source: &[u8], at: usize) -> String {
     let rest = source.get(at..).unwrap_or_default();
     let line = rest.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();

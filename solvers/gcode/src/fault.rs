@@ -6,26 +6,27 @@ use std::fmt::Arguments;
 #[derive(Debug)]
 pub struct Fault {
     pub message: String,
-    /// True where the text is not understood: the file may be in another language than RS-274.
+    /// True where the reader does not understand the text: the file may be in another language than RS-274.
     pub foreign: bool,
-    /// The 1-based line that it is about; None for the line that is read.
+    /// The 1-based line to which it refers; None for the line that is being read.
     pub line: Option<u32>,
 }
 
 /// A result whose error is boxed, so that the results of hot functions fit into a register.
 pub type Outcome<T> = Result<T, Box<Fault>>;
 
-/// The error of a message as `format!` takes it: a program that is understood and cannot be followed.
+/// An error with a message as for `format!`: the program is understood but cannot be executed.
 macro_rules! fault {
     ($($message:tt)+) => { $crate::fault::Fault::error(None, false, format_args!($($message)+)) };
 }
 
-/// The error of a text that is not understood.
+/// An error with a message as for `format!`: the text is not understood.
 macro_rules! foreign {
     ($($message:tt)+) => { $crate::fault::Fault::error(None, true, format_args!($($message)+)) };
 }
 
-/// The error of a program that cannot be followed because of another line than the one that is read.
+/// An error with a message as for `format!`: the program cannot be executed because of line `$line`, not of the line that is
+/// read.
 macro_rules! fault_in {
     ($line:expr, $($message:tt)+) => { $crate::fault::Fault::error(Some($line), false, format_args!($($message)+)) };
 }

@@ -1,6 +1,6 @@
-//! The lines of a text that decide which line is next: O words (sub, call, if, while, do, repeat), Fanuc's program numbers
-//! and its statements (IF, WHILE, GOTO). One pass over the text finds them, when the first of them is run, and ties each to
-//! its partner.
+//! The lines of a text that decide which line is next: O words (sub, call, if, while, do, repeat), Fanuc's program numbers and
+//! its statements (IF, WHILE, GOTO). One pass over the text finds them, when the first of them is run, and links each to its
+//! partner.
 
 use std::cell::OnceCell;
 use std::collections::HashMap;
@@ -15,7 +15,7 @@ use super::statement::{
 /// A line of program flow.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// Places in the text: its first letter, its arguments, the next line.
+    /// Byte positions in the text: of its first letter, of its arguments, of the next line.
     pub at: usize,
     pub arguments: usize,
     pub next: usize,
@@ -49,7 +49,7 @@ struct Numbered {
 }
 
 impl Flow {
-    /// The steps of a text; `delete` leaves out lines after `/`.
+    /// The steps of a text; with `delete`, lines that begin with `/` are left out.
     pub fn new(source: &[u8], delete: bool) -> Outcome<Self> {
         let mut flow = Self { steps: Vec::new(), subs: HashMap::new(), numbered: OnceCell::new() };
         let (mut at, mut line) = (0, 0);
@@ -77,8 +77,8 @@ impl Flow {
         self.subs.get(label).copied()
     }
 
-    /// The place of the line with a block number, and the 1-based line before it. Searched is the program around `from`,
-    /// from its O number to the next one: first behind `from`, then from its start.
+    /// The byte position of the line with a block number, and the 1-based number of the line before it. Searches the program that
+    /// contains the byte `from`, from its O number to the next one: first from `from` on, then from its start.
     pub fn numbered(&self, source: &[u8], number: i64, from: usize) -> Option<(usize, u32)> {
         let Numbered { lines, programs } = self.numbered.get_or_init(|| Numbered {
             lines: numbered_lines(source),
@@ -100,9 +100,9 @@ impl Flow {
         Some((*at, *line))
     }
 
-    /// Ties steps to their partners; each must have one.
+    /// Links steps to their partners; fails if a step has none.
     fn tie(&mut self) -> Outcome<()> {
-        // Blocks that are open: the step that begins each, and the branches of an `if` so far.
+        // Open blocks: for each the step that begins it, followed by the branches of an `if` so far.
         let mut open: Vec<Vec<usize>> = Vec::new();
         for i in 0..self.steps.len() {
             match self.steps[i].kind {
@@ -233,7 +233,7 @@ fn step_at(source: &[u8], at: usize, next: usize, line: u32) -> Outcome<Option<S
     })
 }
 
-/// The label at a place, a number or a `<name>`, and the place after it; a label that is computed is skipped.
+/// The label at a place, a number or a `<name>`, and the place after it; a computed label is skipped.
 fn label(source: &[u8], at: usize) -> Outcome<Option<(Label, usize)>> {
     let at = spaces(source, at);
     if source.get(at) == Some(&b'<') {
@@ -289,7 +289,7 @@ pub fn behind_comments(source: &[u8], at: usize) -> usize {
     at
 }
 
-/// Refuses text behind the arguments of a step, except for comments and the DO of Fanuc's WHILE.
+/// Refuses text after the arguments of a step, except for comments and the DO of Fanuc's WHILE.
 pub fn check_rest(source: &[u8], at: usize) -> Outcome<()> {
     let at = loop_label(source, at).map_or(at, |(_, end)| end);
     let at = behind_comments(source, at);

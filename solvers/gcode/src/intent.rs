@@ -6,16 +6,16 @@ use super::fault::Outcome;
 /// Words that need no code in their block.
 pub const FREE_WORDS: u32 = bits(b"FST");
 
-/// Words that programs have where no code uses them: of extruders, and of offsets that other controls keep.
+/// Words that are ignored where no code of their block uses them: E of extruders, and D of offsets on other controls.
 const LEFT_OUT: u32 = bits(b"DE");
 
-/// Words of G2 and G3 beside the axes.
+/// Words of G2 and G3 besides the axis words.
 pub const ARC_WORDS: u32 = bits(b"IJKRP");
 
 /// Codes without motion that take the axis words of their block.
 const TAKES_AXES: [u16; 10] = [100, 280, 281, 282, 283, 284, 300, 301, 520, 920];
 
-/// The axis words of a block that are coordinates. Beside G4, an X alone is a time.
+/// The axis words of a block that are coordinates. In a block with G4, X without other axis words is a time.
 pub fn axis_words(block: &Block) -> u32 {
     let axes = block.words & AXIS_WORDS | if block.is_polar() { bits(b"XY") } else { 0 };
     let timed = axes == bit(b'X') && block.code(Group::Once) == Some(40) && !block.has(b'P');
@@ -64,7 +64,7 @@ fn motion_beside_others(
         }
         (Some(code), None) => Ok(Some(code)),
         (None, Some(_)) if once.is_some() || axes != 0 => Ok(None),
-        // Fanuc's G60 is a rapid that comes from one side.
+        // Fanuc's G60 is a rapid that approaches its end from one side.
         (None, None) if axes != 0 && block.code(Group::Once) == Some(600) => Ok(Some(0)),
         (None, _) if axes != 0 && modal == 800 => {
             let word = AXES.into_iter().find(|&letter| block.has(letter)).map(|letter| block.word(letter));
@@ -89,7 +89,7 @@ fn words_of(code: u16) -> u32 {
         62 => bits(b"PKRQ"),
         100 => bits(b"PLRQIJ"),
         411 | 421 => bits(b"DL"),
-        // Older controls of Fanuc have one number for lengths and radii, also beside G41 and G42.
+        // Older controls of Fanuc have one number for lengths and radii, also in the block of G41 and G42.
         410 | 420 => bits(b"DH"),
         430 | 432 | 434 | 435 | 490 => bits(b"H"),
         541 | 1540 => bits(b"P"),
@@ -103,8 +103,8 @@ fn words_of(code: u16) -> u32 {
     }
 }
 
-/// Refuses a word that no code of the block uses: it would be a misunderstanding. Returns those that are left out. With
-/// `directed`, I, J, K are the tool's direction.
+/// Refuses a word that no code of the block uses, since it may have a meaning that the reader does not know. Returns the bits of
+/// the words that are ignored. With `directed`, I, J, K are the tool's direction.
 pub fn check_use(
     block: &Block,
     axes: u32,

@@ -1,4 +1,4 @@
-//! The state of a program between two blocks, and what all kinds of blocks need of it: positions, axes and warnings.
+//! The state of a program between two blocks, and functions on it that all kinds of blocks use: positions, axes and warnings.
 
 use super::block::{bit, rotary, Block, AXES, AXIS_OF_LETTER, AXIS_WORDS};
 use super::compensation::Compensation;
@@ -28,7 +28,7 @@ pub struct Interpreter<'a> {
     pub moves: Moves,
     pub line: u32,
     pub options: &'a Options,
-    /// Letters of the axes that the program has named.
+    /// Bits of the letters of the axes that the program has named.
     pub known: u32,
     warnings: Vec<String>,
     warned: Vec<Topic>,
@@ -44,13 +44,13 @@ pub struct Interpreter<'a> {
     pub selected: Option<u32>,
     /// The corner that waits for the next straight move.
     pub corner: Option<Corner>,
-    /// The compensation, while G41 or G42 is on.
+    /// The compensation, from G41 or G42 until the move after G40.
     pub compensation: Option<Box<Compensation>>,
     /// Modes that M70 and M73 have saved, with the depth of calls, and true where the end of the call restores them.
     pub saved: Vec<(usize, bool, State)>,
 }
 
-/// What a program is warned of once.
+/// The topics of which a program is warned only once.
 #[derive(PartialEq)]
 pub enum Topic {
     UnknownCode(u16),
@@ -104,7 +104,7 @@ impl<'a> Interpreter<'a> {
         (self.moves, self.warnings)
     }
 
-    /// The point of the programmed path; the tool is beside it while G41 or G42 is on.
+    /// The current point of the programmed path; with cutter compensation, the tool's centre is beside it.
     #[inline(always)]
     pub fn position(&self) -> Point {
         match &self.compensation {
@@ -145,7 +145,7 @@ impl<'a> Interpreter<'a> {
         Ok(())
     }
 
-    /// Gives columns to axes that are named for the first time; the machine must have them.
+    /// Adds columns for axes that are named for the first time; fails if the machine does not have them.
     #[cold]
     pub fn add_axes(&mut self, words: u32) -> Outcome<()> {
         for (axis, &letter) in AXES.iter().enumerate().filter(|(_, &letter)| words & bit(letter) != 0) {
@@ -184,7 +184,7 @@ impl<'a> Interpreter<'a> {
         self.warnings.push(format!("line {}: {text}", self.line));
     }
 
-    /// Warns of a topic for the first time.
+    /// Warns, unless there has been a warning of this topic.
     pub fn warn_once(&mut self, topic: Topic, text: impl FnOnce() -> String) {
         if !self.warned.contains(&topic) {
             self.warned.push(topic);

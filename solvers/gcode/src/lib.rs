@@ -1,10 +1,10 @@
-//! The reader of G-code: from the text of a program to its moves in machine coordinates.
+//! Reads G-code: from the text of a program to its moves in machine coordinates.
 //!
 //! Sources: the NIST interpreter for RS-274/NGC (NIST IR 6556), the documentation of LinuxCNC, and the manuals of Fanuc
 //! for its macros and codes. Text that is not understood is an error with its line and word.
 //!
-//! 1. `read` starts `run`, which takes the lines in the order of the program flow: `statement` reads its keywords, `flow`
-//!    ties them, and `steps` follows them.
+//! 1. `read` starts `run`, which takes the lines in the order of the program flow: `statement` reads its keywords, `flow` links
+//!    them, and `steps` executes them.
 //! 2. `words` reads a line into a `block`, with the arithmetic of `expression` on `parameters` and `readings`.
 //! 3. `intent` finds the motion of the block and checks that each of its words has a use.
 //! 4. `execute` runs the block on the state of the `interpreter` in LinuxCNC's order, with the modes of `modal` and `modes`

@@ -25,7 +25,7 @@ pub struct Feed {
     pub angular: f64,
 }
 
-/// The words that stay in force while a canned cycle is repeated, in the numbers of the program.
+/// The words that stay in force while a canned cycle is repeated, in the coordinates and units of the program.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sticky {
     pub retract: f64,
@@ -60,18 +60,18 @@ impl Offsets {
         offsets
     }
 
-    /// Machine coordinates of the program's zero, where the rotation is 0.
+    /// Machine coordinates of the program's zero, if the rotation is 0.
     #[inline(always)]
     pub fn sum(&self) -> &Point {
         &self.sum
     }
 
-    /// Must be called after a change.
+    /// Computes the sum again; must be called after each change of a vector.
     pub fn update(&mut self) {
         self.sum = std::array::from_fn(|k| self.work[k] + self.shift[k] + self.tool[k]);
     }
 
-    /// A point of the program in machine coordinates.
+    /// Converts a point from the coordinates of the program to those of the machine.
     pub fn to_machine(&self, point: &Point) -> Point {
         if self.rotation == 0.0 {
             return std::array::from_fn(|k| point[k] + self.sum[k]);
@@ -81,7 +81,7 @@ impl Offsets {
         std::array::from_fn(|k| shifted[k] + self.work[k] + self.tool[k])
     }
 
-    /// A point in machine coordinates in those of the program, in mm and degrees.
+    /// Converts a point from the coordinates of the machine to those of the program, in mm and degrees.
     pub fn to_program(&self, point: &Point) -> Point {
         if self.rotation == 0.0 {
             return std::array::from_fn(|k| point[k] - self.sum[k]);
@@ -123,7 +123,7 @@ pub struct State {
     /// True after G98 or G99.
     pub retract_given: bool,
     pub spindle_on: bool,
-    /// M4.
+    /// M4: the spindle turns counter-clockwise.
     pub spindle_back: bool,
     pub mist: bool,
     pub flood: bool,
@@ -132,8 +132,8 @@ pub struct State {
     pub constant_surface_speed: bool,
     pub sticky: Sticky,
     pub coordinate_mode: CoordinateMode,
-    /// With the mode `Tip` or `Direction`, the tool's length in mm (NaN for that of the machine file) and the joints
-    /// where the mode began.
+    /// With the mode `Tip` or `Vector`, the tool's length in mm (NaN for that of the machine file) and the joints where the mode
+    /// began.
     pub tool_length: f64,
     pub entry: Point,
 }

@@ -60,7 +60,7 @@ impl Interpreter<'_> {
         self.parameters.leave();
     }
 
-    /// M70 to M73.
+    /// Executes M70 to M73: saves modes, deletes saved ones or restores them.
     pub fn save_modes(&mut self, code: u16) {
         let depth = self.parameters.depth();
         match code {

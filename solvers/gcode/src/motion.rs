@@ -1,4 +1,4 @@
-//! The straight move or the arc of one block, with its feed.
+//! Adds the straight move or the arc of one block, with its feed.
 
 use super::arc::{arc, arc_length, Form};
 use super::block::{bits, Block, AXES, AXIS_WORDS};
@@ -111,7 +111,7 @@ impl Interpreter<'_> {
         self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed))
     }
 
-    /// The feed along a move of a length under G93, where F is one over the minutes of the move.
+    /// The feed in mm/s of a move of length `length` under G93, where F is 1/(duration in minutes).
     fn inverse_feed(&self, block: &Block, length: f64) -> Outcome<f64> {
         match block.get(b'F') {
             Some(rate) if rate > 0.0 => Ok(length * rate / 60.0),
@@ -199,7 +199,7 @@ impl Interpreter<'_> {
         let offsets = &self.state.offsets;
         let words = words.map(|word| word.unwrap_or(0.0));
         let centre = if offsets.rotation == 0.0 {
-            // Without the coordinates of the program in between, which would round.
+            // Computed in machine coordinates; the way through the coordinates of the program would add rounding.
             let from = if self.state.absolute_centres { offsets.sum() } else { position };
             [words[0] + from[u], words[1] + from[v]]
         } else {

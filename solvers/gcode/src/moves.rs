@@ -1,6 +1,6 @@
 //! The moves of a program, collected as columns while it is read.
 //!
-//! Path control, stops and dwells change seldom: their changes are kept, and `columns` makes columns of them.
+//! Path control, stops and dwells change seldom: only their changes are stored, and `columns` expands them to columns.
 
 pub mod columns;
 
@@ -75,7 +75,7 @@ pub enum Stop {
     None = 0,
     /// A change of the coordinate mode or of the tool length in it.
     Change = 1,
-    /// A switch of spindle, coolant and the like.
+    /// A switch of the spindle, the coolant or an output.
     Switch = 2,
     Dwell = 3,
     /// M0, M1, M60.
@@ -153,7 +153,7 @@ impl Moves {
         self.kind.is_empty()
     }
 
-    /// Gives an axis a column, in which it has rested at the start.
+    /// Adds a column for an axis; in the rows so far the axis is at its start.
     #[cold]
     pub fn add_axis(&mut self, axis: usize) {
         let Err(column) = self.axes.binary_search(&axis) else { return };
@@ -300,8 +300,8 @@ impl Moves {
         Ok(())
     }
 
-    /// Moves the end of the row `first` within a plane, and the rows after it, which rest there. If the row is an arc, its
-    /// sweep grows by `turned`; false where nothing of the arc would be left.
+    /// Moves the end of row `first` in a plane to `end`, and the ends of the rows after it, which do not move in that plane. If
+    /// the row is an arc, `turned` in radians is added to its sweep; returns false if nothing of the arc would be left.
     pub fn bend(&mut self, first: usize, plane: (usize, usize), end: &Point, turned: f64) -> bool {
         let width = self.axes.len();
         for row in self.target[first * width..].chunks_exact_mut(width) {
@@ -318,7 +318,7 @@ impl Moves {
         }
     }
 
-    /// Takes one turn from the arc of a row that has more than `turns`; true where it did.
+    /// Removes one turn from the arc of a row if it has more than `turns`; returns whether it did.
     pub fn drop_turn(&mut self, row: usize, turns: f64) -> bool {
         let found = self.arcs.iter_mut().rev().take(2).find(|(arc, _)| *arc == row);
         match found.filter(|(_, arc)| arc.angle.abs() / TAU > turns + WHOLE_TURNS) {
@@ -341,7 +341,7 @@ impl Moves {
         self.event(line, letter, index as f64, [None; 2]);
     }
 
-    /// A full stop after the last move; of several causes the last one of `Stop` is kept.
+    /// Adds a full stop after the last move; of several causes the greatest is kept.
     pub fn stop(&mut self, cause: Stop) {
         // Before the first move the machine is at rest.
         let Some(last) = self.kind.len().checked_sub(1) else { return };
@@ -351,7 +351,7 @@ impl Moves {
         }
     }
 
-    /// A full stop and a pause of some seconds.
+    /// Adds a full stop and a pause of `seconds`.
     pub fn dwell(&mut self, seconds: f64) {
         self.stop(Stop::Dwell);
         match self.kind.len().checked_sub(1) {

@@ -40,7 +40,7 @@ pub fn decimal(source: &[u8], at: usize) -> Option<(f64, usize)> {
     Some((if negative { -size } else { size }, at))
 }
 
-/// The integer that a number stands for, if it is as near as `NEAR_INTEGER`.
+/// The integer that a number stands for; None if it is not within `NEAR_INTEGER` of one.
 pub fn integer(value: f64) -> Option<i64> {
     let nearest = value.round();
     ((value - nearest).abs() <= NEAR_INTEGER && nearest.abs() < 1e15).then_some(nearest as i64)

@@ -1,4 +1,4 @@
-//! The NURBS of several blocks that is being read: G5.2 with uniform knots, G6.2 with its own.
+//! A NURBS that is read from several blocks: G5.2 with uniform knots, G6.2 with knots of its own.
 
 use super::block::{g_name, Block};
 use super::coordinates::Point;
@@ -18,7 +18,7 @@ pub struct Nurbs {
     pub order: usize,
     pub points: Vec<Point>,
     pub weights: Vec<f64>,
-    /// Of G6.2; empty for G5.2.
+    /// The knots of G6.2; empty for G5.2.
     pub knots: Vec<f64>,
 }
 
@@ -71,7 +71,7 @@ impl Nurbs {
         Ok(curve)
     }
 
-    /// The feed along it: that of rotary moves where only rotary axes move.
+    /// The feed along the curve: that of rotary moves if only rotary axes move.
     pub fn feed_along(&self) -> f64 {
         let turns = self.points.iter().all(|point| only_turns(&self.points[0], point));
         if turns {

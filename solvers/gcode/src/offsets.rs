@@ -137,7 +137,7 @@ impl Interpreter<'_> {
         self.state.offsets.update();
     }
 
-    /// Puts a work offset, 0 for G54, into force as its parameters have it.
+    /// Selects a work offset, 0 for G54, with the values in its parameters.
     pub fn select_system(&mut self, system: usize) {
         let first = first_of_system(system);
         self.end_turn();
@@ -188,8 +188,8 @@ impl Interpreter<'_> {
         self.set_system(block)
     }
 
-    /// G43.4 and G43.5: axis words are the tip, without the tool length. The length is the one in force, or that of the tool
-    /// which H names.
+    /// G43.4 and G43.5: from now on axis words give the position of the tip, without the tool length. The length is the one in
+    /// force, or that of the tool which H names.
     fn program_tip(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let mode = if code == 434 { CoordinateMode::Tip } else { CoordinateMode::Vector };
         let named = block.has(b'H');
@@ -265,8 +265,8 @@ impl Interpreter<'_> {
         Ok(tool.map_or([0.0; 9], |tool| tool.offset))
     }
 
-    /// G28 and G30: a rapid to the axis words, then one of the axes named, or of all axes if none is, to the home position.
-    /// G28.1 and G30.1 set that to the current position. G28.2 to G28.4 home the axes and set nothing.
+    /// G28 and G30: a rapid to the axis words, then a rapid of the named axes, or of all axes if none is named, to the home
+    /// position. G28.1 and G30.1 set the home position to the current position. G28.2 to G28.4 home the axes and set nothing.
     pub fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
         let first = if code < 300 { HOME } else { SECOND_HOME };
         if matches!(code, 281 | 301) {

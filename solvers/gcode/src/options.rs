@@ -1,4 +1,4 @@
-//! What the reader is told beside the program: the machine's data and the user's choices.
+//! The input of the reader besides the program: the machine's data and the user's choices.
 
 use super::coordinates::{Point, TipControl};
 
@@ -13,8 +13,8 @@ pub struct Tool {
     pub orientation: u32,
 }
 
-/// Finds a subprogram by its name: its file and the bytes of it, None where there is no such file, or a sentence why it
-/// cannot be read.
+/// Finds a subprogram by its name: returns the name and the bytes of its file, None if there is no such file, or a sentence why
+/// it cannot be read.
 pub type Subprograms = dyn Fn(&str) -> Result<Option<(String, Vec<u8>)>, String> + Send + Sync;
 
 /// Names the machines that have the axis of a letter.
@@ -30,7 +30,7 @@ pub struct Options {
     pub start: Point,
     /// Letters of the machine's axes; empty where no machine is given.
     pub machine_axes: Vec<u8>,
-    /// The machines that have the axis of a letter, as a part of a sentence.
+    /// Returns the machines that have the axis of a letter, as a part of a sentence.
     pub machines_with: Option<Box<MachinesWith>>,
     /// The kinematics for G43.4 and G43.5; None where no machine is given.
     pub tip_control: Option<Box<dyn TipControl + Send + Sync>>,

@@ -9,10 +9,10 @@ use std::collections::HashMap;
 use super::fault::Outcome;
 use super::tolerance::MAX_CALLS;
 
-/// The number of parameters that each call has of its own.
+/// The number of numbered parameters that are local to each call.
 pub const LOCALS: usize = 30;
 
-/// The end of all numbers; LinuxCNC's last one; the first one of the further work offsets.
+/// The number after that of the last parameter; the last number of LinuxCNC; the first number of the further work offsets.
 const NUMBERS: usize = FIRST_FURTHER + SYSTEM_STEP * MOST_FURTHER as usize;
 const LAST: usize = 5602;
 const FIRST_FURTHER: usize = 7001;
@@ -64,12 +64,12 @@ impl std::fmt::Display for Name {
     }
 }
 
-/// The parameters that a call has of its own.
+/// Which parameters are local to a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// Numbers and names, as in LinuxCNC; missing arguments are 0.
     Own,
-    /// Names alone, as in Fanuc's subprograms, which have the numbers of their caller.
+    /// Only names; the numbers are those of the caller, as in Fanuc's subprograms.
     Shared,
     /// Numbers and names, as in Fanuc's macros; missing arguments have no value.
     Macro,

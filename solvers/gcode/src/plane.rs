@@ -1,4 +1,4 @@
-//! Plane geometry: where lines and arcs beside a path meet, and angles between points.
+//! Plane geometry: where the offset lines and arcs of a path meet, and angles between points.
 
 use std::f64::consts::{PI, TAU};
 

@@ -6,14 +6,15 @@ use super::moves::columns::Columns;
 use super::options::Options;
 use super::run::Runner;
 
-/// Why a program is not read: a sentence, and the 1-based line that it is about; None for the file as a whole.
+/// Why a program cannot be read: a sentence, and the 1-based line to which it refers; None for the file as a whole.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadError {
     pub line: Option<u32>,
     pub message: String,
 }
 
-/// The moves of a program. `seen` is called now and then with the number of lines read since its last call; it may unwind.
+/// The moves of a program. `seen` is called now and then with the number of lines read since its last call; it may stop the
+/// reading by a panic.
 pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Columns, ReadError> {
     let whole = |message: &str| ReadError { line: None, message: message.into() };
     if source.contains(&0) {

@@ -17,7 +17,7 @@ const ALARM: usize = 3000;
 const CONTROL: std::ops::Range<usize> = 1000..5161;
 
 impl Interpreter<'_> {
-    /// The value of a number; 0 where it has none, as in LinuxCNC. A value that only one control can know is a fault.
+    /// The value of a number; 0 where it has none, as in LinuxCNC. A number whose value only a certain control knows is a fault.
     pub fn parameter(&self, number: usize) -> Outcome<f64> {
         if !READINGS.contains(&number) {
             self.check_known(number)?;

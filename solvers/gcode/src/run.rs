@@ -1,4 +1,4 @@
-//! Runs a program: its lines in the order of O words, M98 and M99, over the texts of the program and of the subprograms
+//! Runs a program: its lines in the order that O words and calls determine, in the texts of the program and of the subprograms
 //! that it calls. A line is read again each time that it is run.
 
 use std::borrow::Cow;
@@ -40,7 +40,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Where lines go on: the index of their text, the place in it of the next line, and the 1-based line before.
+/// Where to read the next line: the index of its text, its byte position in the text, and the 1-based number of the line before.
 #[derive(Clone, Copy)]
 struct Cursor {
     text: usize,
@@ -68,23 +68,23 @@ impl Frame {
     }
 }
 
-/// What is called.
+/// The target of a call.
 pub enum Target {
     Label(Vec<u8>),
     /// The line with a block number, by M97.
     Line(i64),
 }
 
-/// How it is called: `times` in succession.
+/// The arguments and the scope of a call, and how many `times` in succession the target is run.
 pub struct Call {
     pub arguments: Vec<f64>,
     pub scope: Scope,
     pub times: u32,
 }
 
-/// The reason why the next line is not the one after.
+/// The reason why a program does not continue with the following line.
 pub enum Exit {
-    /// The program ends by that word, or the text ends.
+    /// The program ends by this word; None: the text ends.
     End(Option<&'static str>),
     Call(Target, Call),
     Return(Option<f64>),
@@ -138,7 +138,7 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// The progress of the call that is run, or of the program.
+    /// The frame of the call that is being run, or that of the program.
     fn frame(&self) -> &Frame {
         self.calls.last().unwrap_or(&self.main)
     }
@@ -157,7 +157,7 @@ impl<'a> Runner<'a> {
         self.calls.is_empty()
     }
 
-    /// Runs the program to its end: sentences about its end and about blocks that were left out.
+    /// Runs the program to its end; returns warnings about its end and about blocks that were left out.
     pub fn run(&mut self) -> Outcome<Vec<String>> {
         let end = loop {
             let Cursor { text, at, line } = self.frame().cursor;
@@ -184,7 +184,7 @@ impl<'a> Runner<'a> {
         Ok(end)
     }
 
-    /// Sentences about the end of the program.
+    /// Warnings about the end of the program and about blocks that were left out.
     fn ending(&self, lexer: &Lexer, word: Option<&str>) -> Vec<String> {
         let mut warnings = Vec::new();
         if self.deleted > 0 {
@@ -370,7 +370,8 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// The line of the program that a fault is about, and its sentence, with file and line where these are another's.
+    /// The line of the program to which a fault refers, and its message, which names file and line if the fault is in another
+    /// file.
     #[cold]
     pub fn place(&self, fault: &Fault) -> (u32, String) {
         let Frame { cursor, reported, .. } = *self.frame();

@@ -1,4 +1,4 @@
-//! Splines to Bézier pieces: LinuxCNC's G5 and G5.1 (Bézier curves of one block) and G5.2 to G5.3 (NURBS with uniform
+//! Converts splines to Bézier pieces: LinuxCNC's G5 and G5.1 (Bézier curves of one block) and G5.2 to G5.3 (NURBS with uniform
 //! knots), and Fanuc's G6.2 (NURBS with knots). A NURBS of several blocks is one move, in the line of its first block.
 
 use super::block::{bit, bits, g_name, Block, Group, AXES, AXIS_WORDS};
@@ -15,7 +15,7 @@ const ORDER: usize = 3;
 const FANUC_ORDER: usize = 4;
 
 impl Interpreter<'_> {
-    /// A block of G5, G5.1, G5.2, G5.3 or G6.2 that begins a spline.
+    /// Executes a block with G5, G5.1, G5.2, G5.3 or G6.2 outside of an open spline.
     pub fn spline(&mut self, block: &Block, motion: u16) -> Outcome<()> {
         if motion == 53 {
             return fault!("word G5.3 ends a NURBS that no G5.2 began: remove it");
@@ -51,7 +51,7 @@ impl Interpreter<'_> {
         }
     }
 
-    /// A cubic Bézier curve: I J is the vector from its start to the first inner control point, P Q from its end to the
+    /// Adds a cubic Bézier curve: I J is the vector from its start to the first inner control point, P Q from its end to the
     /// second.
     fn cubic(&mut self, block: &Block, feed: Feed) -> Outcome<()> {
         let start = self.moves.position;
@@ -69,7 +69,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A quadratic Bézier curve: I J is the vector from its start to the inner control point; a missing one is 0.
+    /// Adds a quadratic Bézier curve: I J is the vector from its start to the inner control point; a missing one is 0.
     fn quadratic(&mut self, block: &Block, feed: Feed) -> Outcome<()> {
         if let Some(letter) = b"PQ".iter().find(|&&letter| block.has(letter)) {
             return fault!(
@@ -109,7 +109,7 @@ impl Interpreter<'_> {
         self.moves.spline(&curve, feed.linear, &self.state.control, self.line)
     }
 
-    /// The first block of a NURBS.
+    /// Begins a NURBS with its first block.
     fn open(&mut self, block: &Block, code: u16, feed: Feed) -> Outcome<()> {
         let start = self.moves.position;
         let order = if code == 62 { block.count(b'P', 2, "order")? } else { None };
@@ -142,7 +142,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A further block of the NURBS that is open.
+    /// Executes a further block of the open NURBS.
     #[cold]
     pub fn continue_spline(&mut self, block: &Block, mut nurbs: Box<Nurbs>) -> Outcome<()> {
         if block.is_empty() {
@@ -173,7 +173,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A control point of G5.2: X and Y, with G91 from the start of the spline, and its weight P.
+    /// Adds a control point of G5.2: X and Y, with G91 from the start of the spline, and its weight P.
     fn add_point(&mut self, nurbs: &mut Nurbs, block: &Block) -> Outcome<()> {
         self.check_plane(block, 52)?;
         let has = b"XYP".map(|letter| block.has(letter));
@@ -189,7 +189,8 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// A block of G6.2 after the first: a control point with a knot, or one of the last knots; true for the last block.
+    /// Adds a block of G6.2 after the first: a control point with a knot, or one of the last knots; returns true for the last
+    /// block.
     fn add_knot(&mut self, nurbs: &mut Nurbs, block: &Block) -> Outcome<bool> {
         let Some(knot) = block.get(b'K') else {
             return fault!("a block of the spline G6.2 of line {} has no knot: give K", nurbs.line);

@@ -15,7 +15,7 @@ use super::words::Lexer;
 const ARGUMENTS: [u8; 26] = *b"ABCIJKDEF H     QRSTUVWXYZ";
 
 impl Runner<'_> {
-    /// Runs the step `i`; the exit, where it leaves the text.
+    /// Runs the step `i`; returns the exit if it leaves the text.
     pub fn step(&mut self, lexer: &mut Lexer, flow: &Flow, i: usize) -> Outcome<Option<Exit>> {
         let (source, steps) = (lexer.source, &flow.steps);
         let step = &steps[i];
@@ -128,7 +128,7 @@ impl Runner<'_> {
         Ok(Exit::Call(Target::Label(label), Call { arguments, scope: Scope::Own, times: 1 }))
     }
 
-    /// IF [condition] GOTO or THEN.
+    /// Runs IF [condition] GOTO or THEN.
     pub fn when(&mut self, lexer: &mut Lexer, flow: &Flow, step: &Step) -> Outcome<()> {
         let source = lexer.source;
         let Some((value, end)) = bracket(source, step.arguments, &self.interpreter)? else {
@@ -150,7 +150,7 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// GOTO, whose number is at a place.
+    /// Runs GOTO, whose number is at the byte position `at`.
     pub fn go_to(&mut self, lexer: &mut Lexer, flow: &Flow, at: usize) -> Outcome<()> {
         let number = number(lexer.source, at, &self.interpreter)?;
         let Some(number) = number.and_then(|(value, _)| integer(value)) else {
@@ -165,7 +165,7 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// M97, M98, M99 or G65 of the block.
+    /// The exit for M97, M98, M99 or G65 of the block.
     pub fn fanuc(&self) -> Outcome<Exit> {
         let block = &self.block;
         let (name, scope, arguments) = match block.code(Group::Macro) {

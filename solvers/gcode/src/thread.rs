@@ -1,4 +1,4 @@
-//! Moves that are synchronous with the spindle: G33 (one pass of a thread), G33.1 (a tap) and G76 (a whole thread).
+//! Adds moves that are synchronous with the spindle: G33 (one pass of a thread), G33.1 (a tap) and G76 (a whole thread).
 
 use super::block::Block;
 use super::coordinates::Point;
@@ -53,7 +53,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// G76: passes of growing depth up to that of the thread, and spring passes at that depth.
+    /// G76: passes of growing depth up to the depth of the thread, and spring passes at that depth.
     pub fn thread(&mut self, block: &Block) -> Outcome<()> {
         self.check_beside("G76")?;
         if let Some(letter) = b"XYABCUVW".iter().find(|&&letter| block.has(letter)) {

@@ -1,5 +1,5 @@
-//! Changes the coordinates that axis words are: joint positions, the tool's tip (G43.4), or the tip and a tool direction
-//! (G43.5). A change moves nothing: the machine's kinematics converts the position to the new coordinates.
+//! Changes the meaning of axis words: joint positions, the tool's tip (G43.4), or the tip and a tool direction (G43.5). A change
+//! moves nothing: the machine's kinematics converts the position to the new coordinates.
 
 use super::block::{bits, g_name, Block, Group};
 use super::coordinates::{CoordinateMode, Direction, Place};
@@ -39,7 +39,7 @@ impl Interpreter<'_> {
         Ok(())
     }
 
-    /// Refuses moves to joint positions or along the spindle while axis words are the tip.
+    /// Refuses moves to joint positions or along the spindle while axis words give the tip.
     pub fn check_coordinate_mode(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
         let code = match (block.code(Group::ToolLength), self.state.coordinate_mode) {
             (Some(code @ (434 | 435)), _) => code,

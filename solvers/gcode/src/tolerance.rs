@@ -1,7 +1,7 @@
-//! The tolerances of the reader, and the greatest numbers that it takes for no mistake.
+//! The tolerances of the reader, and the greatest numbers that it accepts; greater ones are taken for mistakes.
 //!
-//! Posts round coordinates to 2 to 6 decimals, so what a program says exactly arrives with errors of 1e-2 to 1e-6 mm or
-//! inches. Where LinuxCNC has a tolerance the reader has the same one: a program that runs there is read here.
+//! Posts round coordinates to 2 to 6 decimals, so exact geometry is given with errors of 1e-2 to 1e-6 mm or inches. Where
+//! LinuxCNC has a tolerance the reader has the same one: a program that runs there is read here.
 
 use std::f64::consts::SQRT_2;
 
@@ -19,10 +19,10 @@ pub const NEAR_INTEGER: f64 = 1e-4;
 
 /// The radii at the start and the end of an arc may differ by this fraction of the radius …
 pub const SPIRAL_RELATIVE: f64 = 1e-3;
-/// … or by this, in mm: what the rounding of all coordinates to 2 decimals of a mm, or 3 of an inch, changes …
+/// … or by this, in mm: the effect of rounding all coordinates to 2 decimals of a mm, or 3 of an inch …
 pub const SPIRAL_MM: f64 = 2.0 * 0.01 * SQRT_2;
 pub const SPIRAL_INCH: f64 = 2.0 * 0.001 * SQRT_2 * MM_PER_INCH;
-/// … but by no more than this many times as much, whatever the radius.
+/// … but by no more than this many times the difference in mm, whatever the radius.
 pub const SPIRAL_MOST: f64 = 100.0;
 /// An arc needs a radius above this, and an R word may be this much too short for its chord: 0.00005 inch, in mm.
 pub const RADIUS_SLACK: f64 = 0.00127;
@@ -49,7 +49,7 @@ pub const DIRECTION_LENGTH: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
 // Cutter compensation. [LinuxCNC]
 
-/// A corner that turns by less than this, in radians, is no corner, and a turn this close to π is a half turn.
+/// A corner that turns by less than this, in radians, does not count, and a turn this close to π is a half turn.
 pub const NO_CORNER: f64 = 0.05;
 /// The chord of an entry arc must leave its tangent by this fraction of its length.
 pub const ENTRY_BEND: f64 = 1e-4;
@@ -59,7 +59,7 @@ pub const ENTRY_BEND: f64 = 1e-4;
 /// Distance of a position from the machine's zero, in mm, and angle of a rotary axis, which may wind up, in degrees.
 pub const FARTHEST: f64 = 1e6;
 pub const FARTHEST_TURN: f64 = 1e8;
-/// Distance of the centre of an arc, in mm: farther away an arc has no digits left.
+/// Distance of the centre of an arc, in mm: with a centre farther away, rounding leaves no correct digit of the arc.
 pub const FARTHEST_CENTRE: f64 = 1e9;
 /// Feeds and spindle speeds, in the units of the program.
 pub const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e9;

@@ -1,4 +1,4 @@
-//! Positions in polar words, and in coordinates that are rotated about Z by a work offset or by G68.
+//! Computes positions from polar words, and in coordinates that are rotated about Z by a work offset or by G68.
 
 use super::block::{bits, g_name, Block, Group, AXIS_WORDS};
 use super::coordinates::Point;

@@ -25,7 +25,7 @@ pub enum Line {
     Flow(usize),
 }
 
-/// A text, and the place up to which it has been read.
+/// A text, and the byte position up to which it has been read.
 pub struct Lexer<'a> {
     pub source: &'a [u8],
     pub at: usize,
@@ -39,7 +39,7 @@ pub struct Lexer<'a> {
     delete: bool,
     /// The unit of lengths and angles without a decimal point, in units of the program.
     whole_step: f64,
-    /// True after the first block with words: nothing may open a program any more.
+    /// True after the first block with words: after it, no word may open a program.
     pub begun: bool,
 }
 
@@ -50,7 +50,7 @@ const END_OF_FILE: u8 = 0x1a;
 const TEXT_CODES: [f64; 2] = [117.0, 118.0];
 
 impl<'a> Lexer<'a> {
-    /// At the start of a text.
+    /// A lexer at the start of a text.
     pub fn new(source: &'a [u8], delete: bool, whole_step: f64) -> Self {
         let at = if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         Self {
@@ -138,7 +138,7 @@ impl<'a> Lexer<'a> {
                     b'N' => self.number_word(value, at, end, first)?,
                     b'O' if keyword(self.source, end).is_some() => return self.flow(at, first),
                     b'O' => self.program_number(at, end, first)?,
-                    // The word of an extruder follows a blank.
+                    // The E word of an extruder follows a blank; after a digit, E would be an exponent, which is refused.
                     b'E' if at > 0 && self.source[at - 1].is_ascii_digit() => return self.exponent(at, end),
                     _ if block.set(upper, value) => {}
                     _ => return self.twice(at, end),
@@ -189,7 +189,7 @@ impl<'a> Lexer<'a> {
                         at += 1;
                     }
                 }
-                // Text behind it is a comment, as on controls.
+                // Text after it is a comment, as on controls.
                 b'%' if first && !self.source[at..].starts_with(b"%_N_") => {
                     self.at = after_line(self.source, at);
                     return Ok(Some(Line::Percent));
@@ -223,7 +223,7 @@ impl<'a> Lexer<'a> {
         Ok(Some(Line::Block))
     }
 
-    /// Keeps a comment that is not empty.
+    /// Stores a comment that is not empty.
     #[cold]
     fn remark(&mut self, text: &[u8]) {
         let text = text_of(text);
@@ -240,7 +240,7 @@ impl<'a> Lexer<'a> {
         value * if whole && length { self.whole_step } else { 1.0 }
     }
 
-    /// The byte at `at`; a line end behind the text.
+    /// The byte at `at`; a line end after the end of the text.
     #[inline(always)]
     fn byte(&self, at: usize) -> u8 {
         self.source.get(at).copied().unwrap_or(b'\n')

@@ -1,6 +1,6 @@
-//! The exact time-optimal speed along a path of lines, polynomial and rational pieces, from the limits of feed, axis
-//! velocity, axis acceleration and chord error, by two passes over every run. After Zhang et al. 2010 and Timar et
-//! al. 2005, with the limits of speed in the plan.
+//! Computes the exact time-optimal speed along a path of lines, polynomial and rational pieces from the limits of feed, axis
+//! velocity, axis acceleration and chord error, by a backward and a forward pass over every run. Method: Zhang et al. 2010 after
+//! Timar et al. 2005, extended by the speed limits.
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
@@ -52,14 +52,14 @@
 //! | `quadratic` | polynomials of degree 2 in the tool's own axes | closed forms, and roots of quartics |
 //! | `curve` | all others: any degree, rational, joints | roots of Bernstein polynomials |
 //!
-//! The kernel of curves could plan the other pieces too. It takes three times the time of `quadratic` on the same
-//! pieces, and where axes turn so close to a cusp that tangents have no digits left, it treats the turns as one point;
-//! `quadratic` keeps every limit there, since W is exact.
+//! `curve` could plan the other pieces too, but takes three times as long as `quadratic` on the same pieces. Where axes turn so
+//! close to a cusp that rounding leaves no correct digit in the tangents, `curve` treats the turns as one point; `quadratic`
+//! keeps every limit there, since its W is exact.
 //!
 //! | file | content |
 //! |---|---|
 //! | `run` | both passes over a run, from piece to piece |
-//! | `speed_line` | an upper limit of v², linear in t: of the chord error |
+//! | `speed_line` | an upper limit of v² that is linear in t, made by the chord error |
 //! | `time` | the time of a phase along the cap |
 //! | `tolerance` | every tolerance, with its reason |
 
@@ -82,23 +82,23 @@ use feedplan_geometry::watch::Watch;
 /// The problem, with its limits prepared for the kernels.
 struct Task<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
-    /// Limits of the axes for the kernel of curves, and for the other two.
+    /// Limits of the axes in the form for `curve`, and in the form for `line` and `quadratic`.
     axes: curve::Axes<M>,
     plain_axes: quadratic::Axes<M>,
     chord: Option<ChordLimit>,
-    /// The kernels of lines and quadratics may be used: the axes are the tool's, with the same limits in both
-    /// directions.
+    /// Whether `line` and `quadratic` may be used: the axes are those of the tool, with equal limits in both directions.
     plain: bool,
-    /// Counts pieces.
+    /// Receives the progress, counted in pieces.
     watch: Watch<'a>,
 }
 
 /// The state of a pass between two pieces.
 #[derive(Clone, Copy)]
 pub struct Junction {
-    /// The sum of the axes' velocities squared; v² where the axes are the tool's.
+    /// The sum of the squared axis velocities [mm²/s²]; this is v² where the axes are those of the tool.
     pub speed_sq: f64,
-    /// v² of the tip at the end of the piece just left; before the next piece is entered, its limit.
+    /// v² of the tip [mm²/s²] at the end of the piece just left; before the next piece is entered, the square of the junction
+    /// speed.
     pub tip_sq: f64,
 }
 
@@ -107,7 +107,7 @@ impl Junction {
         Self { speed_sq: f64::INFINITY, tip_sq }
     }
 
-    /// Leaves a piece whose axes are those of the tool.
+    /// Sets the state at the end of a piece whose axes are those of the tool, so that both squares are equal.
     fn leave(&mut self, speed_sq: f64) {
         (self.speed_sq, self.tip_sq) = (speed_sq, speed_sq);
     }

@@ -1,6 +1,6 @@
-//! Speed plans without a limit of jerk: the exact time-optimal plan under axis velocity, axis acceleration, feed and
-//! chord error, its lower bound, and the speeds of controllers. Lengths are millimetres, angles degrees, times
-//! seconds.
+//! Speed plans without a jerk limit: the exact time-optimal profile under axis velocity, axis acceleration, feed and chord error
+//! (`bang_bang`), a proven lower bound of its time (`lower_bound`), and the trapezoidal plan of machine controllers
+//! (`trapezoid`). Lengths are millimetres, angles degrees, times seconds.
 
 pub mod bang_bang;
 pub mod lower_bound;
@@ -17,14 +17,14 @@ use phases::Phases;
 use problem::Fault;
 use profile::Profile;
 
-/// Bit k stands for axis k; M is at most 16.
+/// A set of axes: bit k stands for axis k. There are at most 16 axes.
 type AxisBits = u16;
 
 instances! {
     /// The exact planner and its lower bound.
     pub trait Exact for [3, 6, 9] problem::Problem<'_, M> = {
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang::plan;
-        /// A time [s] below that of every feasible profile.
+        /// A proven lower bound [s] of the time of every feasible profile.
         fn lower_bound(&self, hint: &Phases) -> Result<f64, Fault> = lower_bound::lower_bound;
     }
 }

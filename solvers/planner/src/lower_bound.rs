@@ -1,30 +1,30 @@
-//! A proven lower bound of the time of every profile that keeps the limits, from the path and the limits alone.
-//! Source: own, by the axes' energies v_k²/2.
+//! Computes a proven lower bound of the time of every profile that keeps the limits, from the path and the limits alone. Our own
+//! method, from the energies v_k²/2 of the axes.
 //!
 //! Each run is divided into intervals between stations; any division gives a bound. The state at a station is x = π =
 //! p/ω⁴ (symbols: `bang_bang`):
 //!
 //! * At a station, feed, axis velocities and chord error limit x, and so does the limit curve: the acceleration
 //!   limits of two axes after s is eliminated.
-//! * Over an interval, v_k² changes by at most 2 A_k times the distance of axis k to and fro. So x at one station
-//!   limits x at the next, backward and forward. On a phase of the exact profile this holds with equality for its
-//!   control axis, so the phases of a profile are the first intervals.
-//! * In an interval no axis is faster than at full acceleration from the greatest speed at its start and to that at
-//!   its end, and the tool is not faster than the feed.
+//! * Over an interval, v_k² changes by at most 2 A_k times the distance that axis k travels back and forth. So x at one station
+//!   limits x at the next, backward and forward. On a phase of the exact profile this holds with equality for its control axis,
+//!   so the phases of a profile are the first intervals.
+//! * The least time of an interval: no axis is faster than with full acceleration from the greatest speed at its start and full
+//!   braking to the greatest speed at its end, and the tool is not faster than the feed.
 //!
 //! A sweep from the end of a run and one from its start find, at every station, an x that no feasible profile
 //! exceeds. The bound is the sum of the least times of the intervals. A wrong profile can make it loose but never
 //! wrong. The intervals of a phase are halved while their bound is loose and halving helps.
 //!
-//! Rounding: the tangents of a piece come with an error estimate that counts every operation twice (`hodograph`).
-//! They enter every quotient from the side that loosens the bound. A formula of at most sixteen operations on
-//! positive numbers is then widened by `UP` or `DOWN`. NaN and infinity mean no limit, since `f64::min` and `max`
+//! Rounding: the tangents of a piece come with an error estimate that counts every operation twice (`hodograph`). In every
+//! quotient the tangents are increased or reduced by their errors so that the bound becomes looser. A formula of at most sixteen
+//! operations on positive numbers is then widened by `UP` or `DOWN`. NaN and infinity mean no limit, since `f64::min` and `max`
 //! ignore NaN. Magnitudes below 1e-150 are not expected.
 //!
 //! | file | content |
 //! |---|---|
 //! | `hodograph` | tangents, their slopes and the distances of the axes, with their errors |
-//! | `piece` | the greatest x at a station, its rise over an interval, the least time of an interval |
+//! | `piece` | the greatest x at a station, its greatest rise over an interval, the least time of an interval |
 //! | `time`, `length` | the least time of an axis between two speeds; the least length of the tool's path |
 //! | `chord` | the chord-error limit at a station and over an interval |
 //! | `intervals` | the division of a run and its refinement |
@@ -49,7 +49,7 @@ use intervals::Intervals;
 /// Factors that exceed the rounding of sixteen operations.
 const UP: f64 = 1.0 + 16.0 * f64::EPSILON;
 const DOWN: f64 = 1.0 - 16.0 * f64::EPSILON;
-/// Joint polynomials, and the speed of the tip beside them, are off by less than this fraction of any limit; see
+/// The errors of joint polynomials, and of the polynomials of the tip's speed, are less than this fraction of any limit; see
 /// `feedplan/constraints/joints.py`.
 const STAND_IN: f64 = 1e-8;
 /// Refinement stops when the bound is within this fraction of the profile's time.
@@ -61,7 +61,7 @@ const LOOSE: f64 = 2e-4;
 /// after `MOST_ROUNDS`, or at `MOST_INTERVALS` per phase and `FEW_INTERVALS` more.
 const LEAST_GAIN: f64 = 0.02;
 const PATIENCE: usize = 3;
-/// Below every bound: all phases are refined.
+/// As `part` of `Intervals::halve`: all phases are refined.
 const ALL: f64 = f64::NEG_INFINITY;
 /// A turn closer than this fraction of an interval to its end is that end.
 const AT_END: f64 = 1e-3;
@@ -69,7 +69,7 @@ const MOST_ROUNDS: usize = 14;
 const MOST_INTERVALS: usize = 12;
 const FEW_INTERVALS: usize = 20_000;
 
-/// Computes the tables that all bounds share. A process forked while a thread computes them would wait for ever.
+/// Computes the tables that all bounds share. A process forked while a thread computes them would wait for them for ever.
 pub fn prepare() {
     length::prepare();
 }
@@ -84,8 +84,8 @@ struct Task<'a, const M: usize> {
     chord: Option<ChordLimit>,
 }
 
-/// A lower bound [s] of the time of every profile that keeps the problem's limits. `hint` are the phases of a profile, by
-/// their pieces, axes, ends u1 and durations: only the first intervals and their refinement depend on it.
+/// A lower bound [s] of the time of every profile that keeps the problem's limits. `hint` are the phases of a profile, of which
+/// the columns piece, axis, u1 and duration are used: only the first intervals and their refinement depend on them.
 pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Phases) -> Result<f64, Fault> {
     problem.check()?;
     if hint.len() >= u32::MAX as usize {
@@ -126,7 +126,7 @@ pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Phases) -> Resul
     Ok(times.iter().sum::<f64>() * (1.0 - rounding))
 }
 
-/// The bound of one run.
+/// The lower bound [s] of the time of one run.
 fn over_run<const M: usize>(
     task: &Task<M>,
     pieces: (usize, usize),
@@ -139,7 +139,7 @@ fn over_run<const M: usize>(
         sweep::find_turn(task, i, axis, part)
     };
     intervals.divide(hint, pieces, task.problem.width, find_turn);
-    // A turn inside the interval, else its middle.
+    // The place to cut an interval: a turn inside it, else its middle.
     let middle = |i: usize, (from, to): (f64, f64)| {
         let inside = |t: &f64| (t - from).min(to - t) > AT_END * (to - from);
         let mut turns = (0..M).filter_map(|k| find_turn(pieces.0 + i, k, (from, to)));
@@ -154,7 +154,7 @@ fn over_run<const M: usize>(
         None => (M, f64::INFINITY),
     };
     let (mut best, mut idle) = (0.0, 0);
-    // The number of rounds is not known: each one counts as half of what is left.
+    // Progress: the number of rounds is not known, so each round counts as half of what is left.
     let mut watch = task.problem.watch.each(task.problem.width.len());
     for _ in 0..MOST_ROUNDS {
         watch = watch.part(0.5);

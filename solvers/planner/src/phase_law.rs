@@ -21,8 +21,8 @@ pub enum PhaseLaw {
 }
 
 impl PhaseLaw {
-    /// Whether the law is about the length along the path, which counts all axes; the feed may count only some of
-    /// them.
+    /// Whether the law refers to the length along the path, to which all axes contribute. The speed that the feed limits may
+    /// depend on some axes only.
     pub fn is_along(self) -> bool {
         matches!(self, Self::PathJerk | Self::SpeedCubic)
     }

@@ -1,14 +1,14 @@
-//! The phases of a profile as columns, in the order of the path, and one of them.
+//! The phases of a profile in the order of the path: as columns, and as a record of one phase.
 
 use std::mem::take;
 
 use crate::phase_law::PhaseLaw;
 
-/// The axis of a phase without one.
+/// The axis number of a phase whose law refers to no axis.
 pub const NO_AXIS: u8 = 255;
 
-/// One phase of a profile: `value` is the constant of its law, u0 < u1 local parameters, p at both ends, and where the jerk
-/// is limited the acceleration along the path.
+/// One phase of a profile: `value` is the constant of its law; u0 < u1 are local parameters of the piece; p0 and p1 are p =
+/// (du/dτ)² at both ends, with the time τ; a0 and a1 are the accelerations along the path there, if the jerk is limited.
 #[derive(Clone, Copy, Debug)]
 pub struct Phase {
     pub piece: u32,
@@ -25,7 +25,7 @@ pub struct Phase {
 }
 
 impl Phase {
-    /// The speeds that p makes of the squares of a length per u at both ends.
+    /// The speeds [mm/s] at both ends; `squares` are the squares of the length per u there.
     pub fn end_speeds(&self, squares: [f64; 2]) -> [f64; 2] {
         [(squares[0] * self.p0).sqrt(), (squares[1] * self.p1).sqrt()]
     }
@@ -40,7 +40,7 @@ macro_rules! columns {
         }
 
         impl Phases {
-            /// Without phases, with memory for this many.
+            /// No phases, with memory for this many.
             pub fn with_capacity(phases: usize) -> Self {
                 Self { $($column: Vec::with_capacity(phases),)+ }
             }
@@ -50,18 +50,18 @@ macro_rules! columns {
                 $(self.$column.truncate(phases);)+
             }
 
-            /// Takes out one phase.
+            /// Removes one phase.
             pub fn remove(&mut self, at: usize) {
                 $(self.$column.remove(at);)+
             }
 
-            /// Gives back the memory that columns have reserved for more phases.
+            /// Frees the memory that the columns have reserved for more phases.
             pub fn shrink_to_fit(&mut self) {
                 $(self.$column.shrink_to_fit();)+
             }
 
-            /// The phases of all parts in this order. Column after column is copied and its parts are freed; one part alone
-            /// is not copied.
+            /// The phases of all parts in this order. Copies one column after the other and frees its parts, to save memory; a
+            /// single part is not copied.
             pub fn joined(mut parts: Vec<Self>) -> Self {
                 if parts.len() == 1 {
                     return parts.remove(0);
@@ -83,7 +83,7 @@ columns! {
     p0: f64,
     p1: f64,
     duration: f64,
-    /// These two are empty in a profile without a limit of jerk.
+    /// `a0` and `a1` are empty in a profile without a jerk limit.
     a0: f64,
     a1: f64,
 }
@@ -123,7 +123,7 @@ impl Phases {
         self.duration.push(phase.duration);
     }
 
-    /// Phase i, if the number of its law is known.
+    /// Phase i; None if the number of its law is unknown. All columns must be filled, including `a0` and `a1`.
     pub fn get(&self, i: usize) -> Option<Phase> {
         Some(Phase {
             piece: self.piece[i],
@@ -140,7 +140,7 @@ impl Phases {
         })
     }
 
-    /// The first phase that ends at or behind u of a piece; their number if none does.
+    /// Index of the first phase of the piece that ends at u or later; if none does, the index after the piece's last phase.
     pub fn up_to(&self, piece: u32, u: f64) -> usize {
         let first = self.piece.partition_point(|&own| own < piece);
         let own = self.piece[first..].partition_point(|&own| own == piece);

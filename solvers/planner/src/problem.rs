@@ -1,30 +1,30 @@
-//! The planning problem: a path with its limits, with the checks of all its numbers.
+//! The planning problem: a path with its limits, and the checks of all its numbers.
 
 use feedplan_geometry::watch::Watch;
 
 /// Number of axes in which the tip moves.
 pub const TIP_AXES: usize = 3;
 
-/// Limits of the axes as magnitudes: [of positive values, of negative values].
+/// Limits of the axes for positive and for negative values, both as absolute values.
 pub type Both<const M: usize> = [[f64; M]; 2];
 
-/// The greater limit of both directions.
+/// The greater one of both limits of each axis.
 pub fn greater<const M: usize>(limits: &Both<M>) -> [f64; M] {
     std::array::from_fn(|k| limits[0][k].max(limits[1][k]))
 }
 
-/// The lesser limit of both directions.
+/// The lesser one of both limits of each axis.
 pub fn lesser<const M: usize>(limits: &Both<M>) -> [f64; M] {
     std::array::from_fn(|k| limits[0][k].min(limits[1][k]))
 }
 
-/// The greatest factor of `direction` that the limits allow; infinite if all its components are 0.
+/// The greatest factor by which `direction` can be multiplied within the limits; infinite if all its components are 0.
 pub fn along<const M: usize>(limits: &Both<M>, direction: &[f64; M]) -> f64 {
     let of_axis = |k: usize| limits[usize::from(direction[k] < 0.0)][k] / direction[k].abs();
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }
 
-/// The square of a speed over (du/dt)² with the time t, a polynomial on each piece.
+/// The square of a speed divided by (du/dt)², where t is the time: a polynomial in u on each piece.
 #[derive(Clone, Copy)]
 pub struct SpeedSquare<'a> {
     /// Bernstein coefficients; piece i has coefficients[offset[i]..offset[i + 1]].
@@ -44,7 +44,7 @@ impl<'a> SpeedSquare<'a> {
     }
 }
 
-/// Whether offsets give each of `count` pieces `least` or more of `total` rows.
+/// Whether the offsets divide `total` rows among `count` pieces, with `least` rows or more for each.
 fn is_rising(offset: &[usize], count: usize, total: usize, least: usize) -> bool {
     offset.len() == count + 1
         && offset[0] == 0
@@ -52,7 +52,7 @@ fn is_rising(offset: &[usize], count: usize, total: usize, least: usize) -> bool
         && offset.windows(2).all(|pair| pair[1] >= pair[0] + least)
 }
 
-/// The path of the tip beside that of the joints, piece by piece over the same parameter.
+/// The path of the tip that belongs to the path of the joints, with the same pieces and parameters.
 #[derive(Clone, Copy)]
 pub struct Tip<'a> {
     /// The speed that the feed limits: |C'(u)|².
@@ -75,11 +75,11 @@ pub struct Problem<'a, const M: usize> {
     pub width: &'a [f64],
     /// The tip, where the axes are joints.
     pub tip: Option<Tip<'a>>,
-    /// The speed along the path to which laws of jerk refer, if it is not that of the axes; it is 0 only where all
-    /// axes rest.
+    /// The speed along the path to which the laws `PathJerk` and `SpeedCubic` refer; None if it is that of the axes. It is 0 only
+    /// where all axes rest.
     pub way: Option<SpeedSquare<'a>>,
-    /// Of each piece: the factor of each axis's velocity in the speed that the feed limits, |(share_k q_k')| du/dt.
-    /// Empty if all factors are 1, and where `tip` is given.
+    /// For each piece: the factor of each axis's velocity in the speed that the feed limits, |(share_k q_k')| du/dt. Empty if all
+    /// factors are 1, and where `tip` is given.
     pub feed_share: &'a [[f64; M]],
     /// Run i has the pieces runs[i]..runs[i + 1]. Runs begin and end at rest, except at the two ends of the path.
     pub runs: &'a [usize],
@@ -88,16 +88,16 @@ pub struct Problem<'a, const M: usize> {
     /// Greatest speed at the start of each piece and at the end of the path [mm/s]; infinite for no limit. Ignored
     /// where a run begins or ends.
     pub junction_speed: &'a [f64],
-    /// [mm/s] and [mm/s²].
+    /// Limits of the axes [mm/s] and [mm/s²].
     pub max_velocity: Both<M>,
     pub max_acceleration: Both<M>,
-    /// [mm], infinite for no limit; and the servo period [s].
+    /// Greatest chord error [mm], infinite for no limit; and the servo period [s].
     pub chord_tolerance: f64,
     pub period: f64,
-    /// At the ends of the path [mm/s].
+    /// Speeds at both ends of the path [mm/s].
     pub start_speed: f64,
     pub end_speed: f64,
-    /// Takes progress, and asks whether to go on.
+    /// Receives the progress, and can stop the computation.
     pub watch: Watch<'a>,
 }
 
@@ -108,7 +108,7 @@ pub enum Fault {
     Start { piece: usize, reachable: f64 },
     /// The end speed is too high; `reachable` is the greatest possible one [mm/s].
     End { piece: usize, reachable: f64 },
-    /// An argument that cannot be used; of this piece, if of one.
+    /// An invalid argument; `piece` is given if it belongs to one piece.
     Input { piece: Option<usize>, what: String },
     /// Rounding stopped a pass at u on the piece: a fault of the planner.
     Stuck { piece: usize, u: f64 },
@@ -307,8 +307,8 @@ pub struct ChordLimit {
 }
 
 impl ChordLimit {
-    /// None if the limit never binds: on any curve v²/ρ is at most `acceleration`, and the limit is nowhere below ρ
-    /// α/2.
+    /// None if the limit is never the lowest one: on any curve v²/ρ is at most `acceleration`, and this limit is nowhere below
+    /// ρ α/2.
     pub fn new(tolerance: f64, period: f64, acceleration: f64) -> Option<Self> {
         let alpha = 8.0 * tolerance / (period * period);
         let slow_sq = 0.5 * alpha * tolerance;

@@ -26,7 +26,7 @@ pub(crate) struct Row {
 }
 
 impl Profile {
-    /// Without phases, with memory for this many.
+    /// No phases, with memory for this many.
     pub(crate) fn with_capacity(phases: usize) -> Self {
         let phases = Phases { a0: vec![], a1: vec![], ..Phases::with_capacity(phases) };
         Self { phases, ..Self::default() }
@@ -45,7 +45,7 @@ impl Profile {
         Self { phases: Phases::joined(phases), ..all }
     }
 
-    /// Closes a run; its last phase gets the time of those too short to keep.
+    /// Ends a run; its last phase gets the time of the phases after it that were too short to be kept.
     pub(crate) fn end_run(&mut self) {
         let left_out = std::mem::take(&mut self.left_out);
         if let Some(last) = self.phases.duration.last_mut() {
@@ -59,8 +59,8 @@ impl Profile {
         self.left_out = 0.0;
     }
 
-    /// Appends a phase of piece `piece`; t and p are over t = u/width. A phase too short for u to show is left out,
-    /// and the next one gets its time.
+    /// Appends a phase of piece `piece`; t and p refer to the parameter t = u/width. A phase too short to change u is left out,
+    /// and the next phase gets its time.
     #[inline(always)]
     pub(crate) fn push(&mut self, piece: u32, width: f64, row: Row) {
         let phases = &mut self.phases;

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use crate::problem::{Fault, Problem};
 use crate::profile::Profile;
 
-/// Number of pieces of a group of runs, about; a thread plans one group at a time.
+/// Approximate number of pieces in a group of runs; a thread plans one group at a time.
 const GROUP: usize = 8192;
-/// The memory of a run of more pieces is freed after it, so that each thread keeps some MB at most.
+/// After a run of more pieces its memory is freed, so that each thread keeps at most some MB.
 const MOST_KEPT: usize = 4096;
 
 /// Memory of each thread for one run, kept from call to call: allocating some MB takes time.

@@ -1,16 +1,15 @@
-//! The trapezoidal plan of controllers: the greatest speeds at the ends of the segments of a run, from one greatest
-//! acceleration and one greatest deceleration of each segment, by one pass backward and one forward. Without holds
-//! these are the speeds of grbl and Klipper.
+//! Computes the trapezoidal plan of controllers: the greatest speeds at the ends of the segments of a run, from the greatest
+//! acceleration and deceleration of each segment, by a backward and a forward pass. Without holds these are the speeds of grbl
+//! and Klipper.
 //!
-//! A segment of length L [mm] between the speeds v and w [mm/s] changes v² by at most 2 a L, less what it spends at
-//! constant speed: the time T [s] after v and S before w. So w² − v² = 2 a (L − v T − w S), or with h = a T and k = a
-//! S
+//! A segment of length L [mm] between the speeds v and w [mm/s] changes v² by at most 2 a L, or less if it moves at constant
+//! speed for a time: for T [s] at v and for S [s] at w. So w² − v² = 2 a (L − v T − w S), or with h = a T and k = a S
 //!
 //! ```text
 //! (w + k)² = (v − h)² + 2 a L + k² − h²
 //! ```
 //!
-//! and the same from its end to its start where it slows down.
+//! Where the segment slows down, the same equation holds from its end to its start.
 
 /// Segments in the order of the path.
 pub struct Segments<'a> {
@@ -28,9 +27,8 @@ pub struct Change {
 }
 
 impl Segments<'_> {
-    /// Lowers the greatest speeds [mm/s] at the ends of the segments, one more than segments, to those that the
-    /// segments before and after them allow. Between two held speeds the segment must be long enough to hold the
-    /// lower one twice.
+    /// Lowers the greatest speeds [mm/s] at the ends of the segments (one speed more than segments) to those that the segments
+    /// before and after them allow. Between two held speeds the segment must be long enough to hold the lower one twice.
     pub fn lower(&self, speed: &mut [f64]) {
         // Backward: no end faster than full braking to the next one.
         for (i, down) in self.down.iter().enumerate().rev() {

@@ -1,4 +1,4 @@
-//! Conversion of NumPy arrays to and from the types of kernels; lengths are checked here.
+//! Converts NumPy arrays to and from the types of the kernels, and checks their lengths.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -12,12 +12,12 @@ pub type Column<'py, T = f64> = PyReadonlyArray1<'py, T>;
 pub type Table<'py, T = f64> = PyReadonlyArray2<'py, T>;
 pub type Cube<'py, T = f64> = PyReadonlyArray3<'py, T>;
 
-/// ValueError with a sentence, where something does not hold.
+/// Raises ValueError with the sentence if `good` is false.
 pub fn require(good: bool, sentence: &'static str) -> PyResult<()> {
     good.then_some(()).ok_or_else(|| PyValueError::new_err(sentence))
 }
 
-/// Offsets; a negative one becomes the greatest number, which no kernel accepts.
+/// Converts offsets; a negative one becomes the greatest number, which no kernel accepts.
 pub fn indices(array: &Column<'_, i64>) -> Vec<usize> {
     array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
 }
@@ -27,14 +27,14 @@ pub fn rows<const M: usize>(array: &Table) -> PyResult<Vec<[f64; M]>> {
     rows_with(array, 0.0)
 }
 
-/// The same with `rest` for the axes beyond m.
+/// Rows of an (n, m) array as rows of M ≥ m axes, those beyond m at `rest`.
 pub fn rows_with<const M: usize>(array: &Table, rest: f64) -> PyResult<Vec<[f64; M]>> {
     let flat = array.as_slice()?;
     let axes = array.shape()[1];
     Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
 }
 
-/// Rows of `axes` numbers as rows of M axes, those beyond at 0.
+/// Rows of `axes` numbers as rows of M axes, the additional ones at 0.
 pub fn padded_rows<const M: usize>(flat: &[f64], axes: usize) -> Vec<[f64; M]> {
     flat.chunks_exact(axes).map(|row| padded(row, 0.0)).collect()
 }
@@ -60,7 +60,7 @@ pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
 ) -> Bound<'py, PyArray2<T>> {
     let (count, mut flat) = (rows.len(), rows.into_flattened());
     if axes < M {
-        // In place: memory for as many more is slow to get.
+        // In place: allocating a second array of this size is slow.
         for i in 0..count {
             flat.copy_within(i * M..i * M + axes, i * axes);
         }

@@ -1,4 +1,4 @@
-//! The audit of plans: the package's own types in, findings out.
+//! The audit of plans for Python: takes the package's own types, returns findings.
 
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
@@ -20,13 +20,13 @@ use feedplan_audit::{Check, Limits, Sided, Tally, FEEDS};
 
 const OF_PATH: &str = "the arrays of the path differ in length";
 
-/// Pieces of a path, of which fit and plan may leave some kilobytes each.
+/// Memory is given back before the audit of a path of at least this many pieces: fit and plan may leave some kilobytes for each.
 const LONG: usize = 20_000;
 
-/// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
+/// The use of one limit: its name, axis (−1: none), worst value, limit, ratio, time, source line.
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
 
-/// The findings, and how many samples were looked at.
+/// The findings, and the number of samples checked.
 pub type Findings = (Vec<Finding>, u64);
 
 pub fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
@@ -70,7 +70,7 @@ struct PathArrays<'py> {
     dwell: Column<'py>,
 }
 
-/// `feedplan.constraints.problem.Problem`; its other limits come in `LimitArrays`.
+/// `feedplan.constraints.problem.Problem`; its other limits are in `LimitArrays`.
 #[derive(FromPyObject)]
 pub struct ProblemArrays<'py> {
     path: PathArrays<'py>,
@@ -83,12 +83,12 @@ impl ProblemArrays<'_> {
         self.path.curve.axes()
     }
 
-    /// What the axes count in the feed, one row a piece or none.
+    /// The factors of the axes in the feed, one row per piece, or empty.
     fn share(&self) -> PyResult<&[f64]> {
         Ok(self.feed_share.as_ref().map_or(Ok(&[][..]), |share| share.as_slice())?)
     }
 
-    /// `feed` are the greatest speeds of each piece.
+    /// The path with its feeds; `feed` contains the `FEEDS` greatest speeds of each piece.
     pub fn followed<'a>(&'a self, feed: &'a Table<'_>) -> PyResult<Followed<'a>> {
         let followed = Followed { feed: feed.as_slice()?, ..self.unlimited()? };
         require(followed.feed.len() == FEEDS * followed.len(), OF_PATH)?;
@@ -129,7 +129,7 @@ impl ProblemArrays<'_> {
     }
 }
 
-/// The phases of a profile as the audit takes them.
+/// The phases of a profile in the form that the audit takes.
 pub fn phases<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyResult<Phases<'a>> {
     Ok(Phases {
         piece: &profile.piece,
@@ -149,7 +149,7 @@ pub fn phases<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyRes
     })
 }
 
-/// The moves of a program on a path in so many axes.
+/// The moves of a program for a path of `axes` axes.
 pub fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
     let none = Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] };
     require(moves.axes() == axes, "the arrays of the program differ in length")?;
@@ -171,7 +171,7 @@ pub fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
     })
 }
 
-/// `feedplan.audit._Limits`: what holds everywhere, one number an axis.
+/// `feedplan.audit._Limits`: the limits that hold everywhere, one number per axis.
 #[derive(FromPyObject)]
 pub struct LimitArrays {
     max_velocity: Vec<f64>,
@@ -195,7 +195,7 @@ impl LimitArrays {
         self.max_velocity.len()
     }
 
-    /// For `axes` axes, those beyond at rest.
+    /// The limits for `axes` of M axes; the others are at rest.
     pub fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
         let jumps = [&self.max_velocity_jump, &self.jump_beyond];
         let least = [&self.min_velocity, &self.min_acceleration];
@@ -243,7 +243,7 @@ pub fn audit_plan(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
     let path = problem.followed(&feed)?;
-    // What a short plan has left takes longer to give back, and to get again, than it is worth.
+    // After a short plan, giving memory back and allocating it again takes longer than it is worth.
     if path.len() >= LONG {
         py.detach(memory::give_back);
     }
@@ -254,7 +254,7 @@ pub fn audit_plan(
         let limits = limits.limits::<M>(path.axes)?;
         run(py, progress.as_ref(), |watch| {
             let pieces = path.len();
-            // About what each takes of the time.
+            // The approximate share of each audit in the time.
             let [of_path, of_profile, of_deviation] = [0.05, 0.45, 0.5].map(|share| watch.part(share));
             let seen = |count| of_path.each(pieces).advance(count);
             let mut tally = limits.path(&path, phases.as_ref(), &seen);

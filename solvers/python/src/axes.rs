@@ -1,7 +1,7 @@
 //! The numbers of axes that kernels are compiled for.
 
-/// Calls a generic kernel for 3, 6 or 9 axes, those beyond `count` at rest. An axis at rest does not change results, and
-/// three instances of a kernel suffice in place of nine. Another number of axes is an error, or as `otherwise` says.
+/// Calls a generic kernel for 3, 6 or 9 axes, those beyond `count` at rest. An axis at rest does not change results, so three
+/// instances of a kernel suffice instead of nine. For another number of axes it raises an error, or evaluates `otherwise`.
 macro_rules! with_padded_axes {
     ($count:expr, $m:ident, $call:expr) => {
         with_padded_axes!($count, $m, $call, |count| {

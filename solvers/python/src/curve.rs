@@ -1,4 +1,4 @@
-//! `Curve`: the pieces of a composite curve, checked once and held as the kernels take them.
+//! `Curve`: the pieces of a composite curve, checked once and stored in the form that the kernels take.
 
 use std::sync::Arc;
 
@@ -24,10 +24,10 @@ pyo3::import_exception!(feedplan.errors, InputError);
 
 /// Number of places that one thread evaluates at a time.
 const BLOCK: usize = 4096;
-/// Least width of a piece; the greatest one is one over it.
+/// Least width of a piece; the greatest width is its inverse.
 const LEAST_WIDTH: f64 = 1e-60;
 
-/// Where the values and derivatives of some places are written, then their pieces and parameters.
+/// Memory for the values and derivatives at some places, and the pieces and parameters of these places.
 type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
 
 /// Bézier pieces joined end to end.
@@ -37,7 +37,7 @@ pub struct Curve {
     pieces: InAxes,
 }
 
-/// Calls a generic kernel for the pieces of a curve, which have M axes.
+/// Calls a generic kernel with the pieces of a curve in M axes.
 macro_rules! with_pieces {
     ($curve:expr, $m:ident, $pieces:ident, $call:expr) => {
         with_object!($curve.pieces, $m, $pieces: Arc<CompositeCurve<$m>>, $call)
@@ -48,7 +48,7 @@ pub fn weights_of(weights: Option<&Column>) -> PyResult<Vec<f64>> {
     weights.map_or(Ok(vec![]), |weights| Ok(weights.as_slice()?.to_vec()))
 }
 
-/// Offsets of this many pieces in this many control points. Raises InputError for others.
+/// The offsets of `widths` pieces in `points` control points. Raises InputError if they do not fit these numbers.
 fn checked_offsets(given: &[i64], widths: usize, points: usize) -> PyResult<Vec<usize>> {
     let error = |sentence: String| Err(InputError::new_err(sentence));
     if given.len() != widths + 1 {
@@ -94,7 +94,7 @@ impl Curve {
         self.pieces.axes
     }
 
-    /// The pieces in M axes, as `with_padded_axes` counts them.
+    /// The pieces in M axes; raises ValueError if `with_padded_axes` gives another M for this curve.
     pub fn padded<const M: usize>(&self) -> PyResult<&Arc<CompositeCurve<M>>> {
         self.pieces.get().map_err(|_| {
             PyValueError::new_err(format!("a curve in {} axes where {M} are meant", self.axes()))
@@ -105,7 +105,7 @@ impl Curve {
         with_pieces!(self, M, pieces, &pieces.offsets)
     }
 
-    /// Empty where all pieces are polynomial.
+    /// The weights; empty where all pieces are polynomial.
     pub fn weight_slice(&self) -> &[f64] {
         with_pieces!(self, M, pieces, &pieces.weights)
     }
@@ -184,7 +184,7 @@ impl Curve {
         let fields = PyDict::new(slf.py());
         fields.set_item("control_points", view(slf, Self::table)?)?;
         fields.set_item("weights", weights)?;
-        // The same memory as signed numbers: differences of unsigned ones are never negative.
+        // The same memory as signed numbers, since differences of unsigned numbers are never negative.
         fields.set_item("offsets", offsets.call_method1("view", ("i8",))?)?;
         fields.set_item("width", view(slf, |curve| curve.widths().into())?)?;
         Ok(fields)
@@ -221,7 +221,7 @@ impl Curve {
                 }
             });
         };
-        // Waking other threads takes longer than a few places.
+        // Waking other threads takes longer than evaluating a few places.
         if blocks.len() == 1 {
             py.detach(|| blocks.into_iter().for_each(fill));
         } else {
@@ -246,7 +246,7 @@ impl Curve {
         })
     }
 
-    /// The curve with pieces cut at places, which are in the order of the curve.
+    /// The curve with its pieces cut at places, which must be in the order of the curve.
     fn split(&self, piece: Column<'_, u32>, u: Column<'_>) -> PyResult<Self> {
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(self.widths(), piece, u)?;
@@ -275,8 +275,8 @@ impl Curve {
         })
     }
 
-    /// The curve as lines and as curved pieces without a cusp inside; the first and the last piece of the old curve
-    /// that each one follows (n, 2), and whether it rests at its start and at its end (n, 2).
+    /// The curve as n lines and curved pieces without a cusp inside; for each the first and the last piece of the old curve that
+    /// it replaces (n, 2), and whether it rests at its start and at its end (n, 2).
     fn regular<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         with_pieces!(self, M, pieces, {
             let whole = 0..pieces.len();

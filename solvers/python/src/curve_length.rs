@@ -22,7 +22,7 @@ pub struct CurveLength {
 
 #[pymethods]
 impl CurveLength {
-    /// Of a curve, which has at least one piece.
+    /// The lengths along a curve, which must have at least one piece.
     #[new]
     fn new(py: Python<'_>, curve: &Curve, accuracy: f64) -> PyResult<Self> {
         let (axes, width) = (curve.axes(), curve.widths().to_vec());
@@ -46,7 +46,7 @@ impl CurveLength {
         with_object!(self.lengths, M, kernel: Kernel<M>, kernel.error())
     }
 
-    /// Lengths (m,) from the start of the curve to m places.
+    /// Lengths (m,) in mm from the start of the curve to m places.
     fn lengths<'py>(
         &self,
         py: Python<'py>,
@@ -60,7 +60,7 @@ impl CurveLength {
         Ok(PyArray1::from_vec(py, found?))
     }
 
-    /// Pieces and parameters at m lengths.
+    /// Pieces (m,) and parameters (m,) at m lengths from the start of the curve in mm.
     fn locate<'py>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! `read_gcode`: the bytes of a program to the fields of `Program`.
+//! `read_gcode`: reads the bytes of a program into the fields of `Program`.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ pyo3::import_exception!(feedplan.errors, ProgramError);
 struct PyTipControl(Py<PyAny>);
 
 impl PyTipControl {
-    /// Calls a method of the Python object; the message of what it raises is the error.
+    /// Calls a method of the Python object; if it raises, the message of its exception is the error.
     fn call<T, A>(&self, method: &str, arguments: A) -> Result<T, String>
     where
         T: for<'a, 'py> FromPyObject<'a, 'py>,
@@ -67,7 +67,7 @@ impl TipControl for PyTipControl {
 /// A row of the tool table: number, pocket, offset X to W, diameter, orientation.
 type ToolRow = (u32, u32, [f64; 9], f64, u32);
 
-/// The file name and the bytes that the Python function finds for the name of a subprogram.
+/// Calls the Python function for the name of a subprogram; returns the file name and the bytes that it finds.
 fn find(finder: &Py<PyAny>, name: &str) -> Result<Option<(String, Vec<u8>)>, String> {
     Python::attach(|py| {
         let found = finder.bind(py).call1((name,)).map_err(|error| error.value(py).to_string())?;
@@ -75,7 +75,7 @@ fn find(finder: &Py<PyAny>, name: &str) -> Result<Option<(String, Vec<u8>)>, Str
     })
 }
 
-/// The names of machines with an axis, by the Python function; empty where it fails.
+/// The names of the machines that have an axis, from the Python function; empty if it fails.
 fn names_of(names: &Py<PyAny>, letter: char) -> String {
     Python::attach(|py| names.bind(py).call1((letter,)).and_then(|text| text.extract()).unwrap_or_default())
 }
@@ -95,8 +95,8 @@ pub struct PyOptions<'py> {
     whole_step: f64,
 }
 
-/// Reads a G-code program. Returns its moves and the other fields of `Program` but its name, with a native curve as
-/// `splines`, and `event_columns` in place of `events`.
+/// Reads a G-code program. Returns its moves and the other fields of `Program` except its name, with a native curve as `splines`,
+/// and `event_columns` instead of `events`.
 #[pyfunction]
 #[pyo3(signature = (source, name, options, progress=None))]
 pub fn read_gcode<'py>(

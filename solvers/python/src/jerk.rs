@@ -1,5 +1,5 @@
-//! Profiles within limits of jerk for Python: by the jerk-limited planner, by the two-pass profiler of segments, and from
-//! sections that Python makes of such segments.
+//! Profiles within jerk limits for Python: from the jerk-limited planner, from the two-pass profiler of segments, and from
+//! sections that Python computes for such segments.
 
 use std::time::{Duration, Instant};
 
@@ -18,15 +18,15 @@ use feedplan_jerk::s_curve::on_path::Cutting;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
 use feedplan_jerk::JerkLimited as _;
 
-/// How long a planner may take.
+/// The instant at which a planner must stop; None without a time limit.
 fn deadline(time_limit: Option<f64>) -> Option<Instant> {
     let limit = Duration::try_from_secs_f64(time_limit?).ok()?;
     Instant::now().checked_add(limit)
 }
 
-/// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
-/// arcs. Returns the profile; whether a time limit stopped the planner; how far it takes the time of each part that it
-/// planned to be above the least, in s; a lower bound in s of the time of each run, NaN without proof.
+/// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit is reached have no
+/// phases. Returns the profile; whether the time limit stopped the planner; for each planned part the estimated difference in s
+/// between its time and the least time; and a lower bound in s of the time of each run, NaN without proof.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, resolution, tolerance, proves, time_limit=None, progress=None))]
 #[allow(clippy::too_many_arguments)]
@@ -52,8 +52,9 @@ pub fn plan_jerk_limited<'py>(
     })
 }
 
-/// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve::on_path::Cutting` (lengths,
-/// alike). The time limit is that of subruns left to the jerk-limited planner; see there.
+/// The two-pass profile within `jerk` [mm/s³] of every axis. Each subrun is cut into segments by that one of `cuttings` (pairs
+/// of the fields `lengths` and `alike` of `s_curve::on_path::Cutting`) that gives the least time. The time limit applies to the
+/// subruns that are left to the jerk-limited planner, as in `plan_jerk_limited`.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None, progress=None))]
 pub fn plan_s_curve<'py>(
@@ -76,8 +77,8 @@ pub fn plan_s_curve<'py>(
     })
 }
 
-/// The segments of each subrun that `plan_s_curve` plans on, (n, 5) rows of length, speed, acceleration, jerk and the speed
-/// limit at the junction with the next. A subrun without any is not for it.
+/// The segments of each subrun that `plan_s_curve` plans on, (n, 5) rows of length, speed, acceleration, jerk and the speed limit
+/// at the junction with the next. A subrun without segments is left to the jerk-limited planner.
 #[pyfunction]
 pub fn path_segments<'py>(
     py: Python<'py>,
@@ -96,9 +97,9 @@ pub fn path_segments<'py>(
     })
 }
 
-/// The profile of sections of constant jerk, (n, 5) rows of duration, position along the subrun, speed,
-/// acceleration, jerk at their starts; those of subrun i from `offsets[i]` on. A subrun without any is planned by the
-/// jerk-limited planner.
+/// The profile of sections of constant jerk, (n, 5) rows of duration, and at the start of the section the position along the
+/// subrun, speed, acceleration and jerk. Subrun i has the sections from `offsets[i]` to `offsets[i + 1]`; a subrun without
+/// sections is planned by the jerk-limited planner.
 #[pyfunction]
 pub fn profile_of_sections<'py>(
     py: Python<'py>,

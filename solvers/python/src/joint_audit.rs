@@ -1,4 +1,4 @@
-//! The audit of joints for Python: the problem with the recorded formulas of its kinematics in, findings out.
+//! The audit of joints for Python: takes the problem with the recorded formulas of its kinematics, returns findings.
 
 use std::collections::HashMap;
 
@@ -54,7 +54,7 @@ impl WordArrays<'_> {
     }
 }
 
-/// `feedplan.constraints.problem.Problem` beside what other audits take of it.
+/// `feedplan.constraints.problem.Problem`: the fields that only this audit takes.
 #[derive(FromPyObject)]
 struct JointArrays<'py> {
     words: Vec<Bound<'py, PyAny>>,
@@ -68,7 +68,7 @@ struct AxesOfPath {
     axes: Vec<String>,
 }
 
-/// What the words of a problem mean, kept from call to call.
+/// The meaning of the axis words of a problem, kept from call to call.
 pub struct JointWords {
     words: Vec<Words>,
     words_of: Vec<usize>,
@@ -105,7 +105,7 @@ impl JointWords {
         Ok(Self { words, words_of, xyz: of(["X", "Y", "Z"]), ijk: of(["I", "J", "K"]), way_scale })
     }
 
-    /// Calls `work` with the joints, which are of `count`.
+    /// Calls `work` with the path of `count` joints.
     pub fn with<T>(
         &self,
         problem: &Bound<'_, PyAny>,

@@ -1,4 +1,4 @@
-//! Joint motion from a recorded expression and pieces of a tip path.
+//! Joint motion for Python, from a recorded expression of the kinematics and pieces of a tip path.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -53,7 +53,7 @@ impl TipArrays<'_> {
         self.tips_of(&self.control_points)
     }
 
-    /// The same pieces with other coordinates.
+    /// Pieces with the weights and widths of these ones and other control points.
     fn tips_of<'a>(&'a self, control_points: &'a Cube<'_>) -> PyResult<Tips<'a>> {
         let &[count, points, axes] = control_points.shape() else { unreachable!("three dimensions") };
         let tips = Tips {
@@ -163,7 +163,7 @@ pub fn joint_enclosures<'py>(
     (lo?, hi?).into_pyobject(py)
 }
 
-/// The least and the greatest values.
+/// The least values and the greatest values of intervals.
 fn ends(of: &[Interval]) -> [Vec<f64>; 2] {
     [of.iter().map(|x| x.lo).collect(), of.iter().map(|x| x.hi).collect()]
 }

@@ -1,10 +1,10 @@
-//! Memory that has been freed goes back to the system.
+//! Gives memory that has been freed back to the system.
 //!
-//! A fit, a plan or a table of lengths makes many small arrays on several threads, and NumPy large ones on its own. The C
-//! library of Linux keeps what they free for each thread, and the stages that follow, on other threads, would add theirs to
-//! it: 0.9 GB in a plan of a million blocks.
+//! A fit, a plan or a table of lengths allocates many small arrays on several threads, and NumPy allocates large ones on its own
+//! thread. The C library of Linux keeps freed memory for the thread that has allocated it. Later stages, on other threads, would
+//! allocate theirs in addition: 0.9 GB in a plan of a million blocks.
 
-/// Gives back the memory that has been freed, where the allocator keeps it until it is asked.
+/// Gives freed memory back to the system, with allocators that keep it until they are told to (glibc).
 #[allow(unsafe_code)]
 pub fn give_back() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]

@@ -1,4 +1,4 @@
-//! `Moves`: the moves of a program, checked once and held as the path builder and the audit take them.
+//! `Moves`: the moves of a program, checked once and stored in the form that the path builder and the audit take.
 
 use numpy::ndarray::ArrayView2;
 use pyo3::prelude::*;
@@ -15,11 +15,11 @@ macro_rules! moves {
         /// The columns of `feedplan.program.program.Program` that kernels take.
         #[pyclass(frozen, module = "feedplan._solvers")]
         pub struct Moves {
-            /// Where X, Y, Z are among the axes.
+            /// The columns of X, Y and Z among the axes.
             pub xyz: [Option<usize>; 3],
             pub splines: Option<Py<Curve>>,
             $(pub $column: Vec<$type>,)+
-            /// One row after the other.
+            /// Stored row by row.
             $(pub $table: Vec<f64>,)+
         }
 
@@ -33,7 +33,7 @@ macro_rules! moves {
         }
 
         impl Moves {
-            /// The columns of a program that was read, which are taken out of it, without its splines.
+            /// Takes the columns out of a program that has been read; its splines are not included.
             pub fn of(program: &mut Program, axes: &[String]) -> Self {
                 Self {
                     xyz: places_of_xyz(axes),
@@ -75,7 +75,7 @@ moves! {
     tables: target by Moves::axes, change_start by Moves::axes, arc_centre by (|_: &Moves| 3)
 }
 
-/// Where X, Y, Z are among these letters.
+/// The indices of X, Y and Z among these letters.
 fn places_of_xyz<A: PartialEq<str>>(axes: &[A]) -> [Option<usize>; 3] {
     ["X", "Y", "Z"].map(|letter| axes.iter().position(|axis| axis == letter))
 }
@@ -89,7 +89,7 @@ impl Moves {
         self.kind.len()
     }
 
-    /// Raises ValueError where columns differ in length, or name a move or a piece that does not exist.
+    /// Raises ValueError where columns differ in length, or contain the number of a move or a piece that does not exist.
     pub fn checked(self) -> PyResult<Self> {
         let (axes, count, arcs) = (self.axes(), self.len(), self.arc_move.len());
         let exist = |moves: &[i64]| moves.iter().all(|index| (0..count as i64).contains(index));

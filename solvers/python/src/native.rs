@@ -1,4 +1,4 @@
-//! Access to the native objects of Python's records, and their contents in 3, 6 or 9 axes.
+//! Gives access to the native objects of Python's records, and to their contents in 3, 6 or 9 axes.
 
 use std::any::Any;
 use std::ops::Deref;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
 use pyo3::{Borrowed, PyClass};
 
-/// A `feedplan.native.OfNative`.
+/// The native object of a `feedplan.native.OfNative`.
 pub struct Of<T>(Py<T>);
 
 impl<T> Of<T> {
@@ -37,7 +37,7 @@ impl<T: PyClass<Frozen = True> + Sync> Deref for Of<T> {
     }
 }
 
-/// An object in M axes, M being the number of `with_padded_axes` for `axes`.
+/// An object in M axes, where M is the number that `with_padded_axes` gives for `axes`.
 pub struct InAxes {
     pub axes: usize,
     object: Box<dyn Any + Send + Sync>,
@@ -53,7 +53,7 @@ impl InAxes {
     }
 }
 
-/// Calls a generic kernel for what an `InAxes` holds.
+/// Calls a generic kernel with the object of an `InAxes`.
 macro_rules! with_object {
     ($of:expr, $m:ident, $object:ident: $type:ty, $call:expr) => {
         super::axes::with_padded_axes!(

@@ -1,4 +1,4 @@
-//! The path of a program for Python: `build_path` makes its columns from the native moves and the rules for them.
+//! The path of a program for Python: `build_path` computes its columns from the native moves and the rules.
 
 use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -91,11 +91,11 @@ impl Rules<'_> {
     }
 }
 
-/// The arcs of a program by their moves, in the columns of its axes.
+/// The arcs of a program: the index of the move of each, and its shape in the columns of the program's axes.
 fn arcs(moves: &Moves) -> PyResult<Vec<(usize, ArcShape)>> {
     let rows = moves.arc_centre.as_chunks::<3>().0.iter().zip(&moves.arc_normal).zip(&moves.arc_angle);
     let arc = |(&index, ((centre, &normal), &sweep)): (&i64, ((&[f64; 3], &u8), &f64))| {
-        // An arc turns from the first of these to the second at a positive angle.
+        // A positive sweep turns from the first of these axes to the second.
         let letters = [(normal + 1) % 3, (normal + 2) % 3].map(usize::from);
         let [Some(first), Some(second)] = letters.map(|letter| moves.xyz[letter]) else {
             return Err(PyValueError::new_err("an arc turns in an axis that the path does not have"));
@@ -200,7 +200,7 @@ fn sentence(fault: MoveFault) -> &'static str {
 struct PieceColumns<const M: usize> {
     curve: CompositeCurve<M>,
     feed: Vec<f64>,
-    /// The first and the last move of each.
+    /// The first and the last move of each piece.
     moves: Vec<[i64; 2]>,
     tolerance: Vec<f64>,
 }
@@ -256,8 +256,8 @@ impl<const M: usize> PieceColumns<M> {
 }
 
 /// 1. The curve; feeds, first and last moves, tolerances and runs of the path.
-/// 2. Points, splines and polynomials of the fit, the deviation; of a smooth path the mean distance of bends with its sign,
-///    and the greatest distances inside and outside.
+/// 2. The numbers of chords, splines and polynomials of the fit; the deviation; for a smooth path the mean signed distance of
+///    bends and their greatest distances to the inside and to the outside.
 /// 3. Move, axis and position of the first place outside the travel.
 /// 4. Moves at whose end a smooth path turns back; first and last move (k, 2) of each place where its corners are rounded
 ///    one by one.
@@ -283,7 +283,7 @@ fn columns<'py, const M: usize>(
     (columns, summary, outside, not_smooth).into_pyobject(py)
 }
 
-/// One column, `stride` values a piece in place of `initial`, written by all chunks at once.
+/// Makes one column with `stride` values per piece, which `write` sets; chunks are written in parallel.
 fn gather<const M: usize, T: Copy + Send>(
     chunks: &[Chunk<M>],
     initial: T,

@@ -1,4 +1,4 @@
-//! The exact planner, from a problem to a profile, its lower bound, and look-ahead over segments.
+//! The exact planner, its lower bound, and look-ahead over segments, for Python.
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -27,7 +27,8 @@ pub fn plan_bang_bang<'py>(
     })
 }
 
-/// A lower bound in s on the time of every profile of the problem; of `profile` only its division counts.
+/// A lower bound in s on the time of every profile of the problem; of `profile` only the division of the path into phases, with
+/// their axes and durations, is used, as a hint.
 #[pyfunction]
 #[pyo3(signature = (problem, profile, progress=None))]
 pub fn lower_bound(
@@ -42,7 +43,8 @@ pub fn lower_bound(
     })
 }
 
-/// The greatest speed on each part of a piece at which the feed holds everywhere on the part (n,).
+/// The greatest speeds along the path of the axes, one per part of a piece (n,), at which the feed is kept everywhere on the
+/// part.
 #[pyfunction]
 pub fn feed_between<'py>(
     py: Python<'py>,
@@ -66,8 +68,8 @@ pub fn feed_between<'py>(
     })
 }
 
-/// The greatest speeds at the ends of segments that the segments can reach; `up` and `down` (n, 3) are the gain and the
-/// two holds of speeding up and of slowing down.
+/// The greatest speeds at the ends of n segments, at most `speed` (n + 1,), that the segments allow. `up` and `down` (n, 3) are
+/// the gain and the two holds of `Change` for speeding up and for slowing down.
 #[pyfunction]
 pub fn look_ahead<'py>(
     py: Python<'py>,

@@ -65,7 +65,7 @@ pub struct Problem {
     rows: InAxes,
 }
 
-/// The path and its limits in M axes, those beyond its own at rest.
+/// The path and its limits in M axes; those beyond its own are at rest.
 pub struct Rows<const M: usize> {
     pub path: Arc<PathData<M>>,
     tip: Option<Arc<CompositeCurve<TIP_AXES>>>,
@@ -79,7 +79,7 @@ pub struct Rows<const M: usize> {
     end_speed: f64,
 }
 
-/// Limits of the axes as sizes; 1 for axes at rest.
+/// Limits of the axes for positive and for negative values, both as absolute values; 1 for axes at rest.
 fn both<const M: usize>(most: &Column, least: &Column) -> PyResult<Both<M>> {
     Ok([row(most, 1.0)?, row::<M>(least, -1.0)?.map(|value| -value)])
 }
@@ -169,12 +169,12 @@ impl Problem {
         self.rows.axes
     }
 
-    /// Its rows in M axes, M being the number of `with_padded_axes`.
+    /// The rows in M axes, where M is the number that `with_padded_axes` gives.
     pub fn rows<const M: usize>(&self) -> PyResult<&Rows<M>> {
         self.rows.get()
     }
 
-    /// What `kernel` finds for the problem in M axes.
+    /// The result of `kernel` for the problem in M axes; its fault is raised as PlanError.
     pub fn solved<const M: usize, T: Send>(
         &self,
         py: Python<'_>,

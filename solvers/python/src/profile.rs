@@ -19,7 +19,7 @@ macro_rules! profile {
         /// The columns of `feedplan.profile.SpeedProfile`.
         #[pyclass(frozen, module = "feedplan._solvers")]
         pub struct Profile {
-            /// Shared with all that read them.
+            /// Shared with all readers.
             pub phases: Arc<Phases>,
             $(pub $other: Vec<$of>,)+
         }
@@ -32,7 +32,7 @@ macro_rules! profile {
 
         #[pymethods]
         impl Profile {
-            /// From the arrays of a `SpeedProfile`. Raises InputError where those of its phases differ in length.
+            /// From the arrays of a `SpeedProfile`. Raises InputError if the columns of its phases differ in length.
             #[new]
             fn new(columns: Columns<'_>) -> PyResult<Self> {
                 let phases = Phases { $($column: columns.$column.as_slice()?.to_vec(),)+ };

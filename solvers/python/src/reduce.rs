@@ -1,4 +1,4 @@
-//! Few points for charts, for Python.
+//! Reduces data to few points for charts, for Python.
 
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -7,8 +7,8 @@ use pyo3::types::PyTuple;
 use super::arrays::{require, Column, Table};
 use feedplan_setpoints::reduce;
 
-/// Of each column of `values` (n, k) and each bucket of `width` rows, n being a multiple of it: (k, n/width, 2) the rows of the
-/// least and the greatest value, and (k, n/width) the sum of the values times their `weight` (n,).
+/// For each column of `values` (n, k) and each bucket of `width` rows, where n is a multiple of `width`: (k, n/width, 2) the rows
+/// of the least and of the greatest value, in order, and (k, n/width) the sum of the values times their `weight` (n,).
 #[pyfunction]
 pub fn buckets<'py>(
     py: Python<'py>,
@@ -26,7 +26,8 @@ pub fn buckets<'py>(
     (extremes, PyArray1::from_vec(py, sums).reshape(shape)?).into_pyobject(py)
 }
 
-/// The rows of the `points` (n, 4) of a line that stay, and their part of the tolerance; see the kernel.
+/// Leaves out `points` (n, 4) of a line that are within `tolerance` of the segment between their neighbours. `cost` (n,) is the
+/// part of the tolerance that is used between each point and the next. Returns the rows of the points that stay, and their costs.
 #[pyfunction]
 pub fn thin<'py>(
     py: Python<'py>,

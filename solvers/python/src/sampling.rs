@@ -19,7 +19,7 @@ use feedplan_setpoints::{Sampled, States};
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
-/// t, position, velocity, acceleration, jerk, line, piece, u, worst rounds, worst length error.
+/// t, position, velocity, acceleration, jerk, line, piece, u, the greatest number of iterations, the greatest length error.
 fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> PyResult<Bound<'_, PyTuple>> {
     let [position, velocity, acceleration, jerk] =
         [chunk.position, chunk.velocity, chunk.acceleration, chunk.jerk]
@@ -30,7 +30,7 @@ fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> PyRes
     (t, position, velocity, acceleration, jerk, line, piece, u, rounds, error).into_pyobject(py)
 }
 
-/// A profile on its path, ready to be read at any setpoint.
+/// A profile on its path, prepared for computing setpoints.
 #[pyclass(name = "Sampler", module = "feedplan._solvers", frozen)]
 pub struct PySampler {
     /// `Sampler`.
@@ -39,7 +39,7 @@ pub struct PySampler {
 }
 
 impl PySampler {
-    /// Calls `work` with the sampler, free of Python's lock.
+    /// Calls `work` with the sampler, without Python's lock.
     fn states<'py, const M: usize>(
         &self,
         py: Python<'py>,
@@ -87,13 +87,14 @@ impl PySampler {
         with_object!(self.sampler, M, sampler: Sampler<M>, sampler.duration())
     }
 
-    /// (runs, 3) when each starts on the plan's own clock, when on that of the setpoints, and its time in motion.
+    /// (runs, 3): the start of each run in the plan's own time, its start in the time of the setpoints, and its time in motion
+    /// [s].
     #[getter]
     fn runs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         with_object!(self.sampler, M, sampler: Sampler<M>, to_array2(py, sampler.runs().collect(), 3))
     }
 
-    /// The setpoints from `start` up to `stop`.
+    /// The setpoints from `start` to `stop` − 1.
     fn chunk<'py>(
         &self,
         py: Python<'py>,
@@ -106,7 +107,7 @@ impl PySampler {
             return Err(PyIndexError::new_err(format!("setpoints {start} to {stop} of {count}")));
         }
         let interpolator = if newton { Interpolator::Newton } else { Interpolator::Sarfraz };
-        // Locked with Python's lock alone: a child that is forked meanwhile does not find it locked.
+        // Locked only by a thread that holds Python's lock, so that a child process forked meanwhile does not find it locked.
         let state = || self.resume.lock().unwrap_or_else(PoisonError::into_inner);
         let mut next = *state();
         let chunk = with_padded_axes!(self.sampler.axes, M, {
@@ -118,7 +119,7 @@ impl PySampler {
         Ok(chunk)
     }
 
-    /// The states at times of the plan's own clock.
+    /// The states at `times` [s] of the plan's own clock.
     fn at<'py>(&self, py: Python<'py>, times: Column<'_>) -> PyResult<Bound<'py, PyTuple>> {
         let times = times.as_slice()?;
         with_padded_axes!(

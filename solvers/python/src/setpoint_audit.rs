@@ -1,4 +1,4 @@
-//! The audit of setpoints, chunk by chunk: of axes of the path or of joints, with a plan or alone.
+//! The audit of setpoints for Python, chunk by chunk: setpoints of the path's axes or of joints, with a plan or without.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,7 +18,7 @@ use feedplan_audit::setpoints::{Chunk, Stream};
 use feedplan_audit::tracking::Plan;
 use feedplan_geometry::watch::Watch;
 
-/// A stream whatever its number of axes.
+/// A stream with any number of axes.
 trait AnyStream: Send + Sync {
     fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch);
     fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings;
@@ -29,7 +29,7 @@ where
     Stream<M>: SetpointKernels<M>,
 {
     fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch) {
-        // Places are found, then judged.
+        // Each setpoint counts twice: its place is found, then checked.
         let each = watch.each(2 * chunk.t.len());
         self.take(plan, chunk, &|count| each.advance(count));
     }
@@ -40,23 +40,23 @@ where
     }
 }
 
-/// What a stream of setpoints is compared with, kept as Python holds it.
+/// The plan with which a stream of setpoints is compared, as Python objects.
 struct Compared {
     problem: Py<PyAny>,
     feed: Py<PyAny>,
     profile: Option<Py<Profile>>,
     program: Option<Py<Moves>>,
-    /// The greatest share of its tolerance that the path has been found off the program.
+    /// The greatest deviation of the path from the program that the audit of the plan has found, as a share of the tolerance.
     deviation: f64,
-    /// When every phase of the profile begins.
+    /// The time at which each phase of the profile begins [s].
     starts: Vec<f64>,
-    /// Where the setpoints are those of joints that are not the path's axes.
+    /// The meaning of the axis words, if the setpoints are those of joints that are not the path's axes.
     joints: Option<JointWords>,
     axes: usize,
 }
 
 impl Compared {
-    /// Calls `work` with the plan, free of Python's lock.
+    /// Calls `work` with the plan, without Python's lock.
     fn with_plan<T: Send>(
         &self,
         py: Python<'_>,
@@ -81,7 +81,7 @@ impl Compared {
     }
 }
 
-/// Audits setpoints chunk by chunk; with a problem also their places on its path.
+/// Audits setpoints chunk by chunk; with a problem, it also checks their places on its path.
 #[pyclass]
 pub struct SetpointAudit {
     axes: usize,
@@ -118,7 +118,7 @@ impl SetpointAudit {
         Ok(Self { axes, stream: Some(stream), compared })
     }
 
-    /// The next setpoints.
+    /// Audits the next setpoints.
     #[pyo3(signature = (t, position, velocity=None, acceleration=None, line=None, progress=None))]
     #[allow(clippy::too_many_arguments)]
     fn push(
@@ -144,7 +144,7 @@ impl SetpointAudit {
             && [chunk.velocity, chunk.acceleration].iter().flatten().all(|flat| flat.len() == rows)
             && chunk.line.is_none_or(|line| line.len() == chunk.t.len());
         require(good, "the arrays of the setpoints differ in length")?;
-        // An audit that is interrupted is finished.
+        // If the audit is interrupted, the stream is not stored again: the audit is finished.
         let mut stream = self.stream.take().ok_or_else(finished)?;
         let (pushed, progress) = (&mut stream, progress.as_ref());
         match &self.compared {
@@ -157,7 +157,7 @@ impl SetpointAudit {
         Ok(())
     }
 
-    /// What was found; nothing can be pushed afterwards.
+    /// The findings; no setpoints can be pushed afterwards.
     fn finish(&mut self, py: Python<'_>) -> PyResult<Findings> {
         let stream = self.stream.take().ok_or_else(finished)?;
         match &self.compared {
@@ -167,7 +167,8 @@ impl SetpointAudit {
     }
 }
 
-/// A plan to compare with and its number of axes, if the path has pieces; the profile only where its numbers can be used.
+/// The plan with which setpoints are compared, and its number of axes; None if the path has no pieces. A profile that does not
+/// fit the path is left out.
 fn compare(
     axes: usize,
     problem: Bound<'_, PyAny>,

@@ -1,7 +1,7 @@
-//! Native work for Python: it runs on threads of its own, while the calling thread serves signals and progress.
+//! Runs native work for Python on threads of its own, while the calling thread handles signals and reports progress.
 //!
-//! Threads do not survive a fork, so a child process makes its own pools. Each call has a pool of its own, so that no call
-//! waits for another one; later calls use the pool again.
+//! Threads do not survive a fork, so a child process makes its own pools. Each call has a pool for itself, so that no call waits
+//! for another one; later calls use the pool again.
 
 use std::panic::{catch_unwind, resume_unwind, AssertUnwindSafe};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -18,8 +18,8 @@ const PERIOD: Duration = Duration::from_millis(50);
 /// The greatest number of idle pools that are kept.
 const MOST_IDLE: usize = 4;
 
-/// The idle pools. Only a thread with Python's lock locks it, and only such a thread forks the process: a child never
-/// finds it locked.
+/// The idle pools. This mutex is locked only by threads that hold Python's lock, and only such a thread forks the process, so a
+/// child process never finds it locked.
 static POOLS: Mutex<Pools> = Mutex::new(Pools { process: 0, idle: vec![] });
 
 struct Pools {
@@ -36,7 +36,7 @@ fn take(_: Python<'_>) -> PyResult<ThreadPool> {
     let mut pools = lock(&POOLS);
     let process = std::process::id();
     if pools.process != process {
-        // Pools of the parent have no threads here. To drop them would be to wait for these threads.
+        // Pools of the parent process have no threads here. Dropping them would wait for these threads, so they are leaked.
         std::mem::forget(std::mem::take(&mut pools.idle));
         pools.process = process;
     }
@@ -53,8 +53,8 @@ fn give_back(_: Python<'_>, pool: ThreadPool) {
     }
 }
 
-/// Does `work` without Python's lock. Meanwhile signals are handled, and `progress` is called with the part done. An error
-/// of a handler or of `progress` ends the work and is raised.
+/// Does `work` without Python's lock. Meanwhile it handles signals and calls `progress` with the part of the work done, 0 to 1.
+/// An error of a signal handler or of `progress` ends the work and is raised.
 pub fn run<T: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -66,7 +66,7 @@ pub fn run<T: Send>(
     Ok(value.expect("the work is done"))
 }
 
-/// `run` for work without a type, compiled once.
+/// The part of `run` that does not depend on the type of the work, so that it is compiled only once.
 fn run_once(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -96,7 +96,7 @@ fn run_once(
     }
 }
 
-/// Reports progress until the end of the work; returns an error that was raised meanwhile and cancelled it.
+/// Reports progress until the end of the work. Returns the error that has been raised meanwhile, if any; it cancels the work.
 fn serve(
     work: &Work,
     progress: Option<&Py<PyAny>>,

@@ -14,7 +14,7 @@ const OPTIONS: FitOptions = FitOptions {
     max_curvature: f64::INFINITY,
     corner_angle: std::f64::consts::FRAC_PI_6,
 };
-/// The number of chords that a piece is sampled by.
+/// The number of chords into which a piece is divided for sampling.
 const SAMPLES: usize = 64;
 
 fn to_segment<const M: usize>(p: &[f64; M], a: &[f64; M], b: &[f64; M]) -> f64 {
@@ -83,7 +83,7 @@ fn check<const M: usize>(points: &[[f64; M]], pieces: &[FittedPiece<M>], options
             .collect();
         for k in 0..=8 {
             let off = to_polyline(&lerp(&chord[0], &chord[1], k as f64 / 8.0), &curve);
-            // Chords between samples are inside of the curve by this.
+            // The greatest distance of the chords between samples from the curve.
             let bow = near.iter().fold(0.0_f64, |bow, piece| {
                 let [a, b, c] = &piece.piece.control;
                 let bend: [f64; M] = std::array::from_fn(|k| a[k] - 2.0 * b[k] + c[k]);
@@ -186,8 +186,8 @@ fn a_corner_between_curves_jumps_once() {
     let pieces = fitted(&points, &FitOptions { max_curvature: 0.9, ..OPTIONS });
     assert!(pieces.iter().any(|piece| piece.piece.control[2] == points[60]));
     let joints_there = joints(&pieces);
-    // The curves arrive along (1, 0.192) and leave along (0.2, 1), a cosine of 0.377, give or take what the
-    // tolerance leaves a free end.
+    // The curves arrive along (1, 0.192) and leave along (0.2, 1), a cosine of 0.377. Within the tolerance, the direction of a
+    // free end may differ from these.
     assert!(joints_there.len() == 1 && (joints_there[0] - 0.377).abs() < 0.06, "{joints_there:?}");
     assert_eq!(pieces.len(), 12);
     // Without a threshold, the corner is rounded as far as the tolerance allows.
@@ -346,7 +346,7 @@ fn chains_made_to_hurt_hold_the_tolerance() {
 }
 
 fn chain() -> impl Strategy<Value = Vec<[f64; 3]>> {
-    // Turns that are mostly small and steps that mostly resemble each other, as in real programs, and others.
+    // Mostly small turns and mostly similar steps, as in real programs, and some others.
     let turn = prop_oneof![6 => -0.05..0.05, 2 => -0.5..0.5, 1 => -3.1..3.1_f64];
     let step = prop_oneof![6 => 0.2..0.4, 2 => 0.01..2.0, 1 => 1e-6..20.0_f64];
     (proptest::collection::vec((turn, step, -0.02..0.02_f64), 1..120)).prop_map(|steps| {

@@ -86,7 +86,7 @@ fn check_splines(columns: &Columns) -> Result<(), TestCaseError> {
         let end = columns.spline_offsets[columns.spline_pieces[i + 1] as usize];
         let last = &columns.spline_control[(end - 1) * width..end * width];
         let target = &columns.target[row as usize * width..(row as usize + 1) * width];
-        // A spline is never programmed by tool directions.
+        // Splines are not read where tool directions are programmed.
         let linear = columns.axes.iter().filter(|letter| !b"IJK".contains(letter)).count();
         prop_assert_eq!(&last[..linear], &target[..linear]);
     }
@@ -125,11 +125,11 @@ fn lines(source: &[u8]) -> usize {
     1 + source.iter().filter(|byte| matches!(byte, b'\n' | b'\r')).count()
 }
 
-/// Words that fit together often enough for the reader to pass the first line.
+/// Words that often enough fit together, so that the reader gets beyond the first line.
 fn word() -> impl Strategy<Value = String> {
     let codes = "G0|G1|G2|G3|G4|G5|G5\\.1|G5\\.2|G5\\.3|G6\\.2|G43\\.4|G43\\.5|G10|G17|G18|G19|G20|G21|G28|G30|G40|G43|G43\\.1|G49|G52|G53|G54|G59\\.3|G61|G64|G73|G80|\
                  G81|G82|G83|G85|G89|G90|G91|G90\\.1|G91\\.1|G92|G92\\.1|G92\\.2|G92\\.3|G93|G94|G95|G98|G99|M0|M3|M5|M6|M30|L2|L20";
-    // Expressions are parsed here once, and not for each word.
+    // Regular expressions are parsed here once, not for each word.
     let text = |expression: &str| string_regex(expression).expect("an expression");
     prop_oneof![
         4 => text("[XYZIJKRPQFSLABCUVWHDTN]-?[0-9]{1,3}(\\.[0-9]{0,3})?"),
@@ -210,7 +210,7 @@ const FLOW: [&str; 40] = [
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
-    /// Lines of program flow and of compensated paths in any order; few of them make a program.
+    /// Lines of program flow and of compensated paths in any order; few of them are a valid program.
     #[test]
     fn any_blocks_of_flow(blocks in proptest::collection::vec(0..FLOW.len(), 1..40)) {
         let mut source = String::from("G21 G90 F100 S100 M3 G0 X1 Y2 Z5\n");

@@ -90,7 +90,7 @@ fn excess<G: Geometry<M>, const M: usize>(
 }
 
 fn assert_held<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, profile: &Profile) {
-    // None of 17 points in an interval is one of the twelve that the planner checks.
+    // With 17 points per interval, none coincides with one of the twelve points that the planner checks.
     let excess = excess(problem, profile, 17);
     assert!(excess.iter().all(|&part| part < HELD), "excess {excess:?}");
 }
@@ -186,7 +186,7 @@ fn infinity() -> ByLength<Lemniscate, 2> {
     ByLength::new(Lemniscate(50.0), &parameters, 20)
 }
 
-/// Plans from rest to rest, asserts the time and the limits, and gives the certified gap.
+/// Plans from rest to rest, asserts the time and the limits, and returns the certified gap.
 fn assert_curve<G: Geometry<M>, const M: usize>(geometry: &G, most: f64) -> f64 {
     let problem = problem(geometry, FAST);
     let plan = planned(&problem);
@@ -240,7 +240,7 @@ fn random_case(seed: u64) -> (Bends, [f64; 3]) {
 #[test]
 fn random_paths_hold_all_limits() {
     let mut stopped = 0;
-    // In the last three the direction turns unevenly between collocation points.
+    // In the cases of the last three seeds, the direction turns unevenly between collocation points.
     for seed in seeds(24).chain([663, 945, 1440]) {
         let (path, limits) = random_case(seed);
         let problem = problem(&path, limits);
@@ -334,8 +334,9 @@ fn windows_lose_less_than_a_millionth() {
 
 #[test]
 fn windows_agree_where_the_optimum_lies_on_limits_all_along() {
-    // Windows with ends at the optimum of others found no way there: 0.7 % were lost at one cut. Rounds with tightened
-    // limits begin where the last one ended: without its multipliers a round took some ten iterations more.
+    // With window ends fixed at the optimum of their neighbours, the windows did not reach the optimum here: 0.7 % of the time
+    // was lost at one cut. Rounds with tightened limits start from the last solution; without its multipliers a round took some
+    // ten iterations more.
     let path = Wave::new(200);
     let problem = problem(&path, FAST);
     let whole = plan(&problem, &Effort { window: usize::MAX, ..Effort::default() }).expect("a plan");
@@ -359,7 +360,7 @@ fn a_feed_is_reached_and_kept() {
 
 #[test]
 fn speeds_at_single_places_are_kept() {
-    // From rest to 10 mm/s in the middle of each cap: nearly twice the time from rest over such a cap to rest.
+    // The plan passes both caps. Three plans from rest to rest over 20 mm each would take longer.
     let path = Line::new(60.0);
     let caps = [SpeedCap::new(20.0, 10.0), SpeedCap::new(40.0, 0.1)];
     let problem = Problem { caps: &caps, ..problem(&path, FAST) };
@@ -405,7 +406,7 @@ impl Geometry<1> for TwoFeeds {
 
 #[test]
 fn the_bound_beside_a_held_feed_is_for_every_motion_there() {
-    // Who comes slower, but already speeds up, is at 100 mm/s sooner than who holds 20 mm/s up to 0.1 mm.
+    // A motion that arrives more slowly but already speeds up reaches 100 mm/s sooner than one that holds 20 mm/s up to 0.1 mm.
     let path = TwoFeeds { knots: [0.0, 0.1, 10.0], feeds: [20.0, 100.0] };
     let with =
         |start| planned(&Problem { ends: [start, End::Held { speed: 100.0 }], ..problem(&path, FAST) });

@@ -1,4 +1,4 @@
-//! Recorded formulas, evaluated by the Taylor series and intervals of the planner and by the jets of the audit.
+//! Recorded formulas: the Taylor series and the intervals of the planner agree with the jets of the audit.
 
 use feedplan_audit::joints::formula::{Argument, Formula, Jet, JET};
 use feedplan_audit::EPS;
@@ -57,10 +57,10 @@ proptest! {
         for k in 0..4 {
             let (value, error) = (jet.value[k], EPS * jet.error[k]);
             let bound = theirs.output(&bounds, 0)[k];
-            // The factors are rounded as well.
+            // The products with the factorials are rounded as well.
             let slack = 4.0 * EPS * bound.magnitude() * factorial[k];
             let near = Interval { lo: bound.lo * factorial[k] - slack, hi: bound.hi * factorial[k] + slack };
-            // Angles may be on another turn.
+            // Values (k = 0) are not compared: angles may differ by full turns.
             if near.is_bounded() && value.is_finite() && error.is_finite() && k > 0 {
                 let series = theirs.output(&table, 0)[k] * factorial[k];
                 prop_assert!(near.lo <= series && series <= near.hi);
@@ -91,7 +91,7 @@ proptest! {
             alone[..numbers.len()].copy_from_slice(numbers);
             f64::evaluate::<4, 4>(&ours, &mut alone);
             for (row, number) in at_once.iter().zip(&alone) {
-                // Numbers that are none have any sign.
+                // NaN may have either sign.
                 prop_assert!(row[lane].to_bits() == number.to_bits() || row[lane].is_nan() && number.is_nan());
             }
         }
@@ -102,8 +102,8 @@ proptest! {
 fn what_is_no_list_in_order_is_none() {
     for (rows, outputs) in [
         (vec![[2, 0, 2]], vec![2]),  // an operand that comes later
-        (vec![[2, -1, 0]], vec![2]), // and one that is none
-        (vec![[99, 0, 0]], vec![2]), // a code that is none
+        (vec![[2, -1, 0]], vec![2]), // an operand with a negative index
+        (vec![[99, 0, 0]], vec![2]), // an unknown code
         (vec![[11, 0, 0]], vec![2]), // a cosine without its sine
         (vec![[1, 0, 0]], vec![3]),  // an output beyond the list
     ] {

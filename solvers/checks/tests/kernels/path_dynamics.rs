@@ -48,7 +48,7 @@ fn part(control: &[[f64; 2]], weight: &[f64], a: f64, b: f64) -> (Control, Vec<f
         .unzip()
 }
 
-/// Lengths from 0 to equal steps of u (Simpson's rule on halves of tenths of them).
+/// Lengths from u = 0 to the end of each of `count` equal steps of u, by Simpson's rule on ten intervals per step.
 fn lengths(control: &[[f64; 2]], weight: &[f64], count: usize) -> Vec<f64> {
     let speed = |u: f64| evaluate(control, weight, u).1;
     let mut all = vec![0.0];
@@ -65,7 +65,7 @@ fn lengths(control: &[[f64; 2]], weight: &[f64], count: usize) -> Vec<f64> {
     all
 }
 
-/// The parameter at a length, from a table and Newton's method on the rest.
+/// The parameter at a length, from a table and Newton's method.
 fn locate(control: &[[f64; 2]], weight: &[f64], table: &[f64], length: f64) -> f64 {
     let count = table.len() - 1;
     let i = table.partition_point(|&at| at <= length).clamp(1, count) - 1;
@@ -85,7 +85,7 @@ fn locate(control: &[[f64; 2]], weight: &[f64], table: &[f64], length: f64) -> f
     u
 }
 
-/// Positions along the path at the servo period.
+/// Positions along the path [mm], one per servo period.
 fn positions(sections: &[Section]) -> Vec<f64> {
     let last = sections.last().expect("a motion");
     let count = ((last.time + last.duration) / PERIOD) as usize;
@@ -164,7 +164,7 @@ fn axes_keep_their_limits_along_random_curves() {
         let (control, weight) = random_curve(&mut Random(seed));
         let (uses, _) = uses(&control, &weight, |curve| bounded(curve, 0.05));
         for order in 0..3 {
-            // Positions are off by 1e-11 mm, third differences by a thousandth of the jerk.
+            // Positions have errors of 1e-11 mm, and third differences errors of a thousandth of the jerk limit.
             assert!(uses[order] < 1.0 + 2e-3, "seed {seed}: {uses:?}");
             most[order] = most[order].max(uses[order]);
         }

@@ -1,4 +1,4 @@
-//! Planners and bound on random paths.
+//! Tests of the planners and of the lower bound on random paths.
 
 mod bound;
 mod curves;

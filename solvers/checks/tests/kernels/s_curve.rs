@@ -1,4 +1,4 @@
-//! The two-pass jerk-limited profiler: profiles by hand, random sequences of segments, numbers of any size.
+//! The two-pass jerk-limited profiler: profiles computed by hand, random sequences of segments, numbers of any magnitude.
 
 use feedplan_checks::{assert_none, seeds, Random};
 use feedplan_geometry::watch::Watch;
@@ -53,7 +53,7 @@ fn stream(segments: &[Segment], look_ahead: usize) -> Vec<Vec<Section>> {
     all
 }
 
-/// Checks every requirement on a profile; `close` is the relative size of rounding. The first broken one is a sentence.
+/// Checks every requirement on a profile; `close` is the relative size of rounding. Returns the first violation as a sentence.
 fn check(segments: &[Segment], stream: &[Vec<Section>], close: f64) -> Result<(), String> {
     let (mut time, mut position, mut speed, mut before) = (0.0, 0.0, 0.0, 0.0_f64);
     if stream.len() != segments.len() {
@@ -138,7 +138,7 @@ fn random_segments(random: &mut Random) -> Vec<Segment> {
     let kind = random.below(4);
     let one = |random: &mut Random| {
         let (length, limits, allowable) = if kind == 0 {
-            // Any size.
+            // Limits and lengths of any magnitude.
             let limits =
                 Limits { acceleration: random.exponential(-3.0, 12.0), jerk: random.exponential(-3.0, 16.0) };
             (random.exponential(-10.0, 8.0), limits, random.exponential(-4.0, 8.0))

@@ -10,7 +10,7 @@ use feedplan_setpoints::phase_motion::{Counts, PhaseMotion, PiecePath, State};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
 
-/// A curve of one piece with its degree elevated: closed forms and general ones give the same motion.
+/// A curve of one piece with its degree elevated, for which the general formulas must give the same motion as the closed forms.
 fn raised<const M: usize>(piece: &Quadratic<M>, by: usize) -> CompositeCurve<M> {
     let mut curve = CompositeCurve::default();
     elevate(&Piece { control: &piece.control, weights: &[], width: piece.width }, by, &mut curve);
@@ -97,7 +97,7 @@ fn any_part_of_the_stream_has_the_same_digits() {
         let sampler = sampler(1e-5);
         let whole = sampler.chunk(0..sampler.count(), interpolator, &mut None, Watch::default());
         assert!(whole.t.len() > 20_000);
-        // Forward, with gaps, and back; with the state of the part before and without it.
+        // Forward, with gaps, and backward; with the state of the part before and without it.
         let mut state = None;
         for range in [0..1, 1..2, 4095..4097, 4097..4200, 12_345..20_001, 9_999..10_002] {
             for resume in [&mut None, &mut state] {
@@ -266,7 +266,7 @@ fn length(piece: &Quadratic<2>, a: f64, b: f64) -> f64 {
     simpson(|u| norm(&[0, 1].map(|k| from[k] + (to[k] - from[k]) * u / piece.width)), a, b)
 }
 
-/// The phase is as smooth as differences over a thousandth of it need.
+/// Whether the phase is smooth enough for differences over a thousandth of it.
 fn tame(piece: &Quadratic<2>, phase: &Phase) -> bool {
     let (from, to) = piece.end_tangents();
     let change = norm(&sub(&to, &from)) * (phase.u1 - phase.u0) / piece.width;
@@ -291,7 +291,7 @@ proptest! {
         prop_assert!(state.iterations <= 30 && state.error < 1e-12);
         if tame(&piece, &phase) {
             let again = motion.at(state.u).pace.t;
-            // A step of 1e-13 of the way costs √1e-13 of the time next to a standstill.
+            // Next to a standstill, a rounding error of 1e-13 in the position is an error of √1e-13 in the time.
             let slack = if (1e-3..=1.0 - 1e-3).contains(&at) { 1e-9 } else { 1e-6 };
             prop_assert!((again - t).abs() <= slack * phase.duration, "{again} {t}");
         }

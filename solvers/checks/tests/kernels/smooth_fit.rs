@@ -1,5 +1,5 @@
-//! The smooth fit: shapes known by hand, its certificate against dense samples, joints, random polylines in 2 to 6
-//! axes, and what it is for: times of jerk-limited plans.
+//! The smooth fit: shapes known by hand, its certificate against dense samples, joints, random polylines in 2 to 6 axes, and its
+//! purpose: the times of jerk-limited plans.
 
 use feedplan_checks::by_length::{ByLength, Curve};
 use feedplan_checks::campaign::seeds;
@@ -57,11 +57,11 @@ fn check<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>, name: &str) {
     }
     let found = dense(line, smooth);
     let proven = smooth.covered.iter().map(|covered| covered.deviation).fold(0.0, f64::max);
-    // Chords between samples of the curve cut its bends.
+    // The chords between samples of the curve are inside its bends.
     assert!(found <= proven + 2e-3 * tolerance, "{name}: {found} found, {proven} proven");
 }
 
-/// The greatest jump of each derivative at joints without a stop, relative to its size there.
+/// The greatest jump of each derivative at joints without a stop, relative to the change by an error of 1 mm in a control point.
 fn jumps<const D: usize>(smooth: &Smooth<D>) -> [f64; 5] {
     let mut worst = [0.0f64; 5];
     for i in 1..smooth.curve.len() {
@@ -71,7 +71,7 @@ fn jumps<const D: usize>(smooth: &Smooth<D>) -> [f64; 5] {
         }
         let (end, start) = (derivatives(&before, 1.0), derivatives(&after, 0.0));
         for order in 1..5 {
-            // The change of the derivative by a relative error of 1 in a control point.
+            // The change of the derivative, up to a constant factor, by an error of 1 mm in a control point.
             let unit = before.width.min(after.width).powi(-(order as i32));
             worst[order] = worst[order].max(distance(&end[order], &start[order]) / unit);
         }
@@ -84,7 +84,7 @@ fn a_line_is_reproduced_exactly() {
     let two = fit(&polyline(vec![[1.0, 2.0, 3.0], [4.0, 6.0, 3.0]], 0.01));
     assert_eq!((two.curve.len(), two.curve.width[0]), (1, 5.0));
     assert_eq!(two.curve.control, [[1.0, 2.0, 3.0], [4.0, 6.0, 3.0]]);
-    // Points on a line make one line, which is cut beside a point if that is asked for.
+    // Points on a line make one line, which is cut next to a point if a cut is requested there.
     let many = polyline((0..=30).map(|i| [0.1 * i as f64, 0.2 * i as f64]).collect(), 0.01);
     assert_eq!(fit(&many).curve.len(), 1);
     let mut cut = vec![false; 31];
@@ -111,10 +111,10 @@ fn a_right_corner_is_symmetric_about_its_bisector() {
         let away = near.fold(f64::INFINITY, f64::min);
         assert!(away < 0.005, "{p:?} {away}");
     }
-    // Its distance from the corner is at most the tolerance, and nearly that.
+    // The distance of the curve from the corner is at most the tolerance, and close to it.
     let corner = points.iter().map(|p| distance(p, &[10.0, 0.0])).fold(f64::INFINITY, f64::min);
     assert!(corner > 0.08 && corner < 0.1, "{corner}");
-    // The corner is cut inside, and is no bend.
+    // The corner is cut on the inside; it does not count as a bend.
     let offsets = &smooth.offsets;
     assert!(offsets.inside > 0.09 && offsets.inside <= 0.1 && offsets.outside <= 0.1, "{offsets:?}");
     assert_eq!(offsets.mean(), 0.0);
@@ -144,8 +144,8 @@ fn the_sides_of_a_square_are_straight_in_the_middle() {
     }
 }
 
-/// The mean over the vertices of a circle, and the least and the greatest, of what the radius is there, from 30° on
-/// after its start to 30° before its end.
+/// The mean, the least and the greatest radius of the curve next to the vertices of a circle, from 30° after its start to 30°
+/// before its end.
 fn radii(line: &Polyline<2>, smooth: &Smooth<2>) -> [f64; 3] {
     let places: Vec<[f64; 2]> = smooth
         .curve
@@ -165,7 +165,7 @@ fn radii(line: &Polyline<2>, smooth: &Smooth<2>) -> [f64; 3] {
 
 #[test]
 fn a_circle_keeps_its_radius() {
-    // Radius 2, a vertex each 3 degrees, tolerance 0.1: without holds it is cut at 1.905.
+    // Radius 2, a vertex every 3 degrees, tolerance 0.1: with `sized` false, the circle is cut to a radius of 1.905.
     let points: Vec<[f64; 2]> =
         (0..=120).map(|i| (3.0 * i as f64).to_radians().sin_cos()).map(|(y, x)| [2.0 * x, 2.0 * y]).collect();
     let mut line = polyline(points, 0.1);
@@ -227,7 +227,7 @@ fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
     assert!(!smooth.corners.is_empty() && smooth.covered.iter().any(|covered| covered.stop));
 }
 
-/// Random polylines in D axes among P, the others of which rest.
+/// Fits random polylines in D of P axes, the others of which rest; returns the number of those with corners rounded one by one.
 fn random_polylines<const D: usize, const P: usize>(seed: u64, count: usize) -> usize
 where
     Polyline<P>: SmoothFit<P>,
@@ -259,7 +259,7 @@ fn random_polylines_are_followed_within_their_tolerance() {
         random_polylines::<6, 6>(5, count / 4),
     ];
     println!("left to their corners in places, of {count}: {rough:?}");
-    // Few runs fall back to single corners.
+    // Few polylines have corners rounded one by one.
     assert!(rough.iter().sum::<usize>() * 5 < count, "{rough:?}");
 }
 
@@ -326,7 +326,8 @@ fn jerk_limited_plans_lose_little_in_corners() {
         let time = jerk_limited_time(&line);
         println!("{name} at {tolerance} mm: {time:.4} s, with bends of their size {sized:.4} s");
         assert!(time < most, "{name} at {tolerance} mm: {time} s");
-        // A trochoid of radius 3 that is cut by 0.1 is shorter by 3 %, and turns in less time by half of that.
+        // A curve that cuts the trochoid of radius 3 by 0.1 is 3 % shorter and takes 1.5 % less time, so with bends of their own
+        // size the time may be greater by that.
         assert!(sized < 1.016 * most, "{name} at {tolerance} mm: {sized} s");
     }
 }

@@ -1,5 +1,4 @@
-//! The moves of a whole program as columns, as `feedplan.program.program.Program` has them, from the `Moves` that the
-//! interpreter has collected.
+//! Converts the `Moves` that the interpreter has collected to the columns of `feedplan.program.program.Program`.
 
 use super::{Moves, Stop};
 use crate::block::AXES;
@@ -9,7 +8,8 @@ use crate::events::Events;
 /// The letters of the columns of a tool direction, after those of the axes.
 const DIRECTION: [u8; 3] = *b"IJK";
 
-/// One row a move, except for arcs, splines, changes of coordinates and events, which name their moves.
+/// The columns have one row per move, except those of arcs, splines, changes of coordinates and events, which give the number of
+/// their move.
 #[derive(Debug)]
 pub struct Columns {
     pub axes: Vec<u8>,
@@ -26,7 +26,7 @@ pub struct Columns {
     pub stop_cause: Vec<u8>,
     pub dwell: Vec<f64>,
     pub arc_move: Vec<i64>,
-    /// X, Y, Z of one arc after the other.
+    /// X, Y, Z of the centre of each arc.
     pub arc_centre: Vec<f64>,
     pub arc_normal: Vec<u8>,
     pub arc_angle: Vec<f64>,
@@ -103,7 +103,7 @@ impl Moves {
                 .chain([self.splines.len()])
                 .map(|piece| piece as i64)
                 .collect(),
-            // No spline is programmed by tool directions.
+            // Splines are not read where tool directions are programmed.
             spline_control: self
                 .splines
                 .control

@@ -1,10 +1,10 @@
-//! The kernel of all curves: K and the fastest profile on polynomial pieces of any degree, on rational ones, and on
-//! joints with the tip elsewhere, from control points, weights and the limits of the axes, the feed and the chord
-//! error. Symbols: `bang_bang`.
+//! The kernel `curve`: computes K and the fastest profile on polynomial pieces of any degree, on rational pieces, and on paths of
+//! joints, where the tip has its own path, from control points, weights and the limits of the axes, the feed and the chord error.
+//! Symbols: `bang_bang`.
 //!
-//! The limit curve is not convex here. Every switch is the first root of a Bernstein polynomial; the signs of its
-//! coefficients prove that no earlier root is missed. Where rounding stops a pass, it requests a *remedy*: another
-//! cut of the piece, next time a stop. The run is then planned again.
+//! The limit curve is not convex here. Every switch is the first root of a Bernstein polynomial; the signs of its coefficients
+//! prove that no earlier root is missed. Where rounding stops a pass, it requests a *remedy*: in the first attempt one more cut
+//! of the piece, in later attempts a cut at which the plan stops. The run is then planned again.
 //!
 //! | file | content |
 //! |---|---|
@@ -14,7 +14,7 @@
 //! | `split` | the cuts of a piece |
 //! | `part` | a part between two cuts, and the same part as a pass travels it |
 //! | `store` | sub-pieces, kept from the backward pass for the forward one |
-//! | `window` | what is left of a sub-piece ahead of a pass, with its ceiling |
+//! | `window` | the rest of a sub-piece ahead of a pass, with its ceiling |
 //! | `pass` | one pass over one sub-piece: phases (`bang`), along the cap (`slide`), along the `limit_curve` |
 //! | `check` | whether the phases keep the limits at some samples, in spite of rounding |
 
@@ -44,13 +44,14 @@ use piece::Piece;
 use split::{split, Cut, Limits};
 use store::Store;
 
-/// What the backward pass leaves for the forward pass, from the end of a run to its start; and memory for both.
+/// The results of the backward pass, which goes from the end of a run to its start, for the forward pass; and working memory of
+/// both.
 #[derive(Default)]
 pub struct Space {
     cuts: Vec<Cut>,
-    /// Parts of each piece from left to right.
+    /// Pieces from right to left, the parts of each piece from left to right.
     parts: Vec<Part>,
-    /// Of each part from right to left: its sub-piece, and the index of its first phase of K.
+    /// For each part, from right to left: its sub-piece, and the index of its first phase of K in `controllable`.
     subs: Store,
     offsets: Vec<usize>,
     controllable: Vec<Phase>,
@@ -81,8 +82,9 @@ impl Space {
     }
 }
 
-/// Calls a function with a sufficient capacity of polynomials: that of cubics and conics, of other polynomial pieces,
-/// or of all pieces. For many axes the smallest one is left out, since each takes the compiler some seconds.
+/// Calls a function with a sufficient number of coefficients per polynomial: 11 for cubics and conics, 36 for other polynomial
+/// pieces, `MOST` for all others. With more than 6 axes the capacity 11 is left out, since each capacity takes the compiler some
+/// seconds.
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {{
         let needed = coefficients($task, $i);
@@ -120,7 +122,7 @@ fn piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Piece<M, C
     Piece { share, ..Piece::new(problem.points(i), problem.weights(i), speed_sq) }
 }
 
-/// The piece of the tip, where it is another one and its chord error is limited.
+/// The tip's own piece, where the axes are joints and the chord error is limited; None where the tip is at rest.
 fn tip_piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Option<Piece<TIP_AXES, C>> {
     let tip = task.problem.tip.filter(|_| task.chord.is_some())?;
     let control = &tip.control[tip.offset[i]..tip.offset[i + 1]];
@@ -129,7 +131,7 @@ fn tip_piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Option
     moves.then(|| Piece::new(control, weights_of(tip.weight, tip.offset, i), None))
 }
 
-/// The sum of the axes' velocities squared, from v² of the tip.
+/// The sum of the squared axis velocities, from v² of the tip.
 fn axes_speed_sq(tip_sq: f64, tip_share: f64) -> f64 {
     if tip_sq == 0.0 {
         0.0
@@ -138,7 +140,8 @@ fn axes_speed_sq(tip_sq: f64, tip_share: f64) -> f64 {
     }
 }
 
-/// Backward over piece `i`, from `at` at its end to `at` at its start; returns the number of its parts.
+/// Backward pass over piece `i`: takes `at` as the state at its end, sets it to the state at its start, and returns the number of
+/// parts of the piece.
 pub fn backward<const M: usize>(task: &Task<M>, i: usize, at: &mut Junction, space: &mut Space) -> usize {
     with_capacity!(task, i, backward_over(task, i, at, space))
 }
@@ -179,7 +182,8 @@ fn backward_over<const M: usize, const C: usize>(
     space.parts.len() - start
 }
 
-/// Forward over piece `i` with so many parts, the last ones that `backward` has left; appends the phases.
+/// Forward pass over piece `i`, whose parts are the last `parts` ones stored by `backward`: sets `at` from the state at the start
+/// to that at the end and appends the phases.
 pub fn forward<const M: usize>(
     task: &Task<M>,
     i: usize,
@@ -238,7 +242,7 @@ fn push<const M: usize, const C: usize>(
     for phase in phases {
         let t = if phase.x1 == 1.0 { part.to } else { part.from + span * phase.x1 };
         let weight = |x: f64| sub.weight.value(x);
-        // p = (dt/dτ)² from π over x. At rest in a cusp p has no limit, and 0 is written.
+        // p = (dt/dτ)² from π, which refers to x. Where π is infinite because the axes rest in a cusp, 0 is written.
         let p = |pi: f64, x: f64, rests: bool| {
             if rests && pi.is_infinite() {
                 0.0
@@ -250,10 +254,10 @@ fn push<const M: usize, const C: usize>(
         let sign = |k: usize| if part.negative >> k & 1 == 1 { -1.0 } else { 1.0 };
         let mut joins = true;
         let mut by_acceleration = |k: usize, a: f64| {
-            // Distance over mean speed; the faster speed follows from the distance.
+            // Duration = distance / mean speed. The greater end speed follows from the smaller one, a and the distance.
             let distance = distance(k);
-            // A phase that begins where its axis turns does not join the one before, even if phases too short to keep
-            // lie between.
+            // A phase that begins where its axis turns is not joined to the phase before it, even if phases between them were too
+            // short to be kept.
             joins = phase.pi[0].is_finite() && phase.pi[1].is_finite() && sub.g[k].first() > 0.0;
             if distance <= 0.0 {
                 return 0.0;
@@ -299,7 +303,7 @@ fn time_at_speed<const M: usize, const C: usize>(
 ) -> f64 {
     let rate = |x: [f64; NODES]| {
         let weight = sub.weight.values(x);
-        // Next to a cusp D has lost digits that the tangents still have.
+        // Next to a cusp D has lost digits that the tangents still have, so √D is computed from the tangents.
         let speed = if sub.own_speed {
             let g = sub.g.each_ref().map(|g| g.values(x));
             std::array::from_fn(|i| norm(&g.map(|g| g[i])))

@@ -1,5 +1,5 @@
-//! The kernel of straight pieces (degree 1): the fastest speed from the length, the feed and the limits of the axes.
-//! |C'| and the greatest acceleration along the line are constant, so v² is linear in the length: a trapezoid.
+//! The kernel `line`: computes the fastest profile of straight pieces (degree 1) from the length, the feed and the limits of the
+//! axes. |C'| and the greatest acceleration along the line are constant, so v² is linear in the length: a trapezoid.
 
 use super::quadratic::Axes;
 use crate::bang_bang::tolerance::NEGLIGIBLE;
@@ -11,12 +11,12 @@ use feedplan_geometry::quadratic::norm;
 /// A straight piece with its limits.
 pub struct Line {
     length: f64,
-    /// Greatest acceleration along the line, the axis that limits it, and that axis's acceleration with its sign.
+    /// Greatest acceleration along the line [mm/s²], the axis that limits it, and the acceleration of that axis with its sign.
     acceleration: f64,
     axis: usize,
     signed: f64,
-    /// Square of the greatest speed; the axis that limits it with the square of its velocity limit, or None for the
-    /// feed.
+    /// Square of the greatest speed [mm²/s²]; the axis that limits it and the square of its velocity limit, or None if the feed
+    /// limits it.
     speed_sq: f64,
     speed_axis: Option<(usize, f64)>,
 }
@@ -68,7 +68,7 @@ impl Line {
             self.push(from, to, distance, motion, (number, width), out);
             from = to;
         };
-        // Too short to reach the end speed that is asked for.
+        // The line is too short to reach the requested end speed.
         if start_sq + gain <= end_sq {
             push(State { t: 1.0, speed_sq: start_sq + gain }, length, Motion::SpeedUp);
             return start_sq + gain;
@@ -77,7 +77,7 @@ impl Line {
         let (up, down) = ((peak_sq - start_sq) / (2.0 * a), (peak_sq - end_sq) / (2.0 * a));
         // A triangle has no cruise.
         let cruise = if peak_sq < top_sq { 0.0 } else { (length - up - down).max(0.0) };
-        // t from the nearer end keeps its digits. Next to the end even the shortest ramp is rounding.
+        // t is computed from the nearer end to keep its digits. Next to t = 1 the shortest ramps are rounding.
         let state = |before: f64, after: f64| {
             let t = if after <= NEGLIGIBLE * length {
                 1.0
@@ -88,7 +88,7 @@ impl Line {
             };
             State { t: t.clamp(0.0, 1.0), speed_sq: peak_sq }
         };
-        // Next to the start t can show the shortest ramp that is more than the rounding of v².
+        // Next to t = 0, t resolves every ramp that changes v² by more than rounding.
         let is_ramp = peak_sq - start_sq > NEGLIGIBLE * peak_sq;
         let top = if is_ramp { state(up, cruise + down) } else { State { t: 0.0, speed_sq: peak_sq } };
         push(top, up, Motion::SpeedUp);
@@ -99,7 +99,7 @@ impl Line {
         end_sq
     }
 
-    /// Appends a phase of this length [mm].
+    /// Appends a phase of length `distance` [mm].
     #[inline(always)]
     fn push(
         &self,
@@ -110,7 +110,7 @@ impl Line {
         (number, width): (u32, f64),
         out: &mut Profile,
     ) {
-        // A ramp too short for t to show still sets the end speed.
+        // A braking ramp too short to change t still sets the end speed.
         let slows_down = matches!(motion, Motion::SlowDown) && to.speed_sq < from.speed_sq;
         if to.t <= from.t && !slows_down {
             return;

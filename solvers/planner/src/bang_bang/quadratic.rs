@@ -1,6 +1,6 @@
-//! The kernel of polynomial pieces of degree 2 in the tool's own axes: K and the fastest profile in closed form, from
-//! the control points, the feed and the limits of the axes. Zhang et al. 2010, section 4, extended by the limits of
-//! speed.
+//! The kernel `quadratic`: computes K and the fastest profile of polynomial pieces of degree 2 in the tool's own axes in closed
+//! form, from the control points, the feed and the limits of the axes. Zhang et al. 2010, section 4, extended by the speed
+//! limits.
 //!
 //! C' is linear in the parameter, so every W_jk is constant along a piece (symbols: `bang_bang`). Consequences:
 //!
@@ -8,7 +8,7 @@
 //!   gives the x where the next axis reaches its limit.
 //! * The limit curve is a straight line in p.
 //! * A phase and its ceiling cross at the roots of a quartic.
-//! * W gives the tangents at turns to the last digits, also next to a cusp.
+//! * W gives the tangents at turns to full precision, also next to a cusp.
 //!
 //! | file | content |
 //! |---|---|
@@ -45,11 +45,12 @@ use split::{Located, Part, Splitter};
 pub use subpiece::Axes;
 use subpiece::{Cap, SubPiece};
 
-/// What the backward pass leaves for the forward pass, from the end of a run to its start; and memory for both.
+/// The results of the backward pass, which goes from the end of a run to its start, for the forward pass; and working memory of
+/// both.
 #[derive(Default)]
 pub struct Space {
     splitter: Splitter,
-    /// Parts from right to left, each with the index of its first phase of K.
+    /// Parts from right to left, each with the index of its first phase of K in `controllable`.
     parts: Vec<(Part, usize)>,
     controllable: Vec<Phase>,
     phases: Vec<Phase>,
@@ -62,7 +63,7 @@ impl Space {
     }
 }
 
-/// Backward over a piece: from v² at its end to v² at its start and the number of its parts.
+/// Backward pass over a piece, from v² at its end: returns v² at its start [mm²/s²] and the number of its parts.
 #[inline(always)]
 pub fn backward<const M: usize>(
     piece: &Piece<M>,
@@ -82,8 +83,8 @@ pub fn backward<const M: usize>(
     Ok((p * piece.speed[0], space.splitter.parts.len()))
 }
 
-/// Forward over a piece with so many parts, the last ones that `backward` has left: from v² at its start to v² at its
-/// end. Appends the phases of the piece with this number and width.
+/// Forward pass over a piece, whose parts are the last `parts` ones stored by `backward`, from v² at its start: appends the
+/// phases, with the piece's number and parameter width, and returns v² at its end [mm²/s²].
 #[inline(always)]
 pub fn forward<const M: usize>(
     piece: &Piece<M>,
@@ -109,18 +110,18 @@ pub fn forward<const M: usize>(
     Ok(p * piece.speed[2])
 }
 
-/// A phase of the forward pass over a part as a row of the profile.
+/// A phase of the forward pass as a row of the profile.
 #[inline(always)]
 fn row<const M: usize>(phase: &Phase, part: &Part, located: &Located<M>, axes: &Axes<M>) -> Row {
     let sub = &located.sub;
     let t = if phase.x1 == sub.length { located.to } else { (located.from + phase.x1).min(located.to) };
     let step = phase.x1 - phase.x0;
     let mut joins = true;
-    // The control axis has a constant acceleration: distance over mean speed.
+    // The acceleration of the control axis is constant, so the duration is its distance divided by its mean speed.
     let mut by_axis = |k: usize| {
         let (ga, gb) = (sub.axis_tangent(k, phase.x0), sub.axis_tangent(k, phase.x1));
-        // A phase that begins where its axis turns does not join the one before, even if phases too short to keep lie
-        // between.
+        // A phase that begins where its axis turns is not joined to the phase before it, even if phases between them were too
+        // short to be kept.
         joins = sub.axis_tangent(k, 0.0) > 0.0;
         step * (ga + gb) / (ga * phase.p0.sqrt() + gb * phase.p1.sqrt())
     };
@@ -136,7 +137,7 @@ fn row<const M: usize>(phase: &Phase, part: &Part, located: &Located<M>, axes: &
         Law::Accelerating(k) => (PhaseLaw::AxisAcceleration, k, signed(k as usize), by_axis(k as usize)),
         Law::Braking(k) => (PhaseLaw::AxisAcceleration, k, -signed(k as usize), by_axis(k as usize)),
         Law::Flat(k) => (PhaseLaw::ParameterAcceleration, k, 0.0, step / phase.p0.sqrt()),
-        // Followed only where it is level, so p is constant.
+        // Not expected: the forward pass does not follow the limit curve.
         Law::LimitCurve => (PhaseLaw::ParameterAcceleration, NO_AXIS, 0.0, step / phase.p0.sqrt()),
         Law::Cap => match part.cap {
             Cap::Speed([f0, f1]) if f0 == f1 => {
@@ -150,7 +151,7 @@ fn row<const M: usize>(phase: &Phase, part: &Part, located: &Located<M>, axes: &
     Row { law, axis, value, t, p: [phase.p0, phase.p1], duration, joins }
 }
 
-/// The time [s] along a cap whose v² is linear in x.
+/// The time [s] of a phase along a cap whose v² is linear in x.
 #[cold]
 fn time_at_speed<const M: usize>(sub: &SubPiece<M>, phase: &Phase) -> f64 {
     let rate = |x: f64| norm(&sub.tangent(x)) / sub.speed_sq_of_cap(x).sqrt();

@@ -1,7 +1,7 @@
-//! Both passes over one run, from piece to piece, each piece by its kernel.
+//! Runs both passes over one run, piece by piece, each piece with its kernel.
 //!
-//! K depends on the pieces ahead only up to the point where the backward passes from rest and from any speed meet, a
-//! few pieces ahead. So a run is planned in blocks, in memory that stays in the processor's caches.
+//! K depends on the pieces ahead only up to the point where the backward pass from rest and the one from unlimited speed meet,
+//! usually a few pieces ahead. So a run is planned in blocks, whose memory stays in the processor's caches.
 
 use super::curve::{self, Remedy};
 use super::line::Line;
@@ -21,7 +21,7 @@ const LOOK_AHEAD: usize = 32;
 /// Memory for the passes, kept from run to run.
 #[derive(Default)]
 pub struct Workspace {
-    /// Of each piece, the last one first.
+    /// One result for each piece, the last piece first.
     results: Vec<BackwardResult>,
     quadratic: quadratic::Space,
     curve: curve::Space,
@@ -35,9 +35,9 @@ impl Workspace {
     }
 }
 
-/// What the backward pass over one piece leaves for the forward pass.
+/// The result of the backward pass over one piece, for the forward pass.
 enum BackwardResult {
-    /// v² allowed at the end.
+    /// The greatest v² at the end [mm²/s²].
     Line(f64),
     /// Number of parts; the kernel's space holds their phases of K.
     Quadratic(usize),
@@ -50,7 +50,8 @@ enum Kernel<const M: usize> {
     Curve,
 }
 
-/// Plans the pieces `run.0..run.1` between two speeds of the tool, given squared; appends the phases.
+/// Plans the pieces `run.0..run.1` and appends the phases. `speeds_sq` are the squares of the tool's speed at both ends
+/// [mm²/s²]. Fails if they cannot be reached, or if rounding stops the passes in all attempts.
 pub fn plan_run<const M: usize>(
     task: &Task<M>,
     run: (usize, usize),
@@ -74,14 +75,15 @@ pub fn plan_run<const M: usize>(
             return Ok(());
         }
         out.truncate(rows);
-        // The first remedy is only a cut, since other numbers may succeed; later ones are stops, which simplify.
+        // The remedies of the first attempt are only cuts, since a pass may succeed with other numbers. Later ones are stops,
+        // which make the plan simpler.
         remedies.extend(requested.iter().map(|remedy| Remedy { stops: attempt > 0, ..*remedy }));
     }
     let Remedy { piece, t, .. } = remedies[remedies.len() - 1];
     Err(Fault::Stuck { piece, u: t * task.problem.width[piece] })
 }
 
-/// Both passes, block by block; returns v² of the tip at the end. Ends early where a remedy is requested.
+/// Runs both passes, block by block; returns v² of the tip at the end. Returns early if a remedy is requested.
 fn plan_blocks<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
@@ -134,7 +136,8 @@ fn block<const M: usize>(
     }
 }
 
-/// Backward over the pieces `begin..end` of a run that ends at `last`; leaves K in the workspace.
+/// Backward pass over the pieces `begin..end` of a run that ends at `last`, from the state `at`: stores K in the workspace and
+/// returns the state at the start.
 fn backward<const M: usize>(
     task: &Task<M>,
     (begin, end): (usize, usize),
@@ -174,7 +177,7 @@ fn backward<const M: usize>(
     Ok(at)
 }
 
-/// Forward under K over the same pieces of a run that starts at `first`; appends the phases.
+/// Forward pass under K over the pieces `begin..end` of a run that starts at `first`; updates `at` and appends the phases.
 fn forward<const M: usize>(
     task: &Task<M>,
     (begin, end): (usize, usize),
@@ -228,11 +231,11 @@ impl<const M: usize> Task<'_, M> {
         let line = |chord: [f64; M]| Kernel::Line(Line::new(&chord, &self.plain_axes, problem.feed[i]));
         match problem.points(i) {
             [a, b] => line(sub(b, a)),
-            // The middle control point of a short line far from the origin is rounded, which would bend the line.
+            // A line given with degree 2: far from the origin, the rounding of the middle control point would bend a short line.
             [a, b, c] if *b == lerp(a, c, 0.5) => line(sub(c, a)),
             [a, b, c] => match Piece::new(&[*a, *b, *c]) {
                 piece if piece.cross > 0.0 => Kernel::Quadratic(piece),
-                // Straight for all that it is of degree 2: it may stand still inside.
+                // Straight although of degree 2: its tangent may be 0 inside.
                 _ => Kernel::Curve,
             },
             _ => Kernel::Curve,

@@ -1,4 +1,4 @@
-//! The time [s] along a cap of the tool's speed: the integral of length over speed, by Gauss's quadrature.
+//! Computes the time [s] along a cap of the tool's speed, the integral of length/speed, by Gauss's quadrature.
 
 use super::tolerance::TIME;
 
@@ -8,14 +8,14 @@ pub const NODES: usize = 6;
 const MOST_HALVINGS: u32 = 1000;
 
 /// ∫ rate dx from x0 to x1 by Gauss's rule of order 12, halved until both halves agree with the whole. `rate` gives
-/// length over speed at all nodes.
+/// length/speed at all nodes.
 pub fn integral(rate: &impl Fn([f64; NODES]) -> [f64; NODES], x0: f64, x1: f64) -> f64 {
     let whole = rule(rate, x0, x1);
     gauss(rate, (x0, x1), whole, TIME * whole, &mut { MOST_HALVINGS })
 }
 
-/// `error` stays the same for shorter intervals, and `left` counts down the halvings: next to a cusp the rate can be
-/// all rounding, and more halvings would gain nothing.
+/// The allowed `error` is the same for all sub-intervals. `left` is the number of halvings still allowed: next to a cusp the rate
+/// may consist of rounding errors, and further halvings would not make the sum more accurate.
 fn gauss(
     rate: &impl Fn([f64; NODES]) -> [f64; NODES],
     (a, b): (f64, f64),

@@ -9,14 +9,14 @@ use feedplan_geometry::polynomial::Polynomial;
 /// The Wronskian of polynomials of degree 16 has degree 30.
 type Wronskian = Polynomial<40>;
 
-/// A part of an interval is halved while the limit varies on it by more than this fraction.
+/// A part of an interval is halved while the greatest limit on it exceeds the lower one at its ends by more than this fraction.
 const VARIES: f64 = 3e-3;
-/// The same for the sag of the limit below its secant in the middle.
+/// A part with a convex limit is halved while the limit in the middle is below the secant by more than this fraction.
 const SAGS: f64 = 4e-3;
 const MOST_HALVINGS: u32 = 9;
 
 impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
-    /// An upper limit of v² at a station.
+    /// An upper bound of v² [mm²/s²] that the chord error allows at a station.
     pub fn chord_speed_sq(&self, chord: &ChordLimit, station: &Station<M>) -> f64 {
         let (mut square, mut cross_sq) = (0.0, 0.0);
         for j in 0..M {
@@ -28,7 +28,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         speed_sq(chord, square, cross_sq, station.weight_sq)
     }
 
-    /// A lower bound of the time [s] from `a` to `b` under this limit and `feed_sq`.
+    /// A lower bound of the time [s] from `a` to `b` under the chord-error limit and the feed, given squared.
     pub fn chord_time(&self, chord: &ChordLimit, feed_sq: f64, a: &Station<M>, b: &Station<M>) -> f64 {
         let ends = [a, b].map(|station| self.chord_speed_sq(chord, station));
         if self.degree == 1 && !self.is_rational() {
@@ -38,8 +38,9 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         }
     }
 
-    /// With g linear, |g × c| is constant, and over the length l with dl = |g| dt, |g|³ has the second derivative 3
-    /// |c|²/|g|. So the limit of v² is convex in the length, and below its secant.
+    /// A lower bound of the time [s] for linear g. There |g × c| is constant, and |g|³ as a function of the length l, dl = |g|
+    /// dt, has the second derivative 3 |c|²/|g|. So the limit of v² is a convex function of the length and lies below its
+    /// secants.
     fn convex_time(
         &self,
         chord: &ChordLimit,
@@ -57,7 +58,8 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         secant_time(self.chord(a, middle), feed_sq, x, z) + secant_time(self.chord(middle, b), feed_sq, z, y)
     }
 
-    /// From the greatest speed on parts, halved until it is nearly that at their ends.
+    /// A lower bound of the time [s] from the greatest speed on each part; parts are halved until it is nearly that at their
+    /// ends.
     fn halved_time(
         &self,
         chord: &ChordLimit,
@@ -81,8 +83,8 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         self.distances(a, b).least.iter().map(|distance| distance * distance).sum::<f64>().sqrt() * DOWN
     }
 
-    /// An upper limit of v² between two stations: |g| is at most its longest coefficient, and each component of g × c
-    /// at least its smallest coefficient.
+    /// An upper bound of v² between two stations: |g| is at most its longest coefficient, and each component of g × c at least
+    /// its smallest coefficient.
     fn greatest_chord_speed_sq(&self, chord: &ChordLimit, a: &Station<M>, b: &Station<M>) -> f64 {
         let n = self.degree;
         let part = self.part(a.t, b.t);
@@ -104,13 +106,13 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 }
 
-/// An upper limit of v² where the radius of curvature is at most |g|³/(|g × c| ω²).
+/// An upper bound of v² where the radius of curvature is at most |g|³/(|g × c| ω²).
 fn speed_sq(chord: &ChordLimit, square: f64, cross_sq: f64, weight_sq: f64) -> f64 {
     let radius = square * square.sqrt() / (cross_sq.sqrt() * weight_sq) * UP;
     chord.slow_sq.max(chord.alpha * radius - chord.slow_sq) * UP
 }
 
-/// A lower bound of the time [s] over a length on which v² changes linearly from x to y, cut off at a feed.
+/// A lower bound of the time [s] over a length on which v² is at most a linear function from x to y, and at most `feed_sq`.
 fn secant_time(length: f64, feed_sq: f64, x: f64, y: f64) -> f64 {
     let (low, high) = (x.min(y), x.max(y));
     let feed = feed_sq.sqrt();

@@ -1,13 +1,13 @@
-//! The hodograph of a piece with proven errors: tangents, their slopes and the distances of the axes, from the
-//! control points and weights.
+//! Computes the hodograph of a piece with proven error bounds, from the control points and weights: tangents, their slopes and
+//! the distances of the axes.
 
 use feedplan_geometry::polynomial::{binomial, Polynomial};
 
 /// The numerator of C' of a rational piece has degree 2 d − 2, d ≤ 9.
 type Numerator = Polynomial<20>;
 
-/// C' = g/ω² over t in [0, 1]; ω = 1 on polynomial pieces. `C` and `R` are the capacities for the Bernstein
-/// coefficients of g and ω; R = 0 if only polynomial pieces are meant.
+/// C' = g/ω² over t in [0, 1]; ω = 1 on polynomial pieces. `C` and `R` are the capacities for the Bernstein coefficients of g
+/// and ω; R = 0 for polynomial pieces only.
 #[derive(Clone)]
 pub struct Hodograph<const M: usize, const C: usize, const R: usize> {
     /// Degree of g.
@@ -34,17 +34,18 @@ pub struct Station<const M: usize> {
     pub g: [f64; M],
     /// c = g'.
     pub c: [f64; M],
-    /// v_k² = `rate[k]`² x. Usually x is π and the rate g. At an exact cusp at an end of the piece, x is π d^(2
-    /// order), d the distance from it in t, and the rate is the leading coefficient of g.
+    /// v_k² = `rate[k]`² x. Usually x is π and the rate g. At an exact cusp at an end of the piece, x is π d^(2 order), where
+    /// d is the distance in t from the cusp, and the rate is the leading coefficient of g.
     pub rate: [f64; M],
     pub order: usize,
     /// ω², rounded down.
     pub weight_sq: f64,
-    /// q − q(0), of a rational piece only.
+    /// q − q(0); only for rational pieces.
     q: [f64; M],
 }
 
-/// The distance [mm] of each axis between two stations: `least` from one to the other, `most` to and fro.
+/// Distances [mm] of each axis between two stations: `least` is a lower bound of the distance between its positions there, `most`
+/// an upper bound of the distance that it travels back and forth.
 pub struct Distances<const M: usize> {
     pub least: [f64; M],
     pub most: [f64; M],
@@ -147,7 +148,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         (point[0].map(|value| value / weight[0]), weight[0])
     }
 
-    /// The rate at t and the order of the common zero of g, up to 2.
+    /// The rate at t and the order of the common zero of all g_k, up to 2.
     #[inline(always)]
     fn leading(&self, t: f64, g: &[f64; M]) -> ([f64; M], usize) {
         let is_zero = |row: &[f64; M]| row.iter().all(|&value| value == 0.0);
@@ -170,7 +171,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         a.g[k] * b.g[k] < 0.0 && a.g[k].abs() > self.noise[k] && b.g[k].abs() > self.noise[k]
     }
 
-    /// A point inside [from, to] next to which axis k turns, by the secant method with a bracket.
+    /// A t inside [from, to] next to which axis k turns, by the secant method with a bracket; None if it does not turn.
     pub fn find_turn(&self, k: usize, (from, to): (f64, f64)) -> Option<f64> {
         let (mut a, mut b) = (self.station(from), self.station(to));
         if k >= M || !self.turns(k, &a, &b) {
@@ -215,7 +216,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
             if R > 0 && self.count > 0 {
                 let distance = (b.q[k] - a.q[k]).abs();
                 distances.side[k] = usize::from(b.q[k] < a.q[k]);
-                // To and fro at most twice the smaller of the positive and the negative coefficients.
+                // Back-and-forth motion adds at most twice the smaller one of the sums of positive and of negative coefficients.
                 let back = h * (share * (sizes[k] - sum[k].abs()) + 2.0 * noise) / self.weights[0].powi(2);
                 distances.least[k] = (distance - 2.0 * self.point_noise[k]).max(0.0) * super::DOWN;
                 distances.most[k] = (distance + 2.0 * self.point_noise[k] + back) * super::UP;
@@ -251,7 +252,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         b
     }
 
-    /// A lower bound of the length [mm] of `parts` chords of a rational piece between two stations.
+    /// A lower bound of the total length [mm] of `parts` chords of a rational piece between two stations.
     pub fn chords(&self, a: &Station<M>, b: &Station<M>, parts: usize) -> f64 {
         let step = (b.t - a.t) / parts as f64;
         let mut last = a.q;

@@ -1,8 +1,8 @@
-//! The intervals of a run: at first the phases of a profile, then halved where their bound is loose.
+//! Divides a run into intervals: at first the phases of a profile, then halved where their bound is loose.
 
 use crate::phases::Phases;
 
-/// The interval belongs to no phase.
+/// Marks an interval that belongs to no phase.
 const NO_PHASE: u32 = u32::MAX;
 
 /// Intervals in the order of the run; each piece has one or more.
@@ -14,7 +14,7 @@ pub struct Intervals {
     pub end: Vec<f64>,
     /// The phase of the profile.
     pub phase: Vec<u32>,
-    /// The greatest x at the end, by the backward sweep.
+    /// The greatest x at the end, from the backward sweep.
     pub reach: Vec<f64>,
     /// The least time [s].
     pub time: Vec<f64>,
@@ -26,8 +26,8 @@ impl Intervals {
         self.piece[piece]..self.piece[piece + 1]
     }
 
-    /// Makes an interval of each phase, or two if its axis turns. Columns that are no profile give valid intervals,
-    /// too.
+    /// Makes an interval of each phase, or two if its axis turns. Columns that are not those of a profile give valid intervals as
+    /// well.
     ///
     /// `find_turn` returns a turn of an axis between two t of a piece.
     pub fn divide(
@@ -78,9 +78,9 @@ impl Intervals {
         self.time.resize(self.end.len(), 0.0);
     }
 
-    /// Halves the intervals of the phases whose bound is below their duration by more than the fraction `part`;
-    /// returns their number. `middle` gives the cut from the piece, counted from the start of the run, and the
-    /// interval's ends; `other` is memory.
+    /// Halves the intervals of the phases whose bound is below their duration by more than the fraction `part`; returns their
+    /// number. `middle` returns the t of the cut for a piece, counted from the start of the run, and the ends of the interval;
+    /// `other` is working memory.
     pub fn halve(
         &mut self,
         hint: &Phases,
@@ -100,7 +100,7 @@ impl Intervals {
             for interval in self.of_piece(i) {
                 let phase = self.phase[interval];
                 if interval >= known {
-                    // All intervals of the phase at once.
+                    // A new phase: decides for all its intervals at once.
                     while known < self.end.len() && self.phase[known] == phase {
                         known += 1;
                     }

@@ -1,4 +1,4 @@
-//! A lower bound of ∫ √D dx for a polynomial D ≥ 0, by Gauss's quadrature of a polynomial below √D.
+//! Computes a lower bound of ∫ √D dx for a polynomial D ≥ 0, by Gauss's quadrature of a polynomial below √D.
 
 use std::sync::OnceLock;
 
@@ -11,7 +11,8 @@ const ROUNDING: f64 = 1e-12;
 const OFF_LINE: f64 = 0.01;
 const MOST_HALVINGS: u32 = 8;
 
-/// A lower bound of ∫ √D dx over [from, to], for D of this degree with values off by at most `noise`.
+/// A lower bound of ∫ √D dx over [from, to], for a polynomial D of degree `degree` whose computed values have errors of at
+/// most `noise`.
 ///
 /// √D ≥ (3 D r − D² r³)/2 for every r > 0, since the difference is √D (1 − z)² (2 + z)/2 with z = r √D. With r linear
 /// between 1/√D at both ends, the right side is a polynomial, and Gauss's rule integrates it exactly. The error of r

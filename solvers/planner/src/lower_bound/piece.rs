@@ -1,4 +1,5 @@
-//! A piece under its limits: the greatest x at a station, its rise over an interval, the least time of an interval.
+//! A piece with its limits: computes the greatest x at a station, its greatest rise over an interval, and the least time of an
+//! interval.
 
 use super::hodograph::{Distances, Hodograph, Station};
 use super::length::root_integral;
@@ -6,16 +7,16 @@ use super::time::least_time;
 use super::{Task, DOWN, UP};
 use feedplan_geometry::polynomial::binomial;
 
-/// Greatest distance in t of a station from a turn, for the limit of x at the turn to be used.
+/// The limit of x at a turn is used at stations within this distance in t of the turn.
 const NEAR_TURN: f64 = 1e-7;
-/// Chords of a rational piece turn by less than `CHORD_TURN` [rad], with `MOST_CHORDS` of them at most.
+/// A rational piece is divided into chords that each turn by less than `CHORD_TURN` [rad], but into at most `MOST_CHORDS`.
 const CHORD_TURN: f64 = 0.05;
 const MOST_CHORDS: f64 = 64.0;
 
 /// The chord-error limit is used on an interval if v² at an end exceeds this fraction of it.
 const NEAR_CHORD: f64 = 0.5;
 
-/// D: v² of the tip is D x, where the axes are joints.
+/// The polynomial D, where the axes are joints: v² of the tip is D x.
 struct TipSpeed<'a> {
     coefficients: &'a [f64],
     factor: f64,
@@ -28,7 +29,7 @@ pub struct Piece<'a, const M: usize, const C: usize, const R: usize> {
     pub curve: Hodograph<M, C, R>,
     tip_speed: Option<TipSpeed<'a>>,
     feed_sq: f64,
-    /// The factors of the axes in the speed that the feed limits, if that is not the tool's.
+    /// The factor of each axis's velocity in the speed that the feed limits; None if that speed is the tool's.
     share: Option<&'a [f64; M]>,
 }
 
@@ -52,7 +53,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         }
     }
 
-    /// Lower and upper estimate of v² of the tool over x at a station.
+    /// Lower and upper bound of v²/x of the tool at a station.
     #[inline(always)]
     pub fn speed(&self, station: &Station<M>) -> (f64, f64) {
         if let Some(tip) = &self.tip_speed {
@@ -62,7 +63,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         self.axes_speed(station)
     }
 
-    /// Lower and upper estimate of the sum of the axes' velocities squared over x at a station.
+    /// Lower and upper bound of the sum of the squared axis velocities, divided by x, at a station.
     #[inline(always)]
     pub fn axes_speed(&self, station: &Station<M>) -> (f64, f64) {
         let (mut least, mut most) = (0.0, 0.0);
@@ -74,8 +75,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         (least * DOWN, most * UP)
     }
 
-    /// An upper limit of x at a station where the axes and the tool are at most this fast, given squared. `speed` is
-    /// the lower estimate by `self.speed`.
+    /// An upper bound of x at a station from those of the sum of the squared axis velocities and of v² of the tool. `speed` is
+    /// the lower bound by `self.speed`.
     #[inline(always)]
     pub fn x_on_entry(&self, station: &Station<M>, axes_sq: f64, tool_sq: f64, speed: f64) -> f64 {
         if axes_sq == 0.0 || tool_sq == 0.0 {
@@ -85,7 +86,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         (axes_sq / axes).min(tool_sq / speed) * UP
     }
 
-    /// A lower estimate of the square of the speed that the feed limits, over x at a station; `speed` as above.
+    /// A lower bound of the square of the speed that the feed limits, divided by x, at a station. `speed` is the lower bound by
+    /// `self.speed`.
     #[inline(always)]
     fn feed_rate(&self, station: &Station<M>, speed: f64) -> f64 {
         let Some(share) = self.share else { return speed };
@@ -93,7 +95,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         (0..M).map(|k| least(k).powi(2)).sum::<f64>() * DOWN
     }
 
-    /// An upper limit of x at a station from the limits there; `speed` as above.
+    /// An upper bound of x at a station from the limits there. `speed` is the lower bound by `self.speed`.
     #[inline(always)]
     pub fn greatest_x(&self, station: &Station<M>, speed: f64) -> f64 {
         let (task, noise) = (self.task, &self.curve.noise);
@@ -110,8 +112,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         if station.order == 0 {
             for j in 0..M {
                 for k in j + 1..M {
-                    // ω² (g_j s + c_j π) = a_j within its limits and the same of axis k, with s eliminated: ω² W π =
-                    // a_j g_k − a_k g_j.
+                    // With s eliminated from ω² (g_j s + c_j π) = a_j and the same equation of axis k: ω² W π = a_j g_k −
+                    // a_k g_j, where a_j and a_k are within their limits.
                     let wronskian = self.curve.wronskian(station, j, k);
                     if wronskian != 0.0 {
                         let sign = 1.0_f64.copysign(wronskian);
@@ -131,7 +133,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         most * UP
     }
 
-    /// An upper limit of the acceleration of axis k times `factor`, which may be off by `noise`.
+    /// An upper bound of the acceleration of axis k times `factor`, which has an error of at most `noise`.
     #[inline(always)]
     fn greatest_product(&self, k: usize, factor: f64, noise: f64) -> f64 {
         let [forward, backward] = self.task.acceleration.each_ref().map(|side| side[k]);
@@ -139,7 +141,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         (if size > noise { own } else { forward.max(backward) }) * (size + noise)
     }
 
-    /// An upper limit of v² by the chord error at a station.
+    /// An upper bound of v² by the chord error at a station; None if the chord error is not limited.
     fn chord_speed_sq(&self, station: &Station<M>) -> Option<f64> {
         let chord = self.task.chord.as_ref()?;
         Some(self.curve.chord_speed_sq(chord, station) * self.task.speed_share)
@@ -162,8 +164,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         self.curve.chord_time(chord, feed_sq, a, b) / self.task.speed_share
     }
 
-    /// An upper limit of π at a station next to which axis k turns. From the turn on, v_k² is at most 2 A_k times the
-    /// distance; with c_k between two slopes on the way, π ≤ A_k |c_k|max/(|c_k|min² ω²).
+    /// An upper bound of π at a station next to which axis k turns. After the turn, v_k² is at most 2 A_k times the distance;
+    /// with c_k between two slopes on the way, π ≤ A_k |c_k|max/(|c_k|min² ω²).
     #[inline(always)]
     fn at_turn(&self, station: &Station<M>, k: usize) -> f64 {
         let curve = &self.curve;
@@ -182,8 +184,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             / ((c - change).powi(2) * weight * weight)
     }
 
-    /// An upper limit of the growth of v_k²/2 between two stations, in the direction of time or against it. In its
-    /// main direction the axis covers at most `most`, backward at most (most − least)/2.
+    /// An upper bound of the growth of v_k²/2 between two stations, in the direction of time or against it. The axis travels at
+    /// most `most` in its main direction and at most (most − least)/2 in the other one.
     #[inline(always)]
     fn gain(&self, k: usize, in_time: bool, distances: &Distances<M>) -> f64 {
         let side = if in_time { distances.side[k] } else { 1 - distances.side[k] };
@@ -196,7 +198,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         }
     }
 
-    /// An upper limit of x at `to`, before or after `from`, where x is at most `x`.
+    /// An upper bound of x at the station `to`, which is before or after `from`, where x is at most `x`.
     #[inline(always)]
     pub fn rise(&self, from: &Station<M>, x: f64, to: &Station<M>, distances: &Distances<M>) -> f64 {
         let mut most = f64::INFINITY;
@@ -211,8 +213,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         most * UP
     }
 
-    /// A lower bound of the time [s] from `a` to `b` with at most these x. Tries `axis` first, then the length, then
-    /// all else, until the bound reaches `wanted`.
+    /// A lower bound of the time [s] from `a` to `b`, where x is at most `x`. Tries first `axis`, then the length, then the other
+    /// axes and the chord error, until the bound reaches `wanted`.
     #[inline(always)]
     pub fn time(
         &self,
@@ -240,7 +242,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         time
     }
 
-    /// A lower bound of the length [mm] from `a` to `b` that the feed counts.
+    /// A lower bound of the length [mm] from `a` to `b` to which the feed refers.
     fn length(&self, a: &Station<M>, b: &Station<M>, distances: &Distances<M>) -> f64 {
         if let Some(tip) = &self.tip_speed {
             let d = |t: f64| tip.at(t, 0).0;

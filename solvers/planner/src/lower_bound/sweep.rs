@@ -1,4 +1,5 @@
-//! The two sweeps over a run: backward the greatest x at every station, then forward the same with the least times.
+//! The two sweeps over a run: the backward sweep computes the greatest x at every station from the limits ahead, the forward
+//! sweep lowers it by the limits behind and computes the least times of the intervals.
 
 use super::hodograph::{Hodograph, Station};
 use super::intervals::Intervals;
@@ -8,8 +9,8 @@ use super::{Task, DOWN, UP};
 /// At a cusp, directions that differ by more than this [rad] form a corner, which is a stop.
 const CORNER: f64 = 1e-9;
 
-/// The state between two pieces: the greatest sum of the axes' velocities squared, which is the same on both sides
-/// where the tip may rest; the greatest v² of the tool; and the direction of the piece after.
+/// The state between two pieces: the greatest sum of the squared axis velocities, which is continuous even where the tip rests;
+/// the greatest v² of the tool; and the direction at the start of the piece after.
 struct Junction<const M: usize> {
     axes_sq: f64,
     tool_sq: f64,
@@ -40,7 +41,7 @@ impl<const M: usize> End<M> {
     }
 }
 
-/// Calls a function with the capacities that the polynomials of a piece need.
+/// Calls a function with the capacities that the polynomials of piece `$i` need.
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
         match $task.kind($i) {
@@ -66,7 +67,7 @@ impl<const M: usize> Task<'_, M> {
     }
 }
 
-/// A point inside [from, to] of piece `i` next to which the axis turns.
+/// A t inside [from, to] of piece `i` next to which the axis turns; None if it does not turn.
 pub fn find_turn<const M: usize>(task: &Task<M>, i: usize, axis: usize, part: (f64, f64)) -> Option<f64> {
     if axis >= M {
         return None;
@@ -83,7 +84,7 @@ fn find_turn_on<const M: usize, const C: usize, const R: usize>(
     Hodograph::<M, C, R>::new(task.problem.points(i), task.problem.weights(i)).find_turn(axis, part)
 }
 
-/// Backward: fills the greatest x at the end of each interval.
+/// Backward sweep: fills in the greatest x at the end of each interval.
 pub fn backward<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
@@ -133,8 +134,8 @@ fn backward_over<const M: usize, const C: usize, const R: usize>(
     at.end = Some(End::new(&piece, &station));
 }
 
-/// Forward: fills the least time of each interval and returns a lower bound of the time [s] of the run. `wanted`
-/// gives the control axis of a phase, and the time at which its bound is good enough.
+/// Forward sweep: fills in the least time of each interval and returns a lower bound of the time [s] of the run. `wanted` gives
+/// the control axis of a phase, and the time [s] from which on a bound is good enough.
 pub fn forward<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),

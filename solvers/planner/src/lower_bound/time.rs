@@ -1,4 +1,4 @@
-//! The least time of an axis over a distance between two greatest speeds.
+//! Computes the least time of an axis over a distance, from the greatest speeds at both ends.
 
 use super::DOWN;
 
@@ -6,9 +6,9 @@ use super::DOWN;
 /// most `first_sq` to one of at most `last_sq`. It speeds up by at most `gain` and slows down by at most `loss`
 /// [mm/s²]; `v_sq` is the square of its velocity limit.
 ///
-/// The distance is divided in three. On the first part no motion is faster than full acceleration, on the last part
-/// none is faster than full braking, and between them none is faster than the velocity limit. Every division gives a
-/// bound, so its rounding does no harm; the division used is that of the fastest motion.
+/// The distance is divided in three. On the first part no motion is faster than full acceleration, on the last part none is
+/// faster than full braking, and between them none is faster than the velocity limit. Every division gives a valid bound, so its
+/// rounding does no harm; the division used is that of the fastest motion.
 #[inline(always)]
 pub fn least_time(distance: f64, first_sq: f64, last_sq: f64, [gain, loss]: [f64; 2], v_sq: f64) -> f64 {
     let (first_sq, last_sq) = (first_sq.min(v_sq), last_sq.min(v_sq));

@@ -1,5 +1,5 @@
-//! The lower bound: equal to the time where that is known by hand, limit by limit; never above the time of a plan, and
-//! near it, with any intervals at the start.
+//! The lower bound: equal to the time where that is known by hand, limit by limit; never above the time of a plan, and close to
+//! it, whatever the first intervals are.
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ fn bound<const M: usize>(case: &Case<M>, phases: &Phases) -> f64 {
 
 #[test]
 fn on_a_line_from_rest_to_rest_the_bound_is_the_time() {
-    // 100 mm: at 1000 mm/s² up to 50 mm/s and down again 2.05 s; without a limit of speed 2 √0.1 s.
+    // 100 mm: at 1000 mm/s² up to 50 mm/s and down again 2.05 s; without a speed limit 2 √0.1 s.
     for (velocity, feed, time) in [(50.0, 1e3, 2.05), (1e6, 50.0, 2.05), (1e6, 1e6, 2.0 * 0.1f64.sqrt())] {
         let case = Case::new(vec![Quadratic::line([0.0], [100.0])], feed, [velocity], [1e3]);
         let bound = bound(&case, &case.plan().expect("a profile").phases);
@@ -37,15 +37,15 @@ fn every_limit_counts() {
     // v² from 0 to 20 over a peak of 110: (2 √110 − √20)/100 s for each line.
     corner.junction[1] = 20f64.sqrt();
     by_hand(&corner, 2.0 * (2.0 * 110f64.sqrt() - 20f64.sqrt()) / 100.0);
-    // Ends at 10 mm/s and a feed of 10 mm/s: all at 10 mm/s.
+    // Both end speeds and the feed are 10 mm/s: 10 mm/s everywhere.
     let mut flying = Case::new(lines(), 10.0, [1e3; 2], [100.0; 2]);
     (flying.start_speed, flying.end_speed) = (10.0, 10.0);
     by_hand(&flying, 0.2);
-    // The same by axis velocities.
+    // 10 mm/s everywhere, by the limits of axis velocity instead of the feed.
     flying.feed = vec![1e3; 2];
     flying.velocity = [10.0; 2];
     by_hand(&flying, 0.2);
-    // Without both: up and down again on each line, with a corner that is passed at any speed.
+    // Without both limits: up and down again on each line, since the junction speed of the corner is not limited.
     flying.velocity = [1e3; 2];
     by_hand(&flying, 2.0 * (300f64.sqrt() - 10.0) / 100.0);
 }
@@ -72,7 +72,7 @@ struct Gaps {
     failures: Vec<u64>,
 }
 
-/// The gaps over random cases with these seeds; the first intervals are the phases of the plan, or the pieces.
+/// The gaps over random cases with these seeds; the first intervals are the phases of the plan, or else the pieces.
 fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
     let mut found: Vec<(f64, u64, bool)> = seeds
         .into_par_iter()
@@ -88,7 +88,7 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
                     bound(&case, &whole_pieces(&phases, &case))
                 };
                 let gap = 1.0 - bound / time;
-                // Near a cusp, rounding makes the durations of single phases wrong.
+                // Near a cusp, rounding falsifies the durations of single phases.
                 let is_sound = gap >= -1e-10 || -gap <= 2.0 * audit(&case, &phases, 1).duration;
                 Some((gap, seed, is_sound))
             })
@@ -124,7 +124,7 @@ fn the_bound_is_never_above_the_time_and_near_it() {
         found.least, found.shares[0], found.shares[1], found.shares[2]
     );
     assert!(found.failures.is_empty(), "above the time: seeds {:?}", found.failures);
-    // Where the chord error is near the radii, the plan has a margin to it, which widens the gap.
+    // Where the chord tolerance is near the radii of curvature, the plan keeps a margin to that limit, which widens the gap.
     assert!(found.shares[0] < 1e-5 && found.shares[1] < 1e-3, "{:?}", found.shares);
 }
 

@@ -1,4 +1,4 @@
-//! The kernel of curves: on quadratics whose degree is elevated it agrees with the closed forms of quadratics.
+//! The kernel of curves: on quadratics of elevated degree it agrees with the closed forms of `quadratic`.
 
 use feedplan_checks::{assert_none, milder_case, FEW_AXES};
 

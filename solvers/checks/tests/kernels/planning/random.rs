@@ -1,5 +1,5 @@
-//! Random and adversarial paths: every limit holds, some limit is active everywhere, and changes that leave the path
-//! the same leave its time the same.
+//! Random and adversarial paths: every limit is kept, everywhere some limit is reached, and changes that do not change the path
+//! do not change its time.
 
 use feedplan_checks::{assert_none, audit, random_case, seeds, Audit, Case, Random, AXES};
 use feedplan_geometry::quadratic::Quadratic;
@@ -97,7 +97,7 @@ fn a_level_limit_curve_is_passed() {
     ];
     let width = [119.93775, 0.0622, 0.0622, 0.2163];
     for nudge in 0..1000 {
-        // The last digits of the points decide.
+        // The last digits of the points decide whether it falls or rises.
         let shift = 1e-9 * f64::from(nudge);
         let pieces = corners.iter().zip(width).map(|(control, width)| Quadratic {
             control: control.map(|[x, y]| [x + shift, y + 3.0 * shift]),

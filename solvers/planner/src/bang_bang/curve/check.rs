@@ -1,4 +1,4 @@
-//! A guard against rounding: checks at some samples that the phases of a forward pass keep the limits of all axes.
+//! Protects against rounding: checks at some samples that the phases of a forward pass keep the limits of all axes.
 
 use super::part::SubPiece;
 use super::pass::{axis_distance, Law, Phase, Stuck};
@@ -9,12 +9,13 @@ use feedplan_geometry::polynomial::Polynomial;
 const SAMPLES: [f64; 4] = [0.02, 0.35, 0.7, 0.98];
 const DECADES: [f64; 9] = [0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
-/// Fails in the middle of the first phase that exceeds a limit.
+/// Fails if a phase exceeds a limit; the error gives the middle of the first such phase.
 pub fn keeps_limits<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     phases: &[Phase],
 ) -> Result<(), Stuck> {
-    // The ranges of the coefficients spare most sub-pieces the closer samples.
+    // The ranges of the coefficients prove for most sub-pieces that the tangents are short nowhere, so the closer samples are not
+    // needed.
     let ranges = sub.g.each_ref().map(Polynomial::range);
     let fastest = ranges.iter().fold(0.0_f64, |most, range| most.max(range.1));
     let slow_somewhere = ranges.iter().all(|range| range.0 <= SLOW * fastest);
@@ -35,7 +36,7 @@ pub fn keeps_limits<const M: usize, const C: usize>(
     phases.iter().find(|phase| !kept(phase)).map_or(Ok(()), |phase| Err(Stuck(0.5 * (phase.x0 + phase.x1))))
 }
 
-/// What the samples of a phase share. They count from the end where the phase is slowest.
+/// The data that all samples of a phase have in common. A sample is a fraction of the phase, counted from its slowest end.
 struct Samples<'a, const M: usize, const C: usize> {
     sub: &'a SubPiece<M, C>,
     phase: &'a Phase,
@@ -47,7 +48,7 @@ struct Samples<'a, const M: usize, const C: usize> {
 }
 
 impl<const M: usize, const C: usize> Samples<'_, M, C> {
-    /// Whether each axis keeps `factor` times its limits.
+    /// Whether every axis stays within `factor` times its limits at all samples.
     fn keep_limits<const K: usize>(&self, samples: [f64; K], factor: f64) -> bool {
         let Self { sub, phase, j, .. } = *self;
         let limits = &sub.limits;
@@ -61,7 +62,8 @@ impl<const M: usize, const C: usize> Samples<'_, M, C> {
         let scaled_pi: [f64; K] = std::array::from_fn(|i| weight[i] * weight[i] * pi[i]);
         (0..M).all(|l| {
             let other = sub.g[l].values(x);
-            // ω² (g_l s + c_l π) with s from axis j, written without a difference of large terms.
+            // `need` below is g_j times the acceleration ω² (g_l s + c_l π) of axis l, with s from the acceleration of axis j,
+            // written without a difference of large terms.
             let wronskian =
                 if sub.straight || l == j { [0.0; K] } else { sub.g[l].wronskian(&sub.g[j]).values(x) };
             let [up, down, most_sq] =
@@ -73,7 +75,7 @@ impl<const M: usize, const C: usize> Samples<'_, M, C> {
         })
     }
 
-    /// The distance [mm] of axis j from the slowest end of the phase to each x, where its tangents are `g`.
+    /// The distance [mm] that axis j travels from the slowest end of the phase to each x; `g` are its tangents there.
     fn distances<const K: usize>(&self, x: [f64; K], g: &[f64; K]) -> [f64; K] {
         let Self { sub, phase, j, .. } = *self;
         let slowest = if self.braking { phase.x1 } else { phase.x0 };
@@ -82,7 +84,7 @@ impl<const M: usize, const C: usize> Samples<'_, M, C> {
             return std::array::from_fn(|i| (x[i] - slowest).abs() * 0.5 * (start + g[i]));
         }
         if self.slow_somewhere {
-            // The coefficients of a short part keep more digits.
+            // Coefficients computed for a short part keep more digits.
             return x.map(|x| axis_distance(sub, j, x.min(slowest), x.max(slowest)));
         }
         let along = |p: &Polynomial<C>| {
@@ -96,7 +98,7 @@ impl<const M: usize, const C: usize> Samples<'_, M, C> {
         let span = phase.x1 - phase.x0;
         let weight = along(&sub.weight);
         let distance = along(&sub.g[j]).scale(span).antiderivative(&weight, sub.degree);
-        // From x as rounded, so that distance and tangent belong to the same point.
+        // Computed from the rounded x, so that distance and tangent belong to the same point.
         let samples = x.map(|x| (x - slowest).abs() / span);
         let (distance, weight) = (distance.values(samples), weight.values(samples));
         std::array::from_fn(|i| distance[i] / weight[i])

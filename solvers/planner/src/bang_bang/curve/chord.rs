@@ -1,25 +1,26 @@
 //! The chord-error limit v² ≤ α ρ − 4 δ²/T², α = 8 δ/T², as lines: v² linear in t on short parts of a piece, from the
 //! radius of curvature ρ [mm], the tolerance δ [mm] and the servo period T [s].
 //!
-//! ρ = |g|³/(|g × c| ω²) is no polynomial. A part is halved until a line below the limit gives away less than a fixed
-//! fraction of it. The line is the secant, lowered by four times its greatest excess over samples of the limit. The
-//! least ρ, proven from Bernstein coefficients, says where no line is needed, and that samples miss no narrow turn.
+//! ρ = |g|³/(|g × c| ω²) is not a polynomial. A part is halved until a line below the limit is lower than the limit by less
+//! than a fixed fraction. The line is the secant, lowered by four times its greatest relative excess over samples of the limit,
+//! or, if that is more, by a quarter of its greatest relative distance below them. A lower bound of ρ, proven from Bernstein
+//! coefficients, shows where no line is needed, and that the samples miss no narrow turn.
 
 use super::piece::Piece;
 use crate::bang_bang::speed_line::SpeedLine;
 use crate::problem::ChordLimit;
 
-/// Fraction of the limit that a line may give away.
+/// Greatest fraction of the limit by which a line may lie below it.
 const GIVEN_AWAY: f64 = 2e-4;
 /// Greatest number of halvings.
 const MAX_DEPTH: u32 = 14;
 /// Number of samples on a part, both ends included.
 const SAMPLES: usize = 9;
-/// Samples are trusted on a part whose proven least limit is at least this fraction of the least sampled one.
+/// The samples on a part are trusted if the proven lower bound of the limit is at least this fraction of the least sample.
 const SHOWN: f64 = 0.5;
 
 impl ChordLimit {
-    /// Appends the lines of a piece, at most `feed_sq`.
+    /// Appends lines that cover the piece; none is above the limit or above `feed_sq` [mm²/s²].
     pub fn lines<const M: usize, const C: usize>(
         &self,
         piece: &Piece<M, C>,
@@ -64,16 +65,16 @@ impl ChordLimit {
         self.halve(piece, feed_sq, [middle, to], depth + 1, out);
     }
 
-    /// Whether the limits of acceleration are below this one at a radius of curvature and all greater ones.
+    /// Whether at this radius of curvature [mm] and at all greater ones the acceleration limits allow less speed than this limit.
     fn is_free(&self, radius: f64) -> bool {
         radius > self.tolerance
             && self.alpha > self.acceleration
             && self.speed_sq(radius) >= self.acceleration * radius
     }
 
-    /// The greatest v² at the radius of curvature ρ.
+    /// The greatest v² [mm²/s²] at a radius of curvature [mm].
     fn speed_sq(&self, radius: f64) -> f64 {
-        // Where ρ < δ, no part of the path shorter than 2 δ is farther than δ from its chord.
+        // Where ρ < δ, no part of the path shorter than 2 δ is farther than δ from its chord, so v = 2 δ/T is allowed.
         if radius > self.tolerance {
             self.alpha * radius.min(1e300) - self.slow_sq
         } else {
@@ -88,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_turn_narrower_than_the_distance_of_samples_has_its_limit() {
-        // A spline G5 that all but stops near its end: over 3 % of t the radius falls from 0.1 to 0.003 mm.
+        // A spline G5 that almost stops near its end: over 3 % of t the radius falls from 0.1 to 0.003 mm.
         let control = [[0.0, 0.0], [0.50544, -5.36786], [-3.034, -1.79], [-2.97309, -1.99609]];
         let piece = Piece::<2, 8>::new(&control, &[], None);
         let Some(chord) = ChordLimit::new(0.01, 0.004, 6000.0) else { panic!("a limit") };

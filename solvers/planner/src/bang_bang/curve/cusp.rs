@@ -1,10 +1,10 @@
-//! The cusps of a piece: points t₀ where every axis that moves is at rest within rounding, C' = (t − t₀)^r · a
-//! vector.
+//! Finds the cusps of a piece: points t₀ where the tangents of all moving axes are 0 within rounding, C' ≈ (t − t₀)^r ·
+//! a constant vector.
 //!
-//! Control points are rounded, so tangents are known to a fraction of their greatest magnitude only. Around a cusp of
-//! order r this leaves an interval, as wide as about the r-th root of that fraction, on which the tangents have no
-//! digits: axes may seem to turn or not. The distance through it is as short as rounding. So the interval is treated
-//! as one point where all axes have a zero of order r.
+//! Control points are rounded, so tangents are known to a fraction of their greatest magnitude only. Around a cusp of order r
+//! there is an interval, about as wide as the r-th root of that fraction, in which no digit of the tangents is correct: axes may
+//! seem to turn or not. The path through this interval is as short as rounding errors. So the interval is treated as one point
+//! where all axes have a zero of order r.
 
 use super::piece::Piece;
 use crate::bang_bang::tolerance::SLOW_SQ;
@@ -15,14 +15,14 @@ use feedplan_geometry::polynomial::Polynomial;
 const MAX_DEPTH: u32 = 52;
 /// Greatest number of intervals examined on one piece.
 const MAX_INTERVALS: u32 = 4000;
-/// At this many half widths from the interval the tangents have signs.
+/// At a distance of this many half widths from the interval, the signs of the tangents are certain.
 const AWAY: f64 = 10.0;
-/// An interval that needs this many halvings until some axis shows no zero in it is next to a cusp.
+/// An interval that needs at least this many halvings until some axis certainly has no zero in it is a near cusp.
 const NEAR_DEPTH: u32 = 8;
-/// At a cusp of order r the derivatives below r make up less than this fraction of the tangents nearby.
+/// At a cusp of order r, every Taylor term of the tangents of lower order is at most this fraction of the term of order r.
 const LOWER: f64 = 0.3;
 
-/// All axes rest at `t`; within `reach` of `t` the tangents have no digits.
+/// All axes rest at `t`; within `reach` of `t` no digit of the tangents is correct.
 #[derive(Clone, Copy, Debug)]
 pub struct Cusp {
     pub t: f64,
@@ -43,7 +43,7 @@ struct Search<'a, const M: usize> {
 #[derive(Default)]
 pub struct Cusps {
     pub cusps: Vec<Cusp>,
-    /// There the tangents are so short that polynomials over the whole piece lose their small differences.
+    /// Here the tangents are so short that polynomials over the whole piece do not resolve their small differences.
     pub near_cusps: Vec<NearCusp>,
 }
 
@@ -72,7 +72,7 @@ pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBi
     }
     let cusps: Vec<Cusp> =
         intervals.into_iter().filter_map(|interval| locate(piece, moving, interval)).collect();
-    // Of neighbours the shortest interval is kept.
+    // Of adjacent intervals the shortest is kept.
     let mut near_cusps: Vec<(f64, f64, u32)> = vec![];
     let mut reached = 0.0;
     for interval in search.near_cusps {
@@ -92,7 +92,7 @@ pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBi
 }
 
 impl<const M: usize> Search<'_, M> {
-    /// Collects the intervals on which every axis is at rest within rounding.
+    /// Collects the intervals on which every axis is at rest within rounding, and the near cusps.
     fn halve<const C: usize>(&mut self, g: &[Polynomial<C>; M], (from, to): (f64, f64), depth: u32) {
         let moving = self.moving;
         let mut axes = (0..M).filter(|k| moving >> k & 1 == 1);
@@ -144,7 +144,8 @@ fn locate<const M: usize, const C: usize>(
         })
     };
     let size = |rates: &[f64; M]| rates.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // The zero of derivative r − 1; below, the share of each derivative in the tangents at the ends of the interval.
+    // `zero_of(r)`: the zero of derivative r − 1, by three Newton steps. `share(r, t)`: the Taylor term of order r of the
+    // tangents around t, at the ends of the interval.
     let zero_of = |r: usize| {
         let mut t = middle;
         if middle != 0.0 && middle != 1.0 {

@@ -14,7 +14,7 @@ pub struct Axes<const M: usize> {
 }
 
 impl<const M: usize> Axes<M> {
-    /// The squares of the velocity limits of axis k: one if both are equal.
+    /// The squares of the velocity limits of axis k [mm²/s²]; only one if both are equal.
     pub fn velocities_sq(&self, k: usize) -> impl Iterator<Item = f64> + Clone + '_ {
         let count = if self.velocity_sq[0][k] == self.velocity_sq[1][k] { 1 } else { 2 };
         self.velocity_sq[..count].iter().map(move |side| side[k])
@@ -26,9 +26,9 @@ impl<const M: usize> Axes<M> {
 pub enum Cap {
     /// v² [mm²/s²], linear in t between the ends: the feed, or a line of the chord-error limit.
     Speed([f64; 2]),
-    /// The square of the feed, where the axes contribute to the feed by shares.
+    /// The square of the feed [mm²/s²], where the axes count towards the feed with factors (`Piece::share`).
     Feed(f64),
-    /// The square of the velocity limit of an axis.
+    /// An axis, and the square of its velocity limit [mm²/s²].
     Axis(usize, f64),
 }
 
@@ -40,7 +40,7 @@ pub struct Part {
     pub cap: Cap,
     pub left: End,
     pub right: End,
-    /// Bit k: axis k moves backward; axis k moves at all.
+    /// Bit k of `negative`: axis k moves backward. Bit k of `moving`: axis k moves.
     pub negative: AxisBits,
     pub moving: AxisBits,
 }
@@ -50,7 +50,7 @@ pub struct Part {
 pub struct End {
     /// Bit k: axis k turns there.
     pub turns: AxisBits,
-    /// All axes have a zero of this order.
+    /// The tangents of all axes have a zero of this order; 0: no cusp.
     pub order: u8,
     /// Rounding may have moved the zeros this far from the end.
     pub reach: f64,
@@ -59,7 +59,7 @@ pub struct End {
 }
 
 impl End {
-    /// Whether axis k has a zero there.
+    /// Whether the tangent of axis k is 0 there.
     fn is_cut_for(&self, k: usize) -> bool {
         self.order > 0 || self.turns >> k & 1 == 1
     }
@@ -76,7 +76,7 @@ pub struct Remedy {
     pub stops: bool,
 }
 
-/// Limits of the axes on a sub-piece, where every axis moves forward.
+/// Limits of the axes on a sub-piece, in the direction of their motion.
 #[derive(Clone, Copy, Debug)]
 pub struct TravelLimits<const M: usize> {
     /// The greatest acceleration and the greatest deceleration [mm/s²].
@@ -86,7 +86,7 @@ pub struct TravelLimits<const M: usize> {
 }
 
 impl<const M: usize> TravelLimits<M> {
-    /// The limits where the axes of the bits `negative` move backward on the path.
+    /// The limits on a part where the axes whose bits are set in `negative` move backward.
     #[inline(always)]
     fn new(axes: &Axes<M>, negative: AxisBits) -> Self {
         let side = |k: usize| usize::from(negative >> k & 1);
@@ -162,7 +162,8 @@ impl Part {
                 let reach = (end.reach / length).min(1.0);
                 for i in 0..=degree {
                     let index = if at_end { degree - i } else { i };
-                    // An axis that rounding, or a neighbouring turn, sends backward is set to rest.
+                    // A small negative coefficient comes from rounding or a neighbouring turn, and the axis would move backward:
+                    // it is set to 0.
                     let back = -g.coefficients()[index] * reach.powi(i as i32);
                     if i >= known && !(turns && back > 0.0 && back <= 64.0 * noise) {
                         break;
@@ -201,7 +202,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
         usize::from(self.cusp_orders[usize::from(at_end)])
     }
 
-    /// The sum of the axes' velocities squared over π at an end.
+    /// The sum of the squared axis velocities, divided by π, at an end.
     pub fn rate_sq(&self, at_end: bool) -> f64 {
         let end = |p: &Polynomial<C>| if at_end { p.last() } else { p.first() };
         if self.own_speed {
@@ -211,7 +212,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
         }
     }
 
-    /// v² of the tip over the sum of the axes' velocities squared at an end; its limit where both are 0.
+    /// v² of the tip divided by the sum of the squared axis velocities at an end; the limit of this quotient where both are 0.
     pub fn tip_share(&self, at_end: bool) -> f64 {
         if self.own_speed || matches!(self.cap, Cap::Feed(_)) {
             return 1.0;

@@ -7,12 +7,12 @@
 //! | while | holds |
 //! |---|---|
 //! | on a phase of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w W_lj ≥ 0 |
-//! | and above −A_l⁻ (backward) | A_l⁻ g_j³ + A_j g_l g_j² + ω w W_lj ≥ 0 |
-//! | under a ceiling π ≤ n/d | n ω g_j² − w d ≥ 0 |
-//! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l⁻ g_j, W = W_jl | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
-//! | and axis i from −A_i⁻ to A_i | A_i W − (c_i N − g_i N') ≥ 0, A_i⁻ W + (c_i N − g_i N') ≥ 0 |
-//! | along v² = f | A_l D² − ω² ((c_l D − g_l D'/2) f + g_l D f'/2) ≥ 0 |
-//! | along v_k = V | A_l g_k³ − V² ω² W_lk ≥ 0 |
+//! | on a phase of axis j, axis l stays above −A_l⁻ (backward only) | A_l⁻ g_j³ + A_j g_l g_j² + ω w W_lj ≥ 0 |
+//! | a phase of axis j stays under a ceiling π ≤ n/d | n ω g_j² − w d ≥ 0 |
+//! | the pass stays on the limit curve π = N/(ω² W), N = A_j g_l + A_l⁻ g_j, W = W_jl | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
+//! | on it, axis i stays between −A_i⁻ and A_i | A_i W − (c_i N − g_i N') ≥ 0, A_i⁻ W + (c_i N − g_i N') ≥ 0 |
+//! | along a cap v² = f, axis l stays below +A_l | A_l D² − ω² ((c_l D − g_l D'/2) f + g_l D f'/2) ≥ 0 |
+//! | along a cap v_k = V, axis l stays below +A_l | A_l g_k³ − V² ω² W_lk ≥ 0 |
 
 mod bang;
 mod limit_curve;
@@ -24,7 +24,7 @@ use crate::bang_bang::tolerance::{AT_END, NO_STEP, ON_CEILING, ON_LIMIT_CURVE, W
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// Below this x, steps are compared with `NO_STEP` of this instead of x.
+/// A step from x counts if it is longer than `NO_STEP` times x, or times `START` where x is smaller.
 const START: f64 = 1e-6;
 /// Greatest number of switches in succession without a step.
 const MAX_HOPS: u32 = 10;
@@ -35,11 +35,11 @@ const MAX_SWITCHES: u32 = 2000;
 pub enum Law {
     /// This axis is at +A.
     Accelerating(usize),
-    /// This axis is at −A⁻; forward only, along a phase of K.
+    /// This axis is at −A⁻. Only in the forward pass, along a phase of K.
     Braking(usize),
     /// The speed of the cap.
     Cap,
-    /// The limit curve; backward only.
+    /// The limit curve. Only in the backward pass.
     LimitCurve,
 }
 
@@ -49,7 +49,7 @@ pub struct Phase {
     pub x0: f64,
     pub x1: f64,
     pub law: Law,
-    /// π at both ends, over x of the whole sub-piece; infinite at a cusp that the plan passes.
+    /// π at both ends, with respect to x of the whole sub-piece; it may be infinite at a cusp.
     pub pi: [f64; 2],
     /// The square of the control axis's velocity where the phase is slowest: at x0 of an accelerating phase, at x1 of
     /// a braking one.
@@ -60,16 +60,16 @@ pub struct Phase {
 #[derive(Clone, Copy, Debug)]
 pub struct Stuck(pub f64);
 
-/// A pass over the sub-piece from a sum of the axes' velocities squared, v² where the axes are the tool's: backward
-/// under its cap, forward under the phases of K, from the last to the first. Appends the phases and returns that sum
-/// at the end.
+/// One pass over the sub-piece, from the sum `speed_sq` of the squared axis velocities at its start [mm²/s²]. Without
+/// `controllable` it is the backward pass under the cap of the sub-piece, otherwise the forward pass under these phases of K,
+/// from the last to the first. Appends the phases and returns the sum of the squared axis velocities at the end.
 pub fn travel<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     speed_sq: f64,
     controllable: Option<&[Phase]>,
     out: &mut Vec<Phase>,
 ) -> Result<f64, Stuck> {
-    // A curve is at rest in its cusps.
+    // In a cusp all axes rest, and π has no finite value.
     let order = sub.cusp_order(false);
     let pi = if order == 0 { speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
@@ -105,7 +105,7 @@ pub fn travel<const M: usize, const C: usize>(
     Ok(speed_sq.max(0.0))
 }
 
-/// The distance [mm] of axis k from x0 to x1.
+/// The distance [mm] that axis k travels from x0 to x1.
 pub fn axis_distance<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     k: usize,
@@ -135,18 +135,19 @@ struct Pass<'a, const M: usize, const C: usize> {
     /// The pass goes backward.
     back: bool,
     window: Window<M, C>,
-    /// π over x of the window.
+    /// π with respect to x of the window.
     pi: f64,
     /// At the start of the window all tangents have a zero of this order; where it is positive, the axes rest.
     order: usize,
     straight: bool,
     out: &'a mut Vec<Phase>,
-    /// The axis that has just reached its limit, and bits of the axes whose accelerations equal its own.
+    /// The axis that has just reached its limit and becomes the control axis; the bits of the axes that are at their limits as
+    /// well.
     control: Option<usize>,
     tied: AxisBits,
     /// The axis at −A⁻ on the limit curve that has just been left.
     low: Option<usize>,
-    /// The ceiling or the limit curve was left along its tangent; the ceiling is being left.
+    /// `tangent`: the pass leaves the ceiling or the limit curve along its tangent. `leaving`: the pass leaves the ceiling.
     tangent: bool,
     leaving: bool,
     hops: u32,
@@ -188,7 +189,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                         self.window = Window::new(self.sub).part(x0, x1);
                     }
                     self.set_ceiling(phase);
-                    // From π over x of the sub-piece to that over x of the window.
+                    // From π with respect to x of the sub-piece to π with respect to x of the window.
                     self.pi /= self.window.length().powi(2);
                     self.over_window()?;
                 }
@@ -198,7 +199,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         Ok(())
     }
 
-    /// Whether the state is on a phase of K that begins with this π over x of the sub-piece.
+    /// Whether the state is on a phase of K that begins with this π, with respect to x of the sub-piece.
     fn is_on_phase(&self, pi: f64) -> bool {
         self.order == 0 && !self.leaving && pi.is_finite() && self.pi >= pi * (1.0 - ON_CEILING)
     }
@@ -210,7 +211,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
             Law::Accelerating(k) | Law::Braking(k) => {
                 let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
                 let gain = g.antiderivative(&weight, self.sub.degree);
-                // Seen by this pass the axis brakes.
+                // In the direction of the forward pass the axis brakes.
                 let w = weight.combine(phase.slow_sq, &gain, 2.0 * self.sub.limits.down[k]);
                 window.ceiling = Ceiling::Phase(k, w.reverse());
             }
@@ -222,7 +223,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         }
     }
 
-    /// To the end of the window; leaves π over x of the whole sub-piece.
+    /// Travels to the end of the window. After it, `pi` is with respect to x of the whole sub-piece.
     fn over_window(&mut self) -> Result<(), Stuck> {
         self.entering = true;
         for _ in 0..MAX_SWITCHES {
@@ -269,7 +270,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         }
     }
 
-    /// Lowers π to the ceiling, to the limits of axes that turn here, and backward to the limit curve.
+    /// Lowers π to the ceiling, to the limits of the axes that turn here and, in the backward pass, to the limit curve.
     fn enter(&mut self, start: &Start<M>) {
         if self.order > 0 {
             return;
@@ -314,7 +315,8 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         }
     }
 
-    /// Appends a phase to t of the window and drops what is before t. Without w, π at the end is that of the ceiling.
+    /// Appends the phase from the start of the window to t and moves the start of the window to t. With w = ω v_j², π at the
+    /// end is that of the phase, otherwise that of the ceiling.
     fn push(&mut self, t: f64, law: Law, w: Option<&Polynomial<C>>, slow_sq: f64) {
         let length = self.window.length();
         let scale = length * length;
@@ -330,7 +332,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                 _ => f64::INFINITY,
             };
         }
-        // π at the end, over x of the sub-piece.
+        // π at the end with respect to x of the sub-piece.
         let of_phase = w.and_then(|w| match law {
             Law::Accelerating(j) => {
                 let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
@@ -356,7 +358,8 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         self.order = 0;
     }
 
-    /// π at the end of the window if axis j turns there: the limit at which all other axes keep it.
+    /// π at the end of the window if axis j turns there: the greatest one that its deceleration limit allows, A_j⁻/(|c_j|
+    /// ω²).
     fn at_turn(&self, j: usize) -> Option<f64> {
         let slope = self.window.g[j].reverse().first_slope();
         (slope != 0.0).then(|| self.sub.limits.down[j] / (slope.abs() * self.window.weight.last().powi(2)))
@@ -370,7 +373,7 @@ struct Earliest<S> {
 }
 
 impl<S> Earliest<S> {
-    /// Keeps an end that is earlier.
+    /// Replaces the end if `t` is earlier.
     #[inline(always)]
     fn offer(&mut self, t: Option<f64>, switch: S) {
         if let Some(t) = t.filter(|&t| t < self.t) {
@@ -378,7 +381,7 @@ impl<S> Earliest<S> {
         }
     }
 
-    /// What was found, without an end that is hardly before that of the window.
+    /// The end and its switch. An end within `AT_END` of the end of the window counts as the end of the window, without a switch.
     fn found(self) -> (f64, Option<S>) {
         if self.t > 1.0 - AT_END && self.t < 1.0 {
             return (1.0, None);
@@ -387,8 +390,9 @@ impl<S> Earliest<S> {
     }
 }
 
-/// Where a test first fails by more than rounding. `size` gives the magnitude of its rounding. `known` roots at 0 are
-/// divided out; without known roots, a start that fails by less than `slack` passes.
+/// The first t at which the polynomial `test` falls below 0 by more than rounding; None if it does not. `size` gives the rounding
+/// errors of its coefficients. `known` roots at t = 0 are divided out first; then a value at t = 0 between −`slack` and 0
+/// counts as 0.
 #[inline(always)]
 fn first_failure<const C: usize>(
     test: &Polynomial<C>,

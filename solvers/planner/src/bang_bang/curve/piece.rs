@@ -13,21 +13,21 @@ pub struct Piece<const M: usize, const C: usize> {
     pub weight: Polynomial<C>,
     /// D: v² of the tool is D π.
     pub speed: Polynomial<C>,
-    /// By axis: the error of g by rounding, of the control points and of the computation.
+    /// Rounding error of g for each axis, from the rounded control points and from the computation.
     pub noise: [f64; M],
     /// Degree of the curve.
     pub degree: usize,
-    /// All tangents have one direction.
+    /// Whether all tangents have one direction.
     pub straight: bool,
-    /// D = |g|²: the axes are the tool's.
+    /// Whether D = |g|²: the axes are those of the tool.
     pub own_speed: bool,
-    /// The factors of the axes in the speed that the feed limits, if that is not the tool's.
+    /// The factor of each axis's velocity in the speed that the feed limits; None if that speed is the tool's.
     pub share: Option<[f64; M]>,
 }
 
 impl<const M: usize, const C: usize> Piece<M, C> {
-    /// From control points, weights (empty: polynomial) and, for joints, the Bernstein coefficients of |C'|² of the
-    /// tip with a factor.
+    /// From control points, weights (empty: polynomial) and, for joints, the Bernstein coefficients of |C'|² of the tip and a
+    /// factor for them.
     pub fn new(control: &[[f64; M]], weights: &[f64], speed_sq: Option<(&[f64], f64)>) -> Self {
         let degree = control.len() - 1;
         let rational = weights.iter().any(|&weight| weight != weights[0]);
@@ -67,7 +67,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed, share: None }
     }
 
-    /// The square of the speed that the feed limits, over π, if that is not D.
+    /// The square of the speed that the feed limits, divided by π; None if that is D.
     pub fn feed_rate(&self) -> Option<Polynomial<C>> {
         self.share.map(|share| weighted_speed_sq(&self.g, &share))
     }
@@ -103,7 +103,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
     }
 }
 
-/// The sum of the squares of the tangents times their factors.
+/// The sum of the squares (share_k g_k)².
 pub fn weighted_speed_sq<const M: usize, const C: usize>(
     g: &[Polynomial<C>; M],
     share: &[f64; M],
@@ -111,7 +111,7 @@ pub fn weighted_speed_sq<const M: usize, const C: usize>(
     Polynomial::sum_of_squares(&std::array::from_fn::<_, M, _>(|k| g[k].scale(share[k])))
 }
 
-/// The tangents with exactly one direction, if they have one within rounding.
+/// If all tangents have the same direction within rounding: the tangents with exactly that direction. Otherwise None.
 fn straight_line<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Option<[Polynomial<C>; M]> {
     let tangent = |i: usize| -> [f64; M] { std::array::from_fn(|k| g[k].bernstein(i)) };
     let tangents = || (0..g[0].degree() + 1).map(tangent);

@@ -11,7 +11,7 @@ use crate::problem::{greater, TIP_AXES};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// Greatest ratio of a weight to those at the ends of a part.
+/// Greatest ratio of a weight inside a part to the weights at its ends.
 const UNEVEN: f64 = 100.0;
 /// A near cusp needs no cut of its own if there is a cut, or a cusp, within this many times its reach.
 const AROUND: f64 = 4.0;
@@ -43,7 +43,7 @@ impl Cut {
         Self { t, end: End { turns, reach: SAME_TURN, ..End::default() } }
     }
 
-    /// Adds the purposes of another cut at the same t.
+    /// Adds the turns, order, reach and stop of another cut at the same t.
     fn join(&mut self, other: &Self) {
         self.end.turns |= other.end.turns;
         self.end.order = self.end.order.max(other.end.order);
@@ -58,8 +58,8 @@ impl From<&Remedy> for Cut {
     }
 }
 
-/// Appends the parts of the piece from left to right. `tip` is the piece of the tip, where it is another one; `cuts`
-/// is memory.
+/// Appends the parts of the piece from left to right. `tip` is the tip's own piece, where the axes are joints; `cuts` is working
+/// memory.
 pub fn split<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     tip: Option<&Piece<TIP_AXES, C>>,
@@ -81,7 +81,7 @@ pub fn split<const M: usize, const C: usize>(
         _ => {}
     }
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
-    // An axis of the tool's own is never faster than the tool.
+    // Where the axes are those of the tool, no axis is faster than the tool.
     let can_cap = (0..M).fold(0, |bits, k| {
         let slow = piece.own_speed && axes.velocities_sq(k).all(|v_sq| v_sq >= most_sq);
         bits | AxisBits::from(!slow && moving >> k & 1 == 1) << k
@@ -153,7 +153,7 @@ fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut 
     moving
 }
 
-/// Cuts where the tool is at rest, or nearly. Around a cusp the cut at which all axes turn replaces all others.
+/// Cuts at the cusps and near cusps. The cut at a cusp, where all axes turn, replaces all other cuts around it.
 fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBits, cuts: &mut Vec<Cut>) {
     let Cusps { cusps, near_cusps } = cusps(piece, moving);
     for NearCusp { t, reach } in near_cusps {
@@ -177,7 +177,7 @@ fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: Axi
     }
 }
 
-/// Joins all cuts within the remedy's reach.
+/// Joins all cuts within the remedy's reach into one.
 fn join_around(remedy: &Remedy, cuts: &mut Vec<Cut>) {
     let mut all = Cut::from(remedy);
     cuts.retain(|cut| {
@@ -233,7 +233,8 @@ fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &
     cuts.extend(turns);
 }
 
-/// Halves until no weight is much greater than those at the ends, from which integrals are computed.
+/// Halves the interval until no weight exceeds the weights at its ends by more than a factor of `UNEVEN`: integrals are computed
+/// from the weights at the ends.
 fn cut_by_weight<const C: usize>(weight: &Polynomial<C>, (from, to): (f64, f64), cuts: &mut Vec<Cut>) {
     if weight.range().1 <= UNEVEN * weight.first().min(weight.last()) {
         return;
@@ -245,7 +246,7 @@ fn cut_by_weight<const C: usize>(weight: &Polynomial<C>, (from, to): (f64, f64),
     cut_by_weight(&right, (middle, to), cuts);
 }
 
-/// Cuts where two caps cross on a line; returns the axes that can be faster than their limits.
+/// Cuts where two caps cross on the interval of a speed line; returns the axes that can be faster than their limits.
 fn cut_by_cap<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     axes: &Axes<M>,
@@ -260,13 +261,13 @@ fn cut_by_cap<const M: usize, const C: usize>(
     let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
     let speed = on_line(&piece.speed);
     let [f0, f1] = line.speed_sq;
-    // The tool is never faster than all its axes at their limits.
+    // The speed line does not matter where it is above the speed of the tool with all axes at their velocity limits.
     let binds = !piece.own_speed || f0.min(f1) < greater(&axes.velocity_sq).iter().sum();
     let speed_sq =
         if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
     let finite = f0.is_finite() && f1.is_finite();
     let feed = feed.map(|(rate, feed_sq)| (on_line(rate), *feed_sq));
-    // The cuts serve the limits of both directions; each part chooses its own later.
+    // Cuts for the velocity limits of both directions; `lowest_cap` uses the limit of the direction in which the axis moves.
     for k in (0..M).filter(|&k| can_cap >> k & 1 == 1) {
         for v_sq in axes.velocities_sq(k).filter(|&v_sq| v_sq < f64::MAX) {
             let square = || on_line(&piece.g[k].multiply(&piece.g[k]));
@@ -302,8 +303,8 @@ fn cut_by_cap<const M: usize, const C: usize>(
     fast
 }
 
-/// The zeros at which a polynomial changes its sign by more than rounding. Between the two zeros that rounding makes
-/// of a double root it does not.
+/// Calls `cut` at the zeros where a polynomial changes its sign by more than rounding. Rounding may turn a double root into two
+/// zeros, between which the polynomial is 0 within rounding: these are left out.
 fn crossings<const C: usize>(p: &Polynomial<C>, cut: &mut impl FnMut(f64)) {
     let mut roots: Vec<f64> = vec![];
     p.sign_changes(&mut |t| {

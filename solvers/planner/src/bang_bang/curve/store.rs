@@ -1,5 +1,5 @@
-//! The sub-pieces of a run, kept from the backward pass for the forward one, in memory by their own degree rather
-//! than by the capacity of their polynomials.
+//! Stores the sub-pieces of a run from the backward pass for the forward pass. Each takes the memory of its own degree, not that
+//! of the capacity of its polynomials.
 
 use super::part::{Axes, Part, SubPiece};
 use feedplan_geometry::polynomial::Polynomial;
@@ -11,7 +11,7 @@ pub struct Store {
     entries: Vec<Entry>,
 }
 
-/// The start of its coefficients, and what its part does not say.
+/// A stored sub-piece: the index of its first coefficient, and the data that its part does not contain.
 struct Entry {
     start: usize,
     /// Degrees of the tangents, the weight, the speed and the curve.
@@ -41,7 +41,7 @@ impl Store {
         }
     }
 
-    /// Removes the last sub-piece; `part` is its part.
+    /// Removes the last sub-piece and returns it; `part` is the part from which it was made.
     pub fn pop<const M: usize, const C: usize>(&mut self, part: &Part, axes: &Axes<M>) -> SubPiece<M, C> {
         let entry = self.entries.pop().expect("each part has a sub-piece");
         let [tangent, weight, speed, degree] = entry.degrees.map(usize::from);

@@ -1,5 +1,5 @@
-//! The window of a pass: what is left of a sub-piece ahead of it under one ceiling. Tangents, weight, D and the
-//! ceiling are polynomials over x in [0, 1] of the window; the state of the pass is at x = 0.
+//! The window of a pass: the rest of a sub-piece ahead of the pass, under one ceiling. Tangents, weight, D and the ceiling are
+//! polynomials over x in [0, 1] of the window; the state of the pass is at x = 0.
 
 use super::part::{Cap, SubPiece};
 use feedplan_geometry::polynomial::Polynomial;
@@ -11,7 +11,7 @@ pub enum Ceiling<const C: usize> {
     Speed(Polynomial<C>),
     /// The velocity of this axis squared is at most this [mm²/s²].
     Axis(usize, f64),
-    /// Forward: a phase of K, on which axis k brakes, with ω v_k².
+    /// Forward: a phase of K on which this axis k brakes, with the polynomial ω v_k².
     Phase(usize, Polynomial<C>),
     /// Forward: the backward pass followed the limit curve, which no forward phase reaches.
     LimitCurve,
@@ -24,7 +24,7 @@ pub struct Window<const M: usize, const C: usize> {
     pub weight: Polynomial<C>,
     pub speed: Polynomial<C>,
     pub ceiling: Ceiling<C>,
-    /// π on the ceiling at both ends, over x of the sub-piece, if the backward pass has left it.
+    /// π of the ceiling at both ends, with respect to x of the sub-piece, where the backward pass has computed it.
     pub known: [Option<f64>; 2],
     pub x0: f64,
     pub x1: f64,
@@ -42,13 +42,13 @@ impl<const M: usize, const C: usize> Window<M, C> {
         Self { g: sub.g, weight: sub.weight, speed: sub.speed, ceiling, known: [None; 2], x0: 0.0, x1: 1.0 }
     }
 
-    /// Its length in x of the sub-piece.
+    /// The length of the window in x of the sub-piece.
     #[inline(always)]
     pub fn length(&self) -> f64 {
         self.x1 - self.x0
     }
 
-    /// The part [x0, x1] of the window that is a whole sub-piece under its cap.
+    /// The part [x0, x1] of this window, which must be a whole sub-piece under its cap.
     pub fn part(&self, x0: f64, x1: f64) -> Self {
         let length = x1 - x0;
         let ceiling = match &self.ceiling {
@@ -66,7 +66,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         }
     }
 
-    /// Drops what is before t.
+    /// Moves the start of the window to t.
     pub fn leave_before(&mut self, t: f64) {
         let rest = 1.0 - t;
         for g in &mut self.g {
@@ -82,7 +82,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         self.x0 += t * self.length();
     }
 
-    /// The greatest π at the start; infinite for no limit.
+    /// π of the ceiling at the start, with respect to x of the window; infinite where there is no limit.
     pub fn ceiling_at_start(&self) -> f64 {
         if let Some(pi) = self.known[0] {
             return pi / self.length().powi(2);
@@ -100,7 +100,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         }
     }
 
-    /// The greatest π at the end, over x of the sub-piece.
+    /// π of the ceiling at the end, with respect to x of the sub-piece; infinite where there is no limit.
     pub fn ceiling_at_end(&self) -> f64 {
         self.known[1].unwrap_or_else(|| match self.quotient() {
             Some((n, d)) if d.last() > 0.0 => n.last() / d.last() * self.length().powi(2),
@@ -108,7 +108,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         })
     }
 
-    /// The ceiling n/d of π.
+    /// Numerator n and denominator d of the ceiling π ≤ n/d; None along the limit curve.
     pub fn quotient(&self) -> Option<(Polynomial<C>, Polynomial<C>)> {
         match &self.ceiling {
             Ceiling::Speed(f) => Some((*f, self.speed)),

@@ -30,8 +30,8 @@ pub struct Bang {
     pub switch: Switch,
 }
 
-/// The phase from (x, p). `control` is the axis that has just reached its limit, if any. `limit_curve` says whether
-/// the limit curve ends the phase; forward it does not, since K lies below it.
+/// The phase of greatest acceleration from (x, p). `control` is the axis that has just reached its limit, if any. `limit_curve`
+/// tells whether the limit curve ends the phase; in the forward pass it does not, since K lies below it.
 #[inline(always)]
 pub fn bang<const M: usize>(
     sub: &SubPiece<M>,
@@ -45,7 +45,7 @@ pub fn bang<const M: usize>(
     let s: [f64; M] = std::array::from_fn(|k| {
         let rest = axes.acceleration[k] - c[k] * p;
         if rest.abs() > FLAT * axes.acceleration[k] {
-            // An axis at rest (g_k = 0) is no control axis, whatever the sign of `rest`.
+            // With g_k = 0, s_k is infinite whatever the sign of `rest`: the axis is not the control axis.
             rest / g[k].abs()
         } else {
             0.0
@@ -67,7 +67,7 @@ pub fn bang<const M: usize>(
             j = axis;
         }
     }
-    // A tie passes control on without a step, at most M − 1 times.
+    // Between tied axes, control passes on without a step, at most M times.
     let mut ties = 0;
     loop {
         if s[j] == 0.0 {
@@ -123,9 +123,9 @@ pub fn bang<const M: usize>(
     }
 }
 
-/// Keeps p constant where axis k has just turned and p is a little below A_k/|c_k|: there s would be a difference
-/// without digits. The phase begins when the axis has some speed. Until then p loses less than the fraction
-/// `NEAR_TURN`, and soon regains it.
+/// Keeps p constant where axis k has just turned and p is a little below A_k/|c_k|: there s would be a difference without correct
+/// digits. The phase of greatest acceleration begins when g_k is great enough. Until then p is too low by less than the fraction
+/// `NEAR_TURN`.
 #[cold]
 fn hold<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, x: f64, p: f64) -> Option<Bang> {
     if p > sub.flat {

@@ -1,4 +1,4 @@
-//! The limit curve of a quadratic sub-piece: the greatest p at which some s keeps every axis within its acceleration
+//! Computes the limit curve of a quadratic sub-piece: the greatest p at which some s keeps every axis within its acceleration
 //! limits. Zhang et al. 2010, equations 7 and 8, with absolute values.
 //!
 //! Two axes limit p to (A_j g_k + A_k g_j)/|W_jk|. W is constant, so this is a straight line, and the lowest pair
@@ -29,7 +29,7 @@ pub fn limit_curve<const M: usize>(
             }
         }
     }
-    // At a zero of g_k the limit is exactly A_k/|c_k|; the passes rely on the last bit there.
+    // At a zero of g_k the limit is exactly A_k/|c_k|; the passes rely on its last bit.
     let mut line = lowest?;
     for k in 0..M {
         for (value, g) in line.iter_mut().zip([g_start, g_end]) {

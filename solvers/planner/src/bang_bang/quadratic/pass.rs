@@ -12,15 +12,15 @@ use super::slide::slide;
 use super::subpiece::{Axes, SubPiece};
 use feedplan_geometry::bisection::boundary;
 
-/// More switches than on any sub-piece: at most M − 1 transitions lie between two slides, and a slide ends at one of
-/// few roots.
+/// Greatest number of switches, more than any sub-piece has: at most M − 1 transitions lie between two slides, and a slide ends
+/// at one of few roots.
 const MAX_SWITCHES: u32 = 300;
 
-/// The pass makes no headway at this x; never seen.
+/// The pass makes no headway at this x; this has not been observed.
 #[derive(Clone, Copy, Debug)]
 pub struct Stuck(pub f64);
 
-/// Backward over the reversed sub-piece from p: appends the phases of K and returns K at its far end.
+/// Backward pass over the reversed sub-piece, from p at its start: appends the phases of K and returns K at its end.
 #[inline(always)]
 pub fn backward<const M: usize>(
     sub: &SubPiece<M>,
@@ -43,15 +43,15 @@ pub fn backward<const M: usize>(
         line: OnceCell::new(),
     }
     .travel()?;
-    // The last phase stays as it is: forward, p begins below it.
+    // Only the returned p is lowered, not the end of the last phase: the forward pass begins below it.
     if p > sub.flat {
         p = p.min(axes.limit_at_turns(&sub.end, &sub.c));
     }
     Ok(p)
 }
 
-/// Forward over the sub-piece from p under the phases of K: appends the phases of the profile and returns p at the
-/// far end.
+/// Forward pass over the sub-piece under the phases of K, from p at its start: appends the phases of the profile and returns p at
+/// its end.
 #[inline(always)]
 pub fn forward<const M: usize>(
     sub: &SubPiece<M>,
@@ -82,12 +82,12 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         let mut index = 0;
         let mut ceiling = self.ceiling(index);
         let mut on_limit_curve = BACKWARD && self.meets_falling_limit_curve();
-        // The axis that has just reached its limit, and the number of roots that the phase and the ceiling share at
-        // x.
+        // `control`: the axis that has just reached its limit. `leaving`: the number of roots at x that the next phase and the
+        // ceiling share, where the pass leaves a cap.
         let mut control = None;
         let mut leaving = None;
         let mut slack = 0;
-        // The number of roots that the limit curve and the cap share at x.
+        // The number of roots at x that the limit curve and the cap share.
         let mut line_contact = 0;
         for _ in 0..MAX_SWITCHES {
             if self.x == length {
@@ -151,7 +151,8 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                         (slack, line_contact) = (0, 0);
                         continue;
                     }
-                    // Above the ceiling by no more than rounding: follow the ceiling a little further.
+                    // The phase rises above the ceiling by no more than rounding: follow the ceiling a little further, with more
+                    // slack.
                     Some(_) if on_ceiling => {
                         slack += 1;
                         if slack == SLACK.len() {
@@ -207,7 +208,8 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         (found.end, found.saturated, false)
     }
 
-    /// Where `phase` rises above the ceiling from its phase `index` on, and the ceiling there.
+    /// The first x at which `phase` rises above the ceiling, and p of the ceiling there; None if it does not. `index` is the
+    /// phase of the ceiling with which the search begins.
     #[inline(always)]
     fn crossing(&self, phase: &Phase, mut index: usize, mut contact: usize) -> Option<(f64, f64)> {
         let (sub, axes) = (self.sub, self.axes);
@@ -245,8 +247,8 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         }
     }
 
-    /// The same where the root has lost its digits, because g_k near 0 at `a` makes the curves too uneven for one
-    /// polynomial: doubles a step from `a`, then bisects.
+    /// Finds the x and p of `crossing` where its root is inaccurate, because g_k near 0 at `a` makes the curves too uneven for
+    /// one polynomial: doubles a step from `a` until the phase is above the ceiling, then bisects.
     #[cold]
     fn search(&self, phase: &Phase, ceiling: &Phase, a: f64, b: f64) -> Option<(f64, f64)> {
         let above = |x: f64| phase.at(self.sub, self.axes, x) > ceiling.at(self.sub, self.axes, x);
@@ -264,7 +266,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         Some((x, ceiling.at(self.sub, self.axes, x)))
     }
 
-    /// Lowers p to the limit curve at the start; says whether the limit curve has to be followed.
+    /// Lowers p to the limit curve at the start; returns whether the limit curve has to be followed.
     #[inline(always)]
     fn meets_falling_limit_curve(&mut self) -> bool {
         if self.p <= self.sub.flat * (1.0 - ON_LIMIT_CURVE) {
@@ -283,7 +285,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         }
     }
 
-    /// Follows the limit curve to the end of the sub-piece or to where the cap is lower; says whether that is a step.
+    /// Follows the limit curve to the end of the sub-piece or to where the cap becomes lower; returns whether the pass has moved.
     #[cold]
     fn follow_limit_curve(&mut self, cap: &Phase, contact: usize) -> bool {
         let Some(line) = self.limit_curve() else { return false };

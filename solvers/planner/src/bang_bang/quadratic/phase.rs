@@ -10,7 +10,7 @@ pub enum Law {
     Accelerating(u8),
     /// This axis is at −A, a phase of the backward pass seen forward; p is computed from the end of the phase.
     Braking(u8),
-    /// p; this axis is at its acceleration limit.
+    /// p is constant; this axis is at its acceleration limit.
     Flat(u8),
     /// The speed of the cap.
     Cap,
@@ -29,7 +29,7 @@ pub struct Phase {
 }
 
 impl Phase {
-    /// The phase as the opposite pass sees it.
+    /// The phase in the direction of the opposite pass.
     #[inline(always)]
     pub fn reversed(&self, length: f64) -> Self {
         let law = match self.law {

@@ -15,7 +15,7 @@ pub fn bernstein<const N: usize>(coefficients: [f64; N]) -> Quartic {
     Polynomial::from_bernstein(coefficients.into_iter())
 }
 
-/// What a numerator is divided by; on one sub-piece, equal names mean equal denominators.
+/// The name of a denominator; on one sub-piece, equal names mean equal denominators.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Denominator {
     One,

@@ -1,4 +1,4 @@
-//! How far a cap can be followed before an axis would need more than its acceleration limit.
+//! Computes how far a cap can be followed before an axis would need more than its acceleration limit.
 //!
 //! Along a cap every acceleration is a function of x alone:
 //!
@@ -44,7 +44,7 @@ fn at_speed<const M: usize>(
     let d = sub.speed_form(a, b);
     let least = d[0].min(d[1]).min(d[2]).max(0.0);
     let mut found = Slide { end: b, saturated: None, low: false };
-    // The whole acceleration is v²/ρ with ρ = D^1.5/|C' × C''|.
+    // The magnitude of the acceleration is v²/ρ with ρ = D^1.5/|C' × C''|.
     if speed_sq * sub.cross <= axes.least * least * least.sqrt() {
         return found;
     }
@@ -119,7 +119,7 @@ fn at_sloped_speed<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, a: f64, b:
     found
 }
 
-/// Keeps the earliest end.
+/// Replaces the end if x is earlier.
 #[inline(always)]
 fn stop_at(found: &mut Slide, x: f64, axis: usize) {
     if x < found.end || (x == found.end && found.saturated.is_none()) {

@@ -12,11 +12,11 @@ use crate::AxisBits;
 use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::dot;
 
-/// Distance of the tangents of the chord-error limit; see `ChordLimit::lines_below`.
+/// Spacing of the tangents to the chord-error limit; see `ChordLimit::lines_below`.
 const STEP: f64 = 0.03;
 
 impl ChordLimit {
-    /// Whether the limit can bind on the piece.
+    /// Whether the limit may be lower than the feed and the acceleration limits somewhere on the piece.
     fn binds<const M: usize>(&self, piece: &Piece<M>, feed_sq: f64) -> bool {
         let least = piece.least_speed_sq();
         let least_cube = least * least.sqrt();
@@ -106,7 +106,7 @@ impl Tangent {
 /// A part of a piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
-    /// The marks of its monotone part, and its ends as fractions of that.
+    /// The ends of the monotone part that contains it, and its own ends as fractions of that.
     marks: [Mark; 2],
     from: f64,
     to: f64,
@@ -146,7 +146,7 @@ impl Part {
                 _ => monotone.begin + share * monotone.length,
             };
             (from, to) = (t_at(self.from), t_at(self.to));
-            // By rounding, an axis that does not turn may have the wrong sign.
+            // Rounding may give the tangent of an axis that does not turn the wrong sign.
             let tangent = |share: f64| reflect(&monotone.piece.tangent(share)).map(|value| value.max(0.0));
             ends = [tangent(self.from), tangent(self.to)];
         }
@@ -159,7 +159,7 @@ impl Part {
     }
 }
 
-/// Cuts pieces, with the memory for it.
+/// Cuts pieces into parts; holds the working memory for it.
 #[derive(Default)]
 pub struct Splitter {
     lines: Vec<SpeedLine>,
@@ -238,7 +238,8 @@ impl Splitter {
         }
     }
 
-    /// Cuts a monotone part where another cap becomes the lowest along a line, and names the lowest cap of each part.
+    /// Cuts a monotone part, on the interval of a speed line, where another cap becomes the lowest, and sets the lowest cap of
+    /// each part.
     fn cut_by_cap<const M: usize>(&mut self, monotone: &Piece<M>, limits: &Limits<M>, line: &SpeedLine) {
         let (axes, fast) = (limits.axes, limits.fast);
         let cuts = &mut self.cuts;
@@ -287,7 +288,7 @@ impl Splitter {
             }
             let speed = |from: f64| Cap::Speed([line.at(from), line.at(to)]);
             match self.parts.last_mut() {
-                // The same cap goes on.
+                // The part before has the same cap and is extended.
                 Some(part) if part.to == from && part.from >= line.from && part.cap.goes_on(cap) => {
                     part.to = to;
                     part.cap = cap.unwrap_or(speed(part.from));
@@ -316,7 +317,7 @@ fn excess<const M: usize>(piece: &Piece<M>, k: usize, velocity_sq: f64, speed_sq
     std::array::from_fn(|i| speed_sq * g_sq[i] - velocity_sq * piece.speed[i])
 }
 
-/// Whether axis k could be faster than V anywhere at this speed.
+/// Whether axis k could be faster than V somewhere on the piece at the speed v.
 #[inline(always)]
 fn too_fast<const M: usize>(piece: &Piece<M>, k: usize, velocity_sq: f64, speed_sq: f64) -> bool {
     excess(piece, k, velocity_sq, speed_sq).iter().any(|&value| value > 0.0)

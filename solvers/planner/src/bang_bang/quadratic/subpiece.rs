@@ -9,7 +9,7 @@ use crate::bang_bang::tolerance::NEAR_TURN;
 use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::quadratic::dot;
 
-/// The limits of the axes, and numbers that the passes often need.
+/// The limits of the axes, and values computed from them.
 pub struct Axes<const M: usize> {
     /// A_k [mm/s²].
     pub acceleration: [f64; M],
@@ -58,12 +58,12 @@ pub enum Cap {
 }
 
 impl Cap {
-    /// Whether it is this cap of an axis; None stands for the tool's speed.
+    /// Whether this cap is the given cap of an axis; None stands for any cap of the tool's speed.
     pub fn goes_on(&self, axis: Option<Self>) -> bool {
         axis.map_or(matches!(self, Self::Speed(_)), |cap| *self == cap)
     }
 
-    /// The cap as the opposite pass sees it.
+    /// The cap in the direction of the opposite pass.
     #[inline(always)]
     pub fn reversed(self) -> Self {
         match self {
@@ -157,7 +157,7 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         std::array::from_fn(|k| factor * sign[k] * self.wronskian[j][k])
     }
 
-    /// The cap at x.
+    /// p of the cap at x.
     #[inline(always)]
     pub fn cap_at(&self, x: f64) -> f64 {
         match self.cap {
@@ -169,7 +169,7 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         }
     }
 
-    /// v² of the cap of the tool's speed.
+    /// v² of the cap at x if it is one of the tool's speed, else infinity.
     #[inline(always)]
     pub fn speed_sq_of_cap(&self, x: f64) -> f64 {
         match self.cap {
@@ -219,7 +219,7 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         }
     }
 
-    /// A lower estimate of the cap on [a, b] from its values at the ends.
+    /// A lower bound of p of the cap on [a, b] from its values at the ends.
     #[inline(always)]
     pub fn lowest_cap(&self, at_a: f64, at_b: f64) -> f64 {
         match self.cap {

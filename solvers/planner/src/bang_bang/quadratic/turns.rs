@@ -1,8 +1,7 @@
-//! The turns of the axes of a quadratic piece, and the tangents there to the last digits.
+//! Finds the turns of the axes of a quadratic piece, and the tangents there to full precision.
 //!
-//! Next to a cusp several axes turn so close together that differences of t and of tangents keep no digits. The
-//! constants W_jk give all that is needed: where axis a turns, g_k = W_ak/c_a, and axis b turns −W_ab/(c_a c_b) after
-//! it.
+//! Next to a cusp several axes turn so close together that differences of t and of tangents have no correct digits. The constants
+//! W_jk give all that is needed: where axis a turns, g_k = W_ak/c_a, and axis b turns −W_ab/(c_a c_b) after it.
 
 use super::piece::Piece;
 use feedplan_geometry::quadratic::dot;
@@ -11,12 +10,12 @@ use feedplan_geometry::quadratic::dot;
 pub type Mark = u8;
 pub const EDGE: Mark = 255;
 
-/// What lies between two neighbouring turns of a piece.
+/// The part of a piece between two neighbouring turns, or a turn and an edge.
 pub struct MonotonePart<const M: usize> {
     pub begin: f64,
     pub end: f64,
     pub length: f64,
-    /// Its tangents as those of a piece; exactly 0 for an axis that turns.
+    /// The part as a piece over [0, 1]; the tangent of an axis that turns at an end is exactly 0 there.
     pub piece: Piece<M>,
 }
 
@@ -40,7 +39,7 @@ impl<const M: usize> Piece<M> {
         (order, count)
     }
 
-    /// Distance in t from the turn of axis a to the turn of axis b.
+    /// Distance in t from the turn of axis a to the turn of axis b; negative if b turns first.
     fn distance(&self, a: usize, b: usize) -> f64 {
         let c = |k: usize| self.right[k] - self.left[k];
         -self.wronskian[a][b] / (c(a) * c(b))

@@ -15,7 +15,7 @@ enum Switch {
 }
 
 impl<const M: usize, const C: usize> Pass<'_, M, C> {
-    /// The control axis, s = π'/2, bits of the axes tied with it, and whether it turns here.
+    /// The control axis, s = π'/2, the bits of the axes tied with it, and whether it turns here; None if no axis limits s.
     pub(super) fn control_axis(&self, start: &Start<M>) -> Option<(usize, f64, AxisBits, bool)> {
         let (mut s, mut rests) = ([f64::INFINITY; M], [0.0; M]);
         let mut turns = 0;
@@ -52,7 +52,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                 continue;
             }
             tied |= 1 << k;
-            // Of tied axes the one whose s_k falls fastest takes control.
+            // Of tied axes, the one whose s_k falls fastest becomes the control axis.
             let slope = if turning(k) {
                 f64::INFINITY
             } else {
@@ -78,12 +78,12 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         let least = self.moving().filter(|&k| lead(k) > 0.0).map(ratio).fold(f64::INFINITY, f64::min);
         let tied = |k: usize| lead(k) > 0.0 && ratio(k) <= least * (1.0 + TIE);
         let bits = self.moving().filter(|&k| tied(k)).fold(0, |bits, k| bits | 1 << k);
-        // Among tied axes a switch without a step will tell the right one.
+        // If this is the wrong one of the tied axes, the next switch comes without a step and passes control to the right one.
         let j = self.control.filter(|&k| tied(k)).or_else(|| self.moving().find(|&k| tied(k)))?;
         Some((j, bits))
     }
 
-    /// Along a phase of greatest acceleration to the switch that ends it.
+    /// Travels a phase of greatest acceleration up to the switch that ends it.
     pub(super) fn accelerate(&mut self, start: &Start<M>, on_ceiling: bool) -> Result<(), Stuck> {
         let order = self.order;
         let (j, mut tied, turns) = if order > 0 {
@@ -174,8 +174,8 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         Ok(())
     }
 
-    /// Whether axis l certainly stays below +A_l and above −A_l⁻ while axis j is at +A with w = v_j², without the
-    /// polynomials of the tests. Forward nothing falls below −A_l⁻.
+    /// Whether axis l certainly stays below +A_l, and whether it certainly stays above −A_l⁻, while axis j is at +A_j with w
+    /// = v_j². Saves the polynomials of the tests. In the forward pass no axis falls below −A_l⁻.
     ///
     /// Axis l has the acceleration (A_j g_l + π W)/g_j with W = W_lj; its slope is 3 W (A_j g_j² − w c_j)/g_j⁴ + w
     /// W'/g_j³. On a quadratic, W and the bracket are constant, so the ends decide. On other polynomial pieces the
@@ -209,7 +209,8 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         ]
     }
 
-    /// Whether no motion within the limits can reach the cap: 2 A_k times its distance limits the growth of v_k².
+    /// Whether no motion within the limits can reach the cap in this window: v_k² grows by at most 2 A_k times the distance of
+    /// axis k.
     pub(super) fn cap_is_unreachable(&self) -> bool {
         let window = &self.window;
         let gain = |k: usize| 2.0 * self.sub.limits.up[k] * window.g[k].mean();
@@ -240,17 +241,18 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         }
     }
 
-    /// A switch at the start of a phase, without a step.
+    /// Handles a switch at the start of a phase, without a step.
     fn hop(&mut self, switch: Switch, j: usize, on_ceiling: bool) -> Result<(), Stuck> {
         self.hops += 1;
         if self.hops > MAX_HOPS {
             return Err(self.stuck());
         }
         match switch {
-            // Their accelerations will show whether the two are tied.
+            // The next phase finds out from the accelerations whether both axes are tied.
             Switch::Transition(l) => {
                 (self.control, self.tied) = (Some(l), 0);
-                // An axis that turns here cannot show it while π reaches its limit within a step too short to count.
+                // If axis l turns here and π would reach its limit A_l/(c_l ω²) within a step too short to count, π is set to
+                // that limit.
                 let g = &self.window.g[l];
                 let weight = self.window.weight.first();
                 let flat = self.sub.limits.up[l] / (g.first_slope() * weight * weight);
@@ -265,7 +267,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
             }
             Switch::Ceiling => {
                 if !on_ceiling {
-                    // The phase meets the ceiling at once.
+                    // The phase meets the ceiling at its start.
                     let ceiling = self.window.ceiling_at_start();
                     if self.order > 0 || self.pi < ceiling * (1.0 - NEARLY_ON_CEILING) {
                         return Err(self.stuck());
@@ -282,13 +284,13 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         Ok(())
     }
 
-    /// Forgets the contacts at the start of a step.
+    /// Resets what the pass has stored about contacts at its current state; called after each step.
     pub(super) fn after_step(&mut self) {
         (self.hops, self.control, self.tied, self.low) = (0, None, 0, None);
         (self.tangent, self.leaving) = (false, false);
     }
 
-    /// Where the phase of axis j with w = ω v_j² rises above the ceiling.
+    /// The first t of the window at which the phase of axis j with w = ω v_j² rises above the ceiling.
     fn first_crossing(&self, j: usize, w: &Polynomial<C>, turns: bool, on_ceiling: bool) -> Option<f64> {
         let window = &self.window;
         let square = || window.g[j].multiply(&window.g[j]);

@@ -1,4 +1,4 @@
-//! Along the limit curve, backward only: one axis at +A, one at −A⁻ (tests: table of `pass`).
+//! Follows the limit curve, only in the backward pass: one axis is at +A, another one at −A⁻ (tests: table of `pass`).
 
 use super::{first_failure, Earliest, Law, Pass};
 use crate::bang_bang::tolerance::{ON_CEILING, TEST};
@@ -19,7 +19,8 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         (g[l].combine(limits.up[j], &g[j], limits.down[l]), g[j].wronskian(&g[l]))
     }
 
-    /// Along the limit curve while no phase would leave it downward; returns whether that was a step.
+    /// Follows the limit curve until a phase leaves it downward, another pair of axes limits it, or it meets the ceiling. Returns
+    /// whether the pass has moved by a step.
     pub(super) fn follow_limit_curve(&mut self, (j, l): (usize, usize)) -> bool {
         let window = &self.window;
         let (up, down) = (&self.sub.limits.up, &self.sub.limits.down);
@@ -83,7 +84,7 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
                 }
             }
             self.push(first, Law::LimitCurve, None, 0.0);
-            // π at the end is that of the limit curve, or of the ceiling if that is met.
+            // π at the end is that of the limit curve, or that of the ceiling if the pass meets it there.
             if let Some(phase) = self.out.last_mut() {
                 if !matches!(switch, Some(Leave::Ceiling)) {
                     end = end.min(phase.pi[1]);

@@ -1,5 +1,5 @@
-//! Along the ceiling: a phase of K to its end, or the cap while no axis needs more than its acceleration (tests:
-//! table of `pass`).
+//! Follows the ceiling: a phase of K to its end, or the cap while no axis needs more than its acceleration limit (tests: table of
+//! `pass`).
 
 use super::{first_failure, Law, Pass};
 use crate::bang_bang::curve::part::Cap;
@@ -8,7 +8,7 @@ use crate::bang_bang::tolerance::TEST;
 use feedplan_geometry::polynomial::Polynomial;
 
 impl<const M: usize, const C: usize> Pass<'_, M, C> {
-    /// Follows the ceiling as far as possible; returns whether that was a step or led to the limit curve.
+    /// Follows the ceiling as far as possible; returns whether the pass has moved by a step or meets the limit curve.
     pub(super) fn follow_ceiling(&mut self) -> bool {
         let (end, saturated, pair) = match &self.window.ceiling {
             // Any other motion under a phase of K meets it again later.
@@ -82,7 +82,8 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         self.slide(&d_sq, &need, &size)
     }
 
-    /// Whether v²/ρ = v² |g × c|/D^1.5 is below the least acceleration limit.
+    /// Whether v²/ρ = v² |g × c|/D^1.5, the greatest acceleration along the cap, is certainly below the least acceleration
+    /// limit.
     fn curvature_is_low(&self, speed_sq: f64) -> bool {
         let g = &self.window.g;
         let mut cross_sq = 0.0;
@@ -109,9 +110,9 @@ impl<const M: usize, const C: usize> Pass<'_, M, C> {
         })
     }
 
-    /// How far the cap can be followed, where axis l has the acceleration `need`(l)/x with terms of magnitude
-    /// `size`(l). Also returns the axis that reaches its limit, or the axes of the limit curve where that falls below
-    /// the cap.
+    /// The t of the window up to which the cap can be followed, where axis l has the acceleration `need`(l)/x with terms of
+    /// magnitude `size`(l). Also returns the axis that reaches its limit there, or the two axes of the limit curve if that falls
+    /// below the cap there.
     fn slide(
         &self,
         x: &Polynomial<C>,
