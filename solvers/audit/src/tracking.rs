@@ -246,7 +246,8 @@ impl<'a, const M: usize> Finder<'a, M> {
         };
         let place = found.place;
         let [step, next_step] = self.steps(from, place, known.map_or(0.0, |before| before.nearest.step));
-        let late = if found.error.is_finite() { found.error } else { 0.0 };
+        // Off the path the distance is what is wrong: no time is known there.
+        let late = if found.distance > close && found.error.is_infinite() { 0.0 } else { found.error };
         let (off, bend) = (found.distance - rounding, self.columns().curve(place.piece).bounds()[0]);
         let mut nearest =
             Nearest { place, step, next_step, magnitude, bend, off, late, allowed, ..Nearest::default() };

@@ -38,6 +38,11 @@ impl Chord {
     pub fn is_line(&self) -> bool {
         self.end_angle.is_none()
     }
+
+    /// Takes the moves of the next chord, too; the smaller feed holds.
+    fn take(&mut self, next: &Self) {
+        (self.last, self.feed) = (next.last, self.feed.min(next.feed));
+    }
 }
 
 /// Chords from point to point; there is one more point than chords.
@@ -136,7 +141,7 @@ impl<const M: usize> Chords<M> {
             self.points.push(point);
             self.chords.push(chord);
         } else if let Some(last) = self.chords.last_mut() {
-            (last.last, last.feed) = (chord.last, last.feed.min(chord.feed));
+            last.take(&chord);
         } else {
             let (first, feed) = self.skipped.unwrap_or((chord.first, chord.feed));
             self.skipped = Some((first, feed.min(chord.feed)));
@@ -157,8 +162,38 @@ impl<const M: usize> Chords<M> {
             self.points[last] = end;
             if self.points[last - 1] == end {
                 self.points.pop();
-                self.chords.pop();
+                let removed = self.chords.pop();
+                if let (Some(removed), Some(last)) = (removed, self.chords.last_mut()) {
+                    last.take(&removed);
+                }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_last_move_that_goes_nowhere_belongs_to_the_chord_before() {
+        let chord = |first: u32, last: u32, feed: f64| Chord {
+            first,
+            last,
+            feed,
+            tolerance: 0.01,
+            used: 0.0,
+            end_angle: None,
+        };
+        // The last move goes back to 10 mm; it is too short for a chord of its own.
+        let mut chords = Chords {
+            points: vec![[0.0], [10.0], [10.0 + 1e-9]],
+            chords: vec![chord(0, 0, 50.0), chord(1, 2, 20.0)],
+            skipped: None,
+        };
+        chords.end_at([10.0], &(0..3), 0.01);
+        assert_eq!(chords.points, [[0.0], [10.0]]);
+        let [only] = chords.chords[..] else { panic!("{} chords", chords.chords.len()) };
+        assert_eq!((only.first, only.last, only.feed), (0, 2, 20.0));
     }
 }

@@ -370,8 +370,9 @@ impl<'a, const D: usize> Newton<'a, D> {
             let most = if self.pull.0[i] > 0.0 { self.pull.0[i] } else { OFF * size };
             greatest(self.gradient.point(i)) <= most
         });
-        let settled =
-            || pulls.clone().all(|(j, &pull)| pull == 0.0 || self.work[j / 4].values()[j % 4] <= pull);
+        let settled = || {
+            pulls.clone().all(|(j, &pull)| pull == 0.0 || self.work[j / LANES].values()[j % LANES] <= pull)
+        };
         work < ROUNDING * self.whole || still && settled()
     }
 
