@@ -1,11 +1,11 @@
-//! A subrun by its arc length: the parameter at a length, and the axes' derivatives by the length.
+//! Computes the parameter of a subrun at an arc length, and the axes' derivatives by the arc length.
 //!
-//! The arc length s [mm] is that of all axes of the path together, so that it grows wherever an axis moves. The feed
-//! may count fewer axes; it then limits the speed along s by the quotient of both speeds.
+//! The arc length s [mm] is that of all axes of the path together, so that it grows wherever an axis moves. The feed may count
+//! fewer axes; it is converted to a limit of the speed along s by the quotient of both speeds.
 //!
-//! A part has a `table` of u(s) once something inside it is asked for. The stations of a profile are located to rounding,
-//! by Newton's method on the quadrature of s. What holds at one parameter is in `derivatives`, what holds between two parts
-//! in `junctions`.
+//! The `table` of u(s) of a part is computed when a place inside the part is first asked for. The stations of a profile are
+//! located to rounding, by Newton's method on the quadrature of s. `derivatives` computes values at one parameter, `junctions`
+//! the speed caps between two parts.
 
 mod derivatives;
 mod junctions;
@@ -26,21 +26,22 @@ use junctions::Meeting;
 pub use table::Part;
 use table::{around, panel, panel_of, Halving, Row};
 
-/// Most steps to locate a length: one or two of Newton's, or next to a cusp, where they stray, as many bisections as u
-/// has bits.
+/// Greatest number of steps to locate an arc length: mostly one or two Newton steps; next to a cusp, where these go astray, as
+/// many bisections as u has bits.
 const STEPS: usize = 64;
-/// Parameters are located to this part of the greatest on their piece, some roundings.
+/// Parameters are located to this fraction of the greatest one on their part, a few rounding errors.
 const LOCATED: f64 = 1e-15;
-/// Derivatives are evaluated at least this far from a point where D vanishes, as a part of the length.
+/// Derivatives are evaluated at least this far from a point where D vanishes, as a fraction of the part's length.
 const INSET: f64 = 1e-9;
 
 /// What is known of a part without its table.
 #[derive(Clone, Debug)]
 struct Measures<const M: usize> {
     length: f64,
-    /// The direction of motion and the speed by the feed, where the direction is constant and s that of the axes.
+    /// The direction of motion and the speed cap by the feed in mm/s, if the direction is constant and s is the arc length of the
+    /// axes' path.
     straight: Option<([f64; M], f64)>,
-    /// Lengths between which derivatives are evaluated.
+    /// The least and the greatest distance from the start of the part at which derivatives are evaluated, in mm.
     inside: [f64; 2],
 }
 
@@ -93,8 +94,8 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         Self { problem, parts, measures, tables: vec![OnceLock::new(); parts.len()], knots }
     }
 
-    /// The parts that two lengths have between them, with tables and lengths of their own, and the index of the first. Lengths
-    /// from there keep digits that those of a path of half a kilometre do not have.
+    /// The parts between two arc lengths as a path of their own, with their own tables and with arc lengths from the start of the
+    /// first part; and the index of that part. These shorter arc lengths have smaller rounding errors than those of a long path.
     pub fn between(&self, [from, to]: [f64; 2]) -> (Self, usize) {
         let first = self.part(from);
         let end = first + 1 + self.knots[first + 1..].partition_point(|&knot| knot < to);
@@ -105,7 +106,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         self.tables[part].get_or_init(|| {
             let mut rows = Halving::new(self.problem, &self.parts[part]).table();
             let last = rows.len() - 1;
-            // All rows share what the lengths differ by: the last panel alone may be shorter than a turn.
+            // The difference of both lengths is spread over all rows: the last panel alone may be too short to take it.
             let (length, sum) = (self.measures[part].length, rows[last].s);
             rows.iter_mut().for_each(|row| row.s *= length / sum);
             rows[last].s = length;
@@ -123,14 +124,14 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         self.knots[1..self.knots.len() - 1].partition_point(|&knot| knot <= s)
     }
 
-    /// The parameter at an arc length on a part by its table, not on a point where D vanishes.
+    /// The parameter at an arc length on a part by its table, kept away from points where D vanishes.
     fn parameter(&self, part: usize, s: f64) -> f64 {
         let x = self.inside(part, s);
         let [from, to] = around(self.table(part), x);
         from.parameter_at(to, x)
     }
 
-    /// The same at four arc lengths, which are mostly on one panel of the table or on neighbours.
+    /// `parameter` at four arc lengths, which are mostly on one panel of the table or on neighbouring ones.
     fn parameters(&self, part: usize, s: [f64; 4]) -> [f64; 4] {
         let rows = self.table(part);
         let x = s.map(|s| self.inside(part, s));
@@ -146,7 +147,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         })
     }
 
-    /// An arc length on a part from its start, not at a point where D vanishes.
+    /// The distance of an arc length from the start of its part in mm, kept away from points where D vanishes.
     fn inside(&self, part: usize, s: f64) -> f64 {
         let [first, last] = self.measures[part].inside;
         (s - self.knots[part]).max(first).min(last)
@@ -163,7 +164,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         }
         let x = s - self.knots[part];
         let [from, to] = around(self.table(part), x);
-        // Lengths from the nearer row have the digits of a place next to an end of the part.
+        // The length is measured from the nearer row: next to an end of the part this keeps the rounding error small.
         let ahead = to.s - x < x - from.s;
         let miss = |u: f64| {
             if ahead {
@@ -175,7 +176,8 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         self.newton(part, [from.u, to.u], from.parameter_at(to, x), miss)
     }
 
-    /// The parameter at a distance in mm from another one, ahead or back, to its own digits; its arc length is about s.
+    /// The parameter at a signed distance in mm from the parameter `from`, with a small error relative to that distance. Its arc
+    /// length is about s, where the search starts.
     pub fn parameter_beside(&self, part: usize, from: f64, distance: f64, s: f64) -> f64 {
         let at = &self.parts[part];
         let [low, high] = if distance > 0.0 { [from, at.u[1]] } else { [at.u[0], from] };
@@ -183,8 +185,8 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         self.newton(part, [low, high], self.parameter(part, s).clamp(low, high), miss)
     }
 
-    /// The parameter of a part between `low` and `high` where `miss`, a length in mm that rises with u, is 0. A step of Newton's
-    /// method leaves less than step² (|D_u| + |D_uu step|)/D, mostly no more than rounding; not so next to a cusp.
+    /// The parameter of a part between `low` and `high` where `miss`, a length in mm that rises with u, is 0. A Newton step
+    /// leaves an error of less than step² (|D_u| + |D_uu step|)/D, mostly less than rounding, but not next to a cusp.
     fn newton(
         &self,
         part: usize,
@@ -215,7 +217,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         u
     }
 
-    /// The length between two parameters of a part; short lengths have all their digits.
+    /// The length between two parameters of a part, in mm; short lengths have a small relative error as well.
     pub fn length_between(&self, part: usize, a: f64, b: f64) -> f64 {
         if [a, b] == self.parts[part].u {
             return self.measures[part].length;
@@ -230,7 +232,7 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         panel(self.problem, at, a, rows[i + 1].u) + inside + panel(self.problem, at, rows[j].u, b)
     }
 
-    /// The direction of all parts and the speed by their feed, if both are the same on all parts.
+    /// The direction of all parts and the speed cap by their feed in mm/s, if both are the same on all parts.
     pub fn line(&self) -> Option<([f64; M], f64)> {
         let (direction, feed) = self.measures[0].straight?;
         let alike = self.measures.iter().all(|own| {
@@ -256,7 +258,8 @@ impl<'a, const M: usize> ArcLengthPath<'a, M> {
         junctions::junctions(self.problem, &meetings, jerk)
     }
 
-    /// The caps at junctions, and those without speed where tighter limits of jerk begin or end alone.
+    /// The speed caps at junctions, and caps with infinite speed at places where tighter limits of jerk begin or end away from a
+    /// junction.
     pub fn caps(&self, junctions: &[Junction]) -> Vec<SpeedCap> {
         junctions::caps(junctions, self.total())
     }

@@ -1,20 +1,19 @@
-//! The speed cap at jumps of a path's curvature, and the tighter limits of jerk around them, by third differences of
-//! setpoints.
+//! Computes the speed cap at jumps of a path's curvature, and the tighter limits of jerk around them, with which third
+//! differences of setpoints keep the limits of jerk.
 //!
-//! A third difference of setpoints over the cube of their period T is the mean of the jerk, weighted by the quadratic
-//! B-spline B on 3 T, whose maximum is 3/(4 T). A jump Δ of q'', passed at the speed v, is a step Δ v² of the
-//! acceleration, which the difference shows as a jerk Δ v² B, with B at the time of the jump. All differences keep the
-//! limit J if
+//! A third difference of setpoints divided by the cube of their period T is the mean of the jerk, weighted by the quadratic
+//! B-spline B on 3 T, whose maximum is 3/(4 T). A jump Δ of q'', passed at the speed v, is a step Δ v² of the acceleration, which
+//! the difference shows as a jerk Δ v² B, with B at the time of the jump. All differences keep the limit J if
 //!
 //! - Σ |Δ| v² B ≤ κ J over the jumps within any 3 T, with κ ≤ `MOST`, which caps v, and
 //! - the jerk between the jumps is at most (1 − κ) J from 3/2 T before each jump to 3/2 T after it.
 //!
-//! A difference whose middle is x periods from a jump shows the part B(x)/B(0) of its step, and has the part I(x) of
-//! its weight within 3/2 T of the jump. I(x) ≥ B(x)/B(0), so that both conditions suffice for it as well.
+//! A difference whose middle is x periods from a jump shows the fraction B(x)/B(0) of its step, and has the fraction I(x) of its
+//! weight within 3/2 T of the jump. I(x) ≥ B(x)/B(0), so that both conditions suffice for it as well.
 
-/// Greatest part κ of the limit of jerk for jumps: a greater one is faster at jumps, but slower around them.
+/// Greatest fraction κ of the limit of jerk for jumps: a greater one is faster at jumps, but slower around them.
 pub const MOST: f64 = 0.65;
-/// Jumps that show as less than this part of the limit are rounding: half of what an audit can tell.
+/// Jumps that show as less than this fraction of the limit count as rounding: half of what an audit can resolve.
 const UNSEEN: f64 = 5e-7;
 /// Half the time that a third difference spans, in periods.
 pub const HALF: f64 = 1.5;
@@ -29,7 +28,7 @@ const HALVINGS: u32 = 20;
 pub struct Jump<const M: usize> {
     /// Arc length, in mm.
     pub s: f64,
-    /// Jump of each axis's q'', in 1/mm, over its limit of jerk, in mm/s³.
+    /// Jump of each axis's q'' in 1/mm, divided by the axis's limit of jerk in mm/s³.
     pub change: [f64; M],
     /// The greatest speed, in mm/s, and acceleration along the path, in mm/s², by all other limits.
     pub speed: f64,
@@ -43,7 +42,7 @@ pub struct Passage {
     pub speed: f64,
     /// The limits of jerk are tighter up to this distance to both sides, in mm.
     pub reach: f64,
-    /// The part by which they are lower; 0 where no setpoints show a jump.
+    /// The fraction by which the limits of jerk are lower; 0 if no setpoints show a jump.
     pub share: f64,
 }
 
@@ -69,7 +68,7 @@ pub fn passages<const M: usize>(jumps: &[Jump<M>], period: f64) -> Vec<Passage> 
     (0..jumps.len()).map(passage).collect()
 }
 
-/// The greatest speed at jump `i` at which no difference shows more than `MOST`.
+/// The greatest speed at jump `i`, in mm/s, at which no difference shows more than `MOST`.
 fn greatest_speed<const M: usize>(jumps: &[Jump<M>], i: usize, period: f64) -> f64 {
     let jump = &jumps[i];
     let change = jump.change.iter().copied().fold(0.0, f64::max);
@@ -90,7 +89,8 @@ fn greatest_speed<const M: usize>(jumps: &[Jump<M>], i: usize, period: f64) -> f
     low
 }
 
-/// The greatest part of a limit that differences show of jump `i` and those around it at one speed; 0 for rounding.
+/// The greatest fraction of a limit of jerk that differences show of jump `i` and the jumps around it, all passed at `speed` in
+/// mm/s; 0 if this is only rounding.
 fn shown<const M: usize>(jumps: &[Jump<M>], i: usize, speed: f64, period: f64) -> f64 {
     let (per_period, near) = (speed * period, around(jumps, i, speed * period));
     let per_weight = speed * speed / period;
@@ -113,7 +113,7 @@ fn shown<const M: usize>(jumps: &[Jump<M>], i: usize, speed: f64, period: f64) -
         let mut sum = [0.0; M];
         for jump in &jumps[near.clone()] {
             let x = (jump.s - jumps[i].s) / per_period - centre;
-            // The weight's second derivative is −2 in its middle, so that it may exceed its samples by this much.
+            // The weight's second derivative is −2 in its middle, so that between samples it may exceed them by this much.
             let between = if x.abs() < 0.5 + STEP { 0.25 * STEP * STEP } else { 0.0 };
             let part = weight(x) + between;
             for k in 0..M {
@@ -177,7 +177,7 @@ mod tests {
         assert!((passage.speed / (MOST * PERIOD / 1.5).sqrt() - 1.0).abs() < 1e-12);
         assert!((passage.share - MOST).abs() < 1e-12);
         assert!((passage.reach - 1.5e-3 * (passage.speed + 0.75)).abs() < 1e-12);
-        // A jump that is slow by other limits uses less.
+        // A jump that is passed slowly because of other limits uses less.
         let slow = Jump { speed: 0.5 * passage.speed, ..jump(5.0, 2.0) };
         let [passage] = passages(&[slow], PERIOD)[..] else { panic!() };
         assert_eq!(passage.speed, f64::INFINITY);

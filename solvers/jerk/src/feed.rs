@@ -1,4 +1,4 @@
-//! The greatest speed [mm/s] along the axes' path by a feed that counts each axis by a share: |(share_k q_k')| u̇ ≤
+//! Computes the greatest speed [mm/s] along the axes' path by a feed that counts each axis with a share: |(share_k q_k')| u̇ ≤
 //! feed.
 //!
 //! The squares of both speeds are polynomials over one denominator; Bernstein coefficients bound their quotient.
@@ -10,7 +10,7 @@ use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_planner::problem::Problem;
 
-/// The bound on the quotient exceeds the greatest sampled quotient by at most this part …
+/// The bound on the quotient exceeds the greatest sampled quotient by at most this fraction …
 const ACCURACY: f64 = 1e-3;
 /// … unless the part of the piece has been halved this often.
 const MAX_DEPTH: u32 = 16;

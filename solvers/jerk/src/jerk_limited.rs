@@ -25,9 +25,9 @@
 //! | `on_path` | the planner on the package's own paths |
 //! | `turns` | the accelerations with which lines turn back |
 //!
-//! The limits hold to 5e-7 of themselves, as checked at 16 samples of each interval with the path's true derivatives.
-//! Every iterate is a valid plan, so that a planner that is stopped returns the best plan so far. The method is our
-//! own; the predictor and corrector are those of Mehrotra (SIAM J. Optim. 2, 1992).
+//! The limits hold to a relative error of 5e-7, as checked at 16 samples of each interval with the path's true derivatives. Every
+//! iterate is a valid plan, so that a planner that is stopped returns the best plan so far. The method is our own; the predictor
+//! and corrector are those of Mehrotra (SIAM J. Optim. 2, 1992).
 
 mod band;
 mod cases;

@@ -1,8 +1,8 @@
-//! Profiles of limited jerk as columns: phases along the pieces of a path, in the order of the path, from `sections` of
-//! constant jerk or the `spline` w(s) of the jerk-limited planner.
+//! Profiles of limited jerk as columns: phases along the pieces of a path, in the order of the path, from `sections` of constant
+//! jerk or from the `spline` w(s) of the jerk-limited planner.
 //!
-//! Three laws, of `feedplan.profile.PhaseLaw`: the feed is held, the jerk along the path is constant, or v² is a cubic of
-//! the arc length. All stay what they are where a phase is cut at the end of a piece. Lengths in mm, times in s.
+//! There are three laws, of `feedplan.profile.PhaseLaw`: the feed is held, the jerk along the path is constant, or v² is a cubic
+//! of the arc length. If a phase is cut at the end of a piece, both parts follow the law of the phase. Lengths in mm, times in s.
 
 mod sections;
 mod spline;
@@ -13,9 +13,10 @@ use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::{Phase, Phases, NO_AXIS};
 use feedplan_planner::problem::{greater, lesser, Problem};
 
-/// A section shorter than this part of the time in which an axis reaches its greatest speed is rounding.
+/// A section shorter than this fraction of the time in which an axis reaches its greatest speed counts as rounding.
 const SHORTEST: f64 = 1e-9;
-/// The ramps of two profiles take up accelerations that differ by this part: some 90 times as much of the jerk.
+/// The greatest relative difference of the accelerations of two profiles at a turn that a ramp can absorb; it takes some 90 times
+/// this fraction of the limit of jerk.
 const TAKEN_UP: f64 = 2e-3;
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,7 +38,7 @@ pub struct JerkProfile {
     left_from: Option<(usize, f64)>,
 }
 
-/// Arc length along a subrun, speed and acceleration.
+/// Arc length along a subrun in mm, speed in mm/s and acceleration in mm/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub s: f64,
@@ -46,12 +47,12 @@ pub struct State {
 }
 
 impl State {
-    /// At rest with an acceleration, where the path turns back.
+    /// Whether the tool is at rest with an acceleration, because the path turns back.
     fn turns(&self) -> bool {
         self.v == 0.0 && self.a != 0.0
     }
 
-    /// The state after a time t with a constant jerk.
+    /// The state after a time t in s with a constant jerk in mm/s³.
     pub fn after(&self, t: f64, jerk: f64) -> Self {
         let Self { s, v, a } = *self;
         Self {
@@ -81,7 +82,7 @@ impl JerkProfile {
         self.stopped && self.phases.is_empty()
     }
 
-    /// The profiles of all parts in this order, without runs.
+    /// The profiles of all parts joined in this order, without runs.
     pub fn joined(parts: Vec<Self>) -> Self {
         let (mut all, mut phases) = (Self::default(), Vec::with_capacity(parts.len()));
         for part in parts {
@@ -100,8 +101,8 @@ impl JerkProfile {
         a.map_or(0.0, |a| a.abs())
     }
 
-    /// Whether another profile can go on from a turn after this one, where the acceleration may be at most `most`: the
-    /// ramps take up what their accelerations differ by.
+    /// Whether another profile can follow this one at a turn where the acceleration may be at most `most`, in mm/s². A ramp can
+    /// absorb a small difference of both accelerations.
     pub fn meets(&self, next: &Self, most: f64) -> bool {
         let [own, other] = [self.end_acceleration(1), next.end_acceleration(0)];
         let (change, greater) = ((own - other).abs(), own.max(other));
@@ -112,7 +113,8 @@ impl JerkProfile {
             || ramp && change <= TAKEN_UP * greater && greater + change <= most
     }
 
-    /// Whether one phase is the ramp of constant acceleration from or to rest.
+    /// Whether the first phase (`end` 0) or the last one (1), but not its neighbour too, has constant acceleration: the ramp from
+    /// or to rest.
     fn has_ramp(&self, end: usize) -> bool {
         let Phases { kind, value, .. } = &self.phases;
         let is_steady = |at: usize| kind[at] == PhaseLaw::PathJerk as u8 && value[at] == 0.0;
@@ -120,7 +122,7 @@ impl JerkProfile {
         next < kind.len() && is_steady(at) && !is_steady(next)
     }
 
-    /// Appends a movement between two parameters of a part. One too short to show in u is merged into its neighbour.
+    /// Appends a movement between two parameters of a part. A movement too short to show in u is merged into its neighbour.
     fn push<const M: usize>(
         &mut self,
         path: &ArcLengthPath<M>,
@@ -164,7 +166,7 @@ impl JerkProfile {
         });
     }
 
-    /// Appends the way between two lengths of a subrun at its feed, in mm/s.
+    /// Appends the path between two arc lengths of a subrun, passed at its feed in mm/s.
     pub fn push_held<const M: usize>(&mut self, path: &ArcLengthPath<M>, [from, to]: [f64; 2], feed: f64) {
         let state = State { s: 0.0, v: feed, a: 0.0 };
         let mut part = path.part(from);

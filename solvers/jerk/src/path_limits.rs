@@ -1,5 +1,5 @@
-//! Allowable speed, acceleration and jerk along a segment of path, from the limits of the axes, the feed and the chord
-//! error (Cheatham 2007, chapter 5).
+//! Computes the allowable speed, acceleration and jerk along a segment of path, from the limits of the axes, the feed and the
+//! chord error (Cheatham 2007, chapter 5).
 //!
 //! Symbols: q an axis, S arc length [mm], V, A, J speed, acceleration and jerk along the path [mm, s]. By 5.18–5.20
 //! every axis keeps its limits anywhere on a segment, whatever the profile does within V, A, J, if
@@ -8,12 +8,11 @@
 //! |q_S| V ≤ v_max,   |q_SS| V² + |q_S| A ≤ a_max,   |q_SSS| V³ + 3 |q_SS| V A + |q_S| J ≤ j_max
 //! ```
 //!
-//! with bounds on the derivatives over the segment. Where the limits of an axis differ by direction, q_S and q_SS have
-//! one bound for each sign; A is the lesser for speeding up and slowing down. The thesis's 5.21–5.26 solve the same
-//! rows for V, A and J one after the other, which leaves no A where V uses the whole limit, and they divide by q_S,
-//! which may be 0. Here V, A and J minimise the time from rest to rest over a reference length L on which V is reached,
-//! L/V + V/A + A/J. Where an axis shares its acceleration between turning and speeding up, a long L favours the speed,
-//! a short L the acceleration.
+//! with bounds on the derivatives over the segment. Where the limits of an axis differ by direction, q_S and q_SS have one bound
+//! for each sign; A is the lesser of the values for speeding up and slowing down. The thesis's 5.21–5.26 solve the same rows for
+//! V, A and J one after the other; this leaves no A where V uses the whole limit, and they divide by q_S, which may be 0. Here V,
+//! A and J minimise the time from rest to rest over a reference length L on which V is reached, L/V + V/A + A/J. Where an axis
+//! shares its acceleration between turning and speeding up, a long L favours the speed, a short L the acceleration.
 //!
 //! | module | what it computes |
 //! |---|---|
@@ -27,12 +26,12 @@ use crate::s_curve::Limits;
 use feedplan_planner::problem::{greater, Both, Fault};
 pub use shape::{bounded, bounded_until, sampled, Curve, Shape};
 
-/// Golden-section steps: the bracket shrinks to 1e-5 of itself, where the minimum is flat.
+/// Golden-section steps: the bracket shrinks to 1e-5 of its width; more is not needed, because the minimum is flat.
 const STEPS: usize = 24;
-/// Parts of the greatest V and A that are tried: V below its greatest leaves some A, and A some J.
+/// Fractions of the greatest V and A that are tried: a V below its greatest leaves some A, and an A below its greatest some J.
 const RANGE: (f64, f64) = (1e-3, 1.0 - 1e-6);
 
-/// Magnitudes of the limits of every axis, in mm (or degrees) and seconds.
+/// The limits of every axis as absolute values, in mm (or degrees) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisLimits<const M: usize> {
     pub velocity: Both<M>,
@@ -41,12 +40,12 @@ pub struct AxisLimits<const M: usize> {
 }
 
 impl<const M: usize> AxisLimits<M> {
-    /// These limits with the limits of jerk lower by a part.
+    /// These limits, with the limits of jerk lower by the fraction `part`.
     pub fn with_jerk_less(&self, part: f64) -> Self {
         Self { jerk: self.jerk.map(|jerk| (1.0 - part) * jerk), ..*self }
     }
 
-    /// The greatest speed along a segment by the limits of velocity alone.
+    /// The greatest speed along a segment in mm/s by the limits of velocity alone.
     pub fn fastest(&self, shape: &Shape<M>) -> f64 {
         of_both::<M>(|sign, k| self.velocity[sign][k] / shape.first[sign][k])
     }
@@ -138,7 +137,7 @@ impl<'a, const M: usize> Inequalities<'a, M> {
         Self { shape, axes, first: greater(&shape.first), second: greater(&shape.second) }
     }
 
-    /// The V that leaves no A and no J.
+    /// The greatest V: with A = 0 and J = 0 every limit holds.
     fn most_speed(&self) -> f64 {
         let AxisLimits { acceleration, jerk, .. } = self.axes;
         let by_acceleration =
@@ -147,7 +146,7 @@ impl<'a, const M: usize> Inequalities<'a, M> {
         self.axes.fastest(self.shape).min(by_acceleration).min(by_jerk)
     }
 
-    /// The A that leaves no J.
+    /// The greatest A at this V: with J = 0 every limit holds.
     fn most_acceleration(&self, speed: f64) -> f64 {
         let Self { shape, axes, first, second } = self;
         (0..M)
@@ -160,7 +159,7 @@ impl<'a, const M: usize> Inequalities<'a, M> {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// The J that V and A leave.
+    /// The greatest J that V and A leave.
     fn most_jerk(&self, speed: f64, acceleration: f64) -> f64 {
         let Self { shape, axes, first, second } = self;
         let taken = |k: usize| shape.third[k] * speed.powi(3) + 3.0 * second[k] * speed * acceleration;

@@ -1,5 +1,5 @@
-//! A path by its arc length s [mm], the limits of the motion along it, the states at its ends, and the effort of a plan:
-//! what the planners of this crate share.
+//! A path by its arc length s [mm], the limits of the motion along it, the states at its ends, and the effort of a plan: the
+//! types that the planners of this crate share.
 
 use std::time::Instant;
 
@@ -12,15 +12,15 @@ use feedplan_planner::problem::Both;
 pub struct PathPoint<const M: usize> {
     /// q', in mm (or degrees) per mm.
     pub first: [f64; M],
-    /// q'', per mm more.
+    /// q'', in mm (or degrees) per mm².
     pub second: [f64; M],
-    /// q''', per mm² more.
+    /// q''', in mm (or degrees) per mm³.
     pub third: [f64; M],
     /// The greatest speed along the path by feed and chord error, in mm/s; infinite where neither limits it.
     pub speed_cap: f64,
 }
 
-/// The same at four points of a piece.
+/// Derivatives of the axes and speed caps at four points of a piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPoints<const M: usize> {
     /// q', q'' and q''' of each axis.
@@ -40,7 +40,7 @@ impl<const M: usize> PathPoints<M> {
         Self { q, speed_cap: Lanes::new(points.map(|point| point.speed_cap)) }
     }
 
-    /// One of them.
+    /// The point in this lane.
     pub fn point(&self, lane: usize) -> PathPoint<M> {
         let [first, second, third] =
             [0, 1, 2].map(|order| std::array::from_fn(|k| self.q[k][order].values()[lane]));
@@ -57,16 +57,17 @@ pub trait Geometry<const M: usize>: Sync {
     /// Derivatives at the arc length s on a piece, which may be one of its ends.
     fn at(&self, piece: usize, s: f64) -> PathPoint<M>;
 
-    /// The same at four arc lengths on a piece.
+    /// `at` for four arc lengths on a piece.
     fn at_four(&self, piece: usize, s: [f64; 4]) -> PathPoints<M> {
         PathPoints::new(s.map(|s| self.at(piece, s)))
     }
 }
 
-/// The most axes of a path.
+/// Greatest number of axes of a path.
 pub const MOST_AXES: usize = 9;
 
-/// Greatest magnitudes of each axis, in mm/s, mm/s² and mm/s³; all but jerk for positive and for negative values.
+/// The limits of each axis as absolute values, in mm/s, mm/s² and mm/s³; velocity and acceleration have one limit for positive
+/// and one for negative values.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
     pub velocity: Both<M>,
@@ -74,7 +75,7 @@ pub struct Limits<const M: usize> {
     pub jerk: [f64; M],
 }
 
-/// A speed cap, and tighter limits of jerk around it, as setpoints show a jump of q'' as jerk.
+/// A speed cap at a place, and tighter limits of jerk around it, because setpoints show a jump of q'' as jerk.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedCap {
     /// Arc length, in mm.
@@ -83,7 +84,7 @@ pub struct SpeedCap {
     pub speed: f64,
     /// The limits of jerk are tighter up to this distance to both sides, in mm.
     pub reach: f64,
-    /// The part, less than 1, by which they are lower.
+    /// The fraction, less than 1, by which the limits of jerk are lower there.
     pub share: f64,
 }
 
@@ -97,13 +98,13 @@ impl SpeedCap {
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     Rest,
-    /// At rest for no time where the path turns back, with an acceleration away from the end of at most this in mm/s²,
-    /// above 0. The lower bound holds for all accelerations up to the greatest.
+    /// At rest only for an instant, because the path turns back there. The acceleration away from the end is above 0 and at most
+    /// this, in mm/s². The lower bound holds for all accelerations up to `greatest`.
     Turn {
         acceleration: f64,
         greatest: f64,
     },
-    /// A speed above 0 in mm/s and an acceleration along the path in mm/s². Only some iterations lead to a plan.
+    /// A speed above 0 in mm/s and an acceleration along the path in mm/s². There is no plan before some iterations.
     Moving {
         speed: f64,
         acceleration: f64,
@@ -115,7 +116,7 @@ pub enum End {
 }
 
 impl End {
-    /// In mm/s.
+    /// The speed at this end in mm/s; 0 at rest.
     pub fn speed(&self) -> f64 {
         match *self {
             Self::Moving { speed, .. } | Self::Held { speed } => speed,
@@ -135,19 +136,19 @@ pub struct Problem<'a, G, const M: usize> {
 /// Accuracy and effort of a plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort<'a> {
-    /// Number of intervals while r = w^(3/4) doubles at its greatest slope: 16 cost less than 1e-4 of the time.
+    /// Number of intervals while r = w^(3/4) doubles at its greatest slope; a resolution of 16 costs less than 1e-4 of the time.
     pub resolution: f64,
-    /// Complementarity gap at which iterations stop, as a part of the time.
+    /// Complementarity gap at which iterations stop, as a fraction of the time.
     pub tolerance: f64,
-    /// Most iterations for each window.
+    /// Greatest number of iterations for each window.
     pub max_iterations: usize,
-    /// When a plan must be ready, whatever its quality.
+    /// The time at which a plan must be ready, whatever its quality.
     pub deadline: Option<Instant>,
     /// Paths of more intervals than this are solved in overlapping windows of about this many intervals.
     pub window: usize,
     /// Whether a lower bound is computed too.
     pub proves: bool,
-    /// Takes the progress and may cancel the work.
+    /// Gets the progress and may cancel the work.
     pub watch: Watch<'a>,
 }
 

@@ -1,4 +1,4 @@
-//! What the planners of this crate do with a problem of the package, compiled for each count of axes.
+//! The functions of this crate's planners for a problem of the package, compiled for several numbers of axes.
 
 use feedplan_geometry::instances;
 use feedplan_planner::problem::Fault;

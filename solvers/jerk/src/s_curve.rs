@@ -1,11 +1,10 @@
 //! The two-pass jerk-limited speed profiler of Cheatham 2007, "A Geometry-Based Motion Planner for Direct Machining and
 //! Control", chapter 4: from segments of path with limits along the path [mm, s] to sections of constant jerk.
 //!
-//! The acceleration is 0 where segments meet, and a profile always ends at standstill on segments already known. When
-//! the motion is about to enter a segment, the forward recursion raises the speed at its end as far as possible and
-//! falls to standstill; the backward recursion lowers the speeds that break a limit ahead. If it fails, the established
-//! profile stays. So a segment costs no more than looking ahead as far as it takes to stop, and at most `look_ahead`
-//! segments.
+//! The acceleration is 0 where segments meet, and a profile always ends at standstill on segments already known. When the motion
+//! is about to enter a segment, the forward recursion raises the speed at its end as far as possible and falls to standstill; the
+//! backward recursion lowers the speeds that break a limit ahead. If it fails, the established profile stays. The cost of a
+//! segment is therefore that of looking ahead over the segments needed to stop, and over at most `look_ahead` segments.
 //!
 //! | module | what it computes |
 //! |---|---|
@@ -22,13 +21,13 @@
 //! - 4.12: the last term is A³/(6 J²), not 2 A³/(3 J²); only then do 4.12 and 4.13 add up to 4.14.
 //! - 4.3.4 has at most two usable roots; the third end is the acceleration limit (see `dead_spot`).
 //! - Sections of constant acceleration and constant speed are used; a segment may rise to a peak and fall again.
-//! - The pseudocode of 4.3.3 joins the established profile wherever it can, which near the standing end is at once, and
-//!   gains nothing. Here the backward recursion follows the forward one down to the present speed. Only where it cannot
-//!   meet that speed does it join the established profile, as early on the path as it can.
+//! - The pseudocode of 4.3.3 joins the established profile wherever it can; near the standing end this is at once, and gains
+//!   nothing. Here the backward recursion follows the forward one down to the present speed. It joins the established profile
+//!   only if it cannot meet that speed, and as early on the path as it can.
 //! - Zero-length segments, exact stops and speed limits at junctions are allowed.
 //!
-//! The speeds are not the highest possible: zero acceleration where segments meet costs time, most where segments are
-//! short beside the length of a change of speed (thesis, 7.1).
+//! The speeds are not the highest possible: zero acceleration where segments meet costs time, most where segments are short
+//! compared with the length of a change of speed (thesis, 7.1).
 
 mod backward;
 mod buffer;
@@ -55,7 +54,7 @@ pub struct Profiler {
     buffer: Buffer,
     /// The established profile: the speed at the start of every segment in the buffer, and 0 at the end.
     speeds: VecDeque<f64>,
-    /// Number of speeds from the first one on that may differ from 0.
+    /// Only this many speeds, from the first one on, may differ from 0.
     moving: usize,
     start: section::SegmentStart,
     entered: usize,
@@ -139,7 +138,7 @@ pub fn plan(segments: &[Segment], look_ahead: usize, watch: Watch) -> Result<Vec
     Ok(sections)
 }
 
-/// The quickest sections of a segment between two ends that it joins.
+/// The fastest sections of a segment between two ends that it joins.
 pub fn cross(segment: &Segment, ends: [SegmentEnd; 2]) -> Vec<Section> {
     let mut sections = vec![];
     section::cross(segment, ends, section::SegmentStart::default(), &mut sections);

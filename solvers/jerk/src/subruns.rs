@@ -1,6 +1,6 @@
-//! Subruns of a path: runs cut where the tool must rest (stops, and cusps, whose curvature has no bound), and each
-//! subrun cut into parts without such a place and without a kink of the speed cap. Where the path turns back, the tool
-//! rests for no time, and its acceleration need not vanish: such subruns follow each other in a chain.
+//! Cuts the runs of a path into subruns where the tool must rest (stops, and cusps, whose curvature has no bound), and each
+//! subrun into parts without such a place and without a kink of the speed cap. Where the path turns back, the tool is at rest
+//! only for an instant, and its acceleration need not vanish: such subruns follow each other in a chain.
 //!
 //! Input: the pieces and limits of a problem. Lengths in mm, speeds in mm/s, parameters u in [0, width] of a piece.
 
@@ -23,36 +23,36 @@ use feedplan_geometry::tolerance::CUSP;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{along, lesser, Fault, Problem};
 
-/// Cusps closer to the end of a piece than this part of it count as its end.
+/// Cusps closer to the end of a piece than this fraction of it count as its end.
 const AT_END: f64 = 1e-9;
 /// The speed at a sharp turn, in units of the speed that the axes gain in a moment: below `CREEP` the tool would creep,
 /// so that it rests there; below `TIGHT_TURN` the piece is cut there.
 pub const CREEP: f64 = 0.02;
 const TIGHT_TURN: f64 = 10.0;
-/// A moment is a servo period, and at most this part of the time to full speed.
+/// A moment is a servo period, but at most this fraction of the time to full speed.
 pub const MOMENT: f64 = 0.1;
-/// A point is slow where |C'(u)|² is below this part of its maximum on the piece.
+/// A point is slow if |C'(u)|² is below this fraction of its maximum on the piece.
 const SLOW: f64 = 0.25;
-/// A turn beside a slow point is sought at this many distances, each half the one before, and then by this many rounds
-/// of ternary search. It counts where its curvature exceeds that of the slow point by this factor.
+/// A turn beside a slow point is searched for at this many distances, each half the one before, and then by this many rounds of
+/// ternary search. It counts if its curvature exceeds that of the slow point by this factor.
 const LEVELS: i32 = 40;
 const ROUNDS: usize = 20;
 const SHARPER: f64 = 2.0;
-/// To both sides of a slow point |C'(u)|² must rise by more than this part: less may be the rounding of a constant
-/// speed, whose minimum is anywhere.
+/// To both sides of a slow point |C'(u)|² must rise by more than this fraction: less may be the rounding of a constant speed,
+/// whose minimum may be anywhere.
 const RISE: f64 = 1e-6;
 /// Numbers of equal parts of a piece between which its curvature is sampled: the first, …
 const SAMPLES: [usize; 2] = [4, 64];
-/// … or the second where at a sample the radius is less than this multiple of the chord tolerance.
+/// … or the second, if at a sample the radius is less than this multiple of the chord tolerance.
 const TIGHT: f64 = 10.0;
-/// Distance from a point of a line at which its direction is compared, as a part of the piece.
+/// Distance from a point of a line at which its direction is compared, as a fraction of the piece.
 const BESIDE: f64 = 1e-4;
-/// A jump of the acceleration that third differences of setpoints show as less than this part of the limit of jerk is
-/// rounding: half of what an audit can tell.
+/// A jump of the acceleration that third differences of setpoints show as less than this fraction of the limit of jerk counts as
+/// rounding: half of what an audit can resolve.
 const UNSEEN: f64 = 5e-7;
-/// Chains of a run that are planned together.
+/// Greatest number of chains of a run that are planned together.
 const TOGETHER: usize = 64;
-/// The share of this cutting in the work of a plan.
+/// The fraction of a plan's progress that this cutting takes.
 const CUTTING: f64 = 0.1;
 
 /// Parts of pieces between two places of rest or ends of the path.
@@ -65,16 +65,15 @@ pub struct Subrun {
     pub ends: [f64; 2],
 }
 
-/// Subruns between whose ends the path turns back.
+/// A sequence of subruns between which the path turns back.
 pub struct Chain<'a> {
     pub subruns: &'a [Subrun],
-    /// The greatest acceleration along the path, in mm/s², with which the tool can turn back after each of them but the
-    /// last.
+    /// The greatest acceleration along the path, in mm/s², with which the tool can turn back after each subrun but the last.
     pub turns: &'a [f64],
 }
 
-/// The profile of a path within these jerk limits in mm/s³; `plan` plans each subrun alone and counts its work. A run
-/// with an unplanned subrun has no phases.
+/// The profile of a path within these jerk limits in mm/s³; `plan` plans each subrun alone and reports its progress. A run with
+/// an unplanned subrun has no phases.
 pub fn over_subruns<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -86,7 +85,7 @@ pub fn over_subruns<const M: usize>(
     })
 }
 
-/// The same with a `plan` of the subruns of some chains of a run. Its watch counts a part of a piece.
+/// `over_subruns` with a `plan` that plans all subruns of some chains of a run. Its watch counts parts of pieces.
 pub fn over_chains<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -97,11 +96,11 @@ pub fn over_chains<const M: usize>(
     let turns = turns(problem, &limits, &subruns);
     let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
     let chains = chains(&subruns, &turns);
-    // Each run is planned alone: where others are planned does not change its bits.
+    // Each run is planned alone, so that its result is the same to the bit whatever other runs there are.
     let runs = chains.chunk_by(|a, b| a.subruns[0].run == b.subruns[0].run);
     let mut together: Vec<(usize, &[Chain])> =
         runs.flat_map(|run| run.chunks(TOGETHER)).enumerate().collect();
-    // The long ones come first, and each thread takes the next one: at the end none waits for a long one.
+    // The longest groups come first, and each free thread takes the next group: at the end no thread is left with a long one.
     together.sort_by_key(|(_, chains)| Reverse(parts(chains)));
     let mut planned: Vec<(usize, Vec<JerkProfile>)> = together
         .into_iter()
@@ -148,7 +147,7 @@ pub fn turns<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, subruns: 
     subruns.windows(2).map(|pair| turn(problem, limits, &pair[0], &pair[1])).collect()
 }
 
-/// The subruns between turns of which none is 0.
+/// Groups the subruns into chains: a chain ends where the acceleration of a turn is 0.
 pub fn chains<'a>(subruns: &'a [Subrun], turns: &'a [f64]) -> Vec<Chain<'a>> {
     let mut out = vec![];
     let mut first = 0;
@@ -164,7 +163,7 @@ pub fn chains<'a>(subruns: &'a [Subrun], turns: &'a [f64]) -> Vec<Chain<'a>> {
 /// The greatest acceleration along the path, in mm/s², with which the tool can turn back from the end of a subrun to the
 /// next one; 0 where the path does not turn back, or a run ends.
 ///
-/// Both directions are opposite up to what setpoints show of the jump between both accelerations.
+/// Both directions count as opposite if setpoints do not show the jump between the accelerations before and after the turn.
 fn turn<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, before: &Subrun, after: &Subrun) -> f64 {
     let (end, start) = (before.parts[before.parts.len() - 1], after.parts[0]);
     if before.run != after.run {
@@ -226,7 +225,7 @@ pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
 struct Cuts {
     /// Rising parameters inside it, and whether the tool must rest there.
     inside: Vec<(f64, bool)>,
-    /// Whether it must at either end.
+    /// Whether the tool must rest at the start and at the end of the piece.
     cusped: [bool; 2],
 }
 
@@ -251,7 +250,7 @@ fn cuts<const M: usize>(problem: &Problem<M>, i: usize) -> Cuts {
     Cuts { inside: cuts, cusped }
 }
 
-/// Parameters inside piece `i` at which the tool must rest, and whether it must at either end.
+/// Parameters inside piece `i` at which the tool must rest, and whether it must rest at the start and at the end.
 fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]) {
     let own = piece(problem, i);
     let mut points = piece_cusps(&own, CUSP);
@@ -262,7 +261,7 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
     let ends =
         [points.first().is_some_and(|&t| t < AT_END), points.last().is_some_and(|&t| t > 1.0 - AT_END)];
     if line {
-        // A line that does not turn back is no cusp inside. At its ends u̇² would have to be infinite for a speed.
+        // A line that does not turn back has no cusp inside. At its ends a speed above 0 would need an infinite u̇².
         let tangent = |t: f64| derivatives(&own, t * own.width)[1];
         points.retain(|&t| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0);
     }
@@ -299,9 +298,9 @@ fn slow_points<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
     (0..turns.len()).filter(|&n| is_low(n)).map(|n| turns[n] * problem.width[i]).collect()
 }
 
-/// Parameters of piece `i` to either side of a slow point where the tool's path turns the most, if it turns more there
-/// than at the slow point: the residual speed at the slow point has a direction of its own, and the path turns where
-/// both components are equal. A path that turns the most at an end of the piece has no such parameter.
+/// Parameters of piece `i` to either side of a slow point where the tool's path turns the most, if it turns more there than at
+/// the slow point: the residual C' at the slow point has another direction than C' farther away, and the path turns where both
+/// components are equal. A path that turns the most at an end of the piece has no such parameter.
 fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Vec<f64> {
     let width = problem.width[i];
     let curvature = |u: f64| {

@@ -1,4 +1,4 @@
-//! The axes' derivatives by the arc length s [mm], the speed cap and the curvature at a parameter of a piece, from the
+//! Computes the axes' derivatives by the arc length s [mm], the speed cap and the curvature at a parameter of a piece, from the
 //! derivatives of the piece by the chain rule.
 //!
 //! With D(u) = |C'(u)|², or the given square of the speed where the axes are joints, s' = √D and
@@ -16,10 +16,11 @@ use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;
 
-/// Tangents of a straight piece leave its direction by at most this part of their length and this many roundings.
+/// Tangents of a straight piece deviate from its direction by at most this fraction of their length and this many rounding
+/// errors.
 pub const OFF_LINE: f64 = 1e-12;
 const ROUNDINGS: f64 = 16.0;
-/// Most coefficients of D.
+/// Greatest number of Bernstein coefficients of D.
 pub const MAX_RATE: usize = 40;
 
 /// Piece `i` of the path; with equal weights it is polynomial.
@@ -28,7 +29,7 @@ pub fn piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Piece<'a
     plain(problem.control, problem.weight, problem.offset, problem.width, i)
 }
 
-/// Piece `i` of the tool's path, where the axes are not those of the tool.
+/// Piece `i` of the tool's path; None if the axes are those of the tool.
 pub fn tip_piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Option<Piece<'a, 3>> {
     problem.tip.map(|tip| plain(tip.control, tip.weight, tip.offset, problem.width, i))
 }
@@ -46,8 +47,8 @@ fn plain<'a, const M: usize>(
     Piece::new(&control[range], weights, width[i])
 }
 
-/// The direction of a straight piece at u; None for other pieces. A tangent much shorter than the longest may leave the
-/// line by a small part of the longest and still turn sharply.
+/// The direction of a straight piece at u; None for other pieces. A tangent much shorter than the longest one may deviate from
+/// the line by a small fraction of the longest one and still turn sharply, so that it is compared with its own length.
 pub fn straight<const M: usize>(piece: &Piece<M>, u: f64) -> Option<[f64; M]> {
     let hodograph = Hodograph::new(piece);
     let tangents = hodograph.coefficients();
@@ -83,7 +84,7 @@ pub fn rate<const M: usize>(
     }
 }
 
-/// A squared speed and its first two derivatives at u, from its Bernstein coefficients.
+/// The square of a speed and its first two derivatives at u, from its Bernstein coefficients.
 #[inline]
 fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
     let n = coefficients.len() - 1;
@@ -104,12 +105,12 @@ fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
             b[j] = (1.0 - t) * b[j] + t * b[j + 1];
         }
     }
-    // A D that touches 0 may be rounded below it.
+    // Where D touches 0, rounding may give a value below 0.
     out[0] = out[0].max(0.0);
     out
 }
 
-/// The same at four u.
+/// `polynomial` at four parameters.
 fn polynomial_at_four(coefficients: &[f64], width: f64, u: [f64; 4]) -> [Lanes; 3] {
     dispatch!(Level::new(), simd => polynomial_on(simd, coefficients, width, u))
 }
@@ -142,7 +143,8 @@ fn polynomial_on<S: Simd>(simd: S, coefficients: &[f64], width: f64, u: [f64; 4]
     out
 }
 
-/// The speed along s over that which the feed limits, at u of piece `i` with this D; infinite without a limit.
+/// The speed along s divided by the speed that the feed limits, at u of piece `i` with this D; infinite where the feed limits
+/// nothing.
 pub fn per_feed<const M: usize>(problem: &Problem<M>, i: usize, u: f64, d: f64) -> f64 {
     let square = match (problem.tip, problem.share(i)) {
         (Some(tip), _) => polynomial(tip.speed.of(i), problem.width[i], u)[0],
@@ -202,7 +204,7 @@ pub fn path_point<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Pat
     PathPoint { first, second, third, speed_cap }
 }
 
-/// The same at four u.
+/// `path_point` at four parameters of piece `i`.
 pub fn path_points<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) -> PathPoints<M> {
     let c = derivatives_at_four(&piece(problem, i), u);
     let rate = problem.way.map(|way| polynomial_at_four(way.of(i), problem.width[i], u));
@@ -222,7 +224,8 @@ pub fn path_points<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) 
     PathPoints { q, speed_cap: Lanes::new(speed_cap) }
 }
 
-/// The derivatives by the arc length at four places, D and the curvature: D is that of the axes, if not given with its derivatives.
+/// The derivatives by the arc length at four places, D, and the curvature. `rate` is D with its derivatives; without it D is that
+/// of the axes.
 #[inline(always)]
 fn by_length<S: Simd, const M: usize>(
     simd: S,
@@ -258,7 +261,7 @@ fn by_length<S: Simd, const M: usize>(
     (q, [d, bend.sqrt()].map(Lanes::from))
 }
 
-/// The greatest speed along s by the chord error at u of piece `i`, with this D and curvature of the axes' path.
+/// The greatest speed along s by the chord error at u of piece `i`, in mm/s, with this D and curvature of the axes' path.
 #[inline]
 fn chord_cap<const M: usize>(
     problem: &Problem<M>,
@@ -279,7 +282,7 @@ fn chord_cap<const M: usize>(
     }
 }
 
-/// The greatest speed by the chord error at a curvature, in mm/s.
+/// The greatest speed by the chord error at a curvature in 1/mm, in mm/s; infinite without a chord tolerance.
 pub fn chord_limit<const M: usize>(problem: &Problem<M>, curvature: f64) -> f64 {
     if problem.chord_tolerance.is_finite() {
         chord_speed(curvature, problem.chord_tolerance, problem.period)
@@ -288,7 +291,7 @@ pub fn chord_limit<const M: usize>(problem: &Problem<M>, curvature: f64) -> f64 
     }
 }
 
-/// Curvature of a piece at u, 0 where C' = 0, and |C'(u)|².
+/// The curvature of a piece at u in 1/mm, 0 where C' = 0, and |C'(u)|².
 fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> (f64, f64) {
     let [_, c1, c2, _] = derivatives(piece, u);
     let square = dot(&c1, &c1);
@@ -327,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_short_tangent_beside_a_long_one_turns_by_its_own_angle() {
-        // 1e-11 mm off a line turns an edge of 1e-5 mm by 1e-6 rad, and one of half a metre by nothing.
+        // 1e-11 mm off a line turns an edge of 1e-5 mm by 1e-6 rad, but practically does not turn an edge of half a metre.
         let direction = |first: f64, off: f64| {
             let control = [[0.0, 0.0], [first, off], [1e3, 0.0]];
             straight(&Piece { control: &control, weights: &[], width: 1.0 }, 0.5)

@@ -1,21 +1,21 @@
-//! The speed caps where parts of a subrun meet, from the corner and the jump of q'' there (`curvature_jumps`).
+//! Computes the speed caps where parts of a subrun meet, from the corner and the jump of q'' there (`curvature_jumps`).
 
 use crate::curvature_jumps::{passages, Jump, Passage};
 use crate::path_problem::{PathPoint, SpeedCap};
 use feedplan_geometry::quadratic::dot;
 use feedplan_planner::problem::{self, Both, Problem};
 
-/// Where two parts meet.
+/// A place where two parts meet.
 pub struct Meeting<const M: usize> {
     /// Arc length, in mm.
     pub s: f64,
     /// The greatest speed by the corner, in mm/s; None inside a piece, which is smooth.
     pub corner: Option<f64>,
-    /// Derivatives and speed cap before and after it.
+    /// Derivatives and speed cap on the part before and on the part after the place.
     pub sides: [PathPoint<M>; 2],
 }
 
-/// What holds where two parts meet.
+/// The speed cap and the limits of jerk where two parts meet.
 #[derive(Clone, Copy, Debug)]
 pub struct Junction {
     /// The speed cap by a corner or a jump of q'', and the tighter limits of jerk around the jump.
@@ -43,7 +43,7 @@ pub fn junctions<const M: usize>(
 }
 
 impl<const M: usize> Meeting<M> {
-    /// The jump of q'', with the greatest speed and acceleration by other limits.
+    /// The jump of q'', with the greatest speed and the greatest acceleration along the path by all other limits.
     fn jump(&self, problem: &Problem<M>, jerk: &[f64; M]) -> Jump<M> {
         let mut speed = self.corner.unwrap_or(f64::INFINITY);
         for path_point in &self.sides {
@@ -68,8 +68,8 @@ impl<const M: usize> Meeting<M> {
     }
 }
 
-/// The caps at junctions of a subrun of this length, and those without speed where tighter limits of jerk begin or end
-/// alone.
+/// The speed caps at junctions of a subrun of length `total` in mm, and caps with infinite speed at places where tighter limits
+/// of jerk begin or end away from a junction.
 pub fn caps(junctions: &[Junction], total: f64) -> Vec<SpeedCap> {
     let asks = |junction: &&Junction| junction.cap.speed < f64::INFINITY || junction.cap.share > 0.0;
     let own: Vec<SpeedCap> = junctions.iter().filter(asks).map(|junction| junction.cap).collect();
@@ -89,8 +89,8 @@ pub fn caps(junctions: &[Junction], total: f64) -> Vec<SpeedCap> {
     out
 }
 
-/// An upper bound on the speed by the acceleration limits: the acceleration of turning across the direction of motion,
-/// which no acceleration along it can reduce. NaN without such acceleration.
+/// An upper bound in mm/s on the speed by the acceleration limits: by the acceleration across the direction of motion, which no
+/// acceleration along it can reduce. NaN if there is no such acceleration.
 fn turning_speed<const M: usize>(path_point: &PathPoint<M>, limits: &Both<M>) -> f64 {
     let PathPoint { first, second, .. } = path_point;
     let along = dot(second, first) / dot(first, first);

@@ -1,27 +1,29 @@
-//! The length of a part by Gauss's rule of eight points, and its parameter by the length as a table: between two rows u(s) is
-//! the quintic with their u, u' and u''. Panels are halved until both are accurate.
+//! Computes the length of a part by Gauss's rule of eight points, and its parameter u as a function of the length s as a table:
+//! between two rows u(s) is the quintic with the u, u' and u'' of both. Panels are halved until quadrature and quintics are
+//! accurate.
 
 use super::derivatives::{piece, rate, speed_sq, speeds_sq};
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_planner::problem::Problem;
 
-/// Accuracy of the quadrature of a panel, as a part of its length …
+/// Accuracy of the quadrature of a panel, as a fraction of its length …
 const QUADRATURE: f64 = 1e-12;
-/// … and of the quintic half-way; the halves that are kept are 64 times as accurate. Near a sharp turn panels are as
-/// short as the turn, and the third derivatives need digits of that length.
+/// … and of the quintic half-way; the halves that are kept are 64 times as accurate. Near a sharp turn panels are as short as the
+/// turn, and the third derivatives need this accuracy relative to such a length.
 const QUINTIC: f64 = 1e-7;
-/// Greatest error of a quintic that is right half-way, over that of its rate half-way: by (t − ½)(t(1 − t))³.
+/// The greatest error of a quintic that is exact half-way, divided by the error of its rate half-way: for the error (t − ½)(t(1 −
+/// t))³.
 const ODD: f64 = 0.12;
-/// Panels shorter than this part of their piece are not halved.
+/// Panels shorter than this fraction of their part are not halved.
 const SHORTEST: f64 = 1e-14;
-/// Relative rounding of tangents and parameters.
+/// Relative rounding error of tangents and parameters.
 const ROUNDING: f64 = 4e-15;
-/// Tables get about this many rows at most; beside a turn of 1e-10 of its piece some 700 are used.
+/// Greatest number of rows of a table, approximately; beside a turn of 1e-10 of its piece some 700 are used.
 const MOST_ROWS: usize = 20_000;
 /// Panels are halved at most this often.
 const DEPTH: u32 = 48;
-/// Parts of a piece between the samples of its speed.
+/// Number of steps between the samples of the speed |C'| on a part.
 const SAMPLES: usize = 8;
 
 /// The part of a piece between two parameters, without a cusp inside.
@@ -38,7 +40,7 @@ pub struct Row {
     pub u: f64,
     rate: f64,
     bend: f64,
-    /// The length to the next row, by its own digits.
+    /// The length to the next row, not computed as a difference of s.
     pub length: f64,
 }
 
@@ -51,13 +53,13 @@ pub fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> 
     half * ((f0 + f2) + (f1 + f3))
 }
 
-/// The rows of a table around a length.
+/// The two rows of a table around a length.
 pub fn around(rows: &[Row], s: f64) -> [&Row; 2] {
     let i = panel_of(rows, s);
     [&rows[i], &rows[i + 1]]
 }
 
-/// The row before a length, not the last one.
+/// The index of the row before a length; never that of the last row.
 pub fn panel_of(rows: &[Row], s: f64) -> usize {
     rows[1..rows.len() - 1].partition_point(|row| row.s <= s)
 }
@@ -103,11 +105,12 @@ impl Row {
     }
 }
 
-/// Halves the panels of a part until its quadrature is accurate, for its length, or its quintics too, for its table.
+/// Halves the panels of a part until the quadrature is accurate (for the part's length) and, for its table, until the quintics
+/// are accurate as well.
 pub struct Halving<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     part: &'a Part,
-    /// The length by one panel, and the greatest of some tangents.
+    /// The length of the part by one panel, and the greatest |C'| of some samples.
     whole: f64,
     fastest: f64,
 }
@@ -121,12 +124,13 @@ impl<'a, const M: usize> Halving<'a, M> {
         Self { problem, part, whole: panel(problem, i, a, b), fastest }
     }
 
-    /// The rounding of a length up to u: that of tangents is relative to the longest tangent, that of u to itself.
+    /// The rounding error of the length of a panel from a to b: by tangents, relative to the longest tangent, and by b, relative
+    /// to b.
     fn noise(&self, [a, b]: [f64; 2], rate: f64) -> f64 {
         ROUNDING * ((b - a) * self.fastest + b / rate)
     }
 
-    /// Whether the length of a panel by its halves is that by the whole, or too short to tell.
+    /// Whether the length of a panel by its halves agrees with that by the whole panel, or is too short to tell.
     fn is_met(&self, length: f64, whole: f64, noise: f64) -> bool {
         (length - whole).abs() <= QUADRATURE * length + noise || length <= SHORTEST * self.whole
     }
@@ -136,7 +140,7 @@ impl<'a, const M: usize> Halving<'a, M> {
         self.length(self.part.u, self.whole, 0)
     }
 
-    /// The length between two parameters, with that of one panel.
+    /// The length between two parameters; `whole` is its value by one panel.
     fn length(&self, [a, b]: [f64; 2], whole: f64, depth: u32) -> f64 {
         let middle = 0.5 * (a + b);
         let halves = [[a, middle], [middle, b]];
@@ -148,7 +152,7 @@ impl<'a, const M: usize> Halving<'a, M> {
         self.length(halves[0], left, depth + 1) + self.length(halves[1], right, depth + 1)
     }
 
-    /// The rows of the part, whose last one has the length.
+    /// The rows of the part's table; the s of the last row is the part's length.
     pub fn table(&self) -> Vec<Row> {
         let [first, last] = self.part.u.map(|u| Row::new(self.problem, self.part.piece, u, 0.0));
         let mut rows = vec![first];
@@ -156,7 +160,7 @@ impl<'a, const M: usize> Halving<'a, M> {
         rows
     }
 
-    /// Appends rows for the panel from the last row to another one, whose length is not known yet.
+    /// Appends rows for the panel from the last row to the row `to`, whose s is not known yet.
     fn halve(&self, rows: &mut Vec<Row>, to: Row, whole: f64, depth: u32) {
         let (from, b) = (rows[rows.len() - 1], to.u);
         let middle = 0.5 * (from.u + b);
@@ -164,7 +168,7 @@ impl<'a, const M: usize> Halving<'a, M> {
             [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.part.piece, a, b));
         let half = Row::new(self.problem, self.part.piece, middle, from.s + left);
         let end = Row { s: from.s + left + right, ..to };
-        // On a symmetric part the quintic is right half-way and wrong on both sides; only its rate shows this.
+        // On a symmetric part the quintic is exact half-way but wrong on both sides; only its rate shows this.
         let odd = ODD * (end.s - from.s) * (from.rate_between(&end, half.s) - half.rate);
         let mut miss = (from.parameter_at(&end, half.s) - middle).abs().max(odd.abs()) / half.rate;
         let length = left + right;

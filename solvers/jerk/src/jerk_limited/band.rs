@@ -1,11 +1,11 @@
 //! LDLᵀ factor of the Newton matrix, a symmetric banded matrix: two unknowns (w, w') per station, coupled with those of
 //! the neighbouring stations.
 //!
-//! The matrix is scaled to a unit diagonal. The two unknowns of an end are tied to each other (w' = k w, where the path
-//! is at rest beyond the ramp), take given steps (where w and w' are given), or are free.
+//! The matrix is scaled to a unit diagonal. The two unknowns of an end are tied to each other (w' = k w, where a ramp leads to
+//! rest), have given steps (where w and w' are given), or are free.
 //!
-//! Each station waits for the one eliminated before it. So elimination goes from both ends to the station in the middle, and
-//! substitution back from there: the processor works on two stations at a time.
+//! The elimination of a station needs the result of the one eliminated before it. Elimination therefore runs from both ends to
+//! the station in the middle, and back substitution from there to both ends: two independent chains that the processor overlaps.
 
 use fearless_simd::Simd;
 
@@ -23,7 +23,7 @@ pub enum EndCondition {
     Free,
 }
 
-/// Added to the unit diagonal, as rounding may take this much from it.
+/// Added to the unit diagonal, because rounding errors may reduce it by this much.
 const REGULAR: f64 = 1e-13;
 
 /// The block [a b; b c] of each station, in columns.
@@ -59,8 +59,9 @@ struct Pivot {
 }
 
 impl Pivot {
-    /// Eliminates a station with unit diagonal, `inner` beside it and `less` taken from it by the stations before. Returns what
-    /// it takes from the next one, to which it is coupled by `o`. None if the matrix is not positive definite.
+    /// Eliminates the station with the block [1 inner; inner 1] − `less`, where `less` (00 01 11) comes from the stations
+    /// eliminated before. `o` couples it with the station eliminated next. Returns its factor and the `less` of that next
+    /// station, or None if the matrix is not positive definite.
     #[inline(always)]
     fn new(inner: f64, less: [f64; 3], o: [f64; 4]) -> Option<(Self, [f64; 3])> {
         let d0 = 1.0 + REGULAR - less[0];
@@ -77,14 +78,14 @@ impl Pivot {
         (d0 > 0.0 && d1 > 0.0).then_some((Self { per_d0, l, per_d1, rows }, less))
     }
 
-    /// What this station, with the values z, takes from those of the next one.
+    /// Forward substitution: what this station, with the values z, subtracts from the right-hand side of the next station.
     #[inline(always)]
     fn takes(&self, z: [f64; 2]) -> [f64; 2] {
         let m = &self.rows;
         [m[0] * z[0] + m[1] * z[1], m[2] * z[0] + m[3] * z[1]]
     }
 
-    /// Forward substitution.
+    /// Forward substitution: the values of this station, from its right-hand side z and what the stations before it subtract.
     #[inline(always)]
     fn forward(&self, z: [f64; 2], less: [f64; 2]) -> [f64; 2] {
         let a = z[0] - less[0];
@@ -101,7 +102,7 @@ impl Pivot {
 }
 
 impl Band {
-    /// Room for the matrix of so many intervals.
+    /// Sizes the matrix for a window of `intervals` intervals.
     pub fn resize(&mut self, intervals: usize) {
         self.intervals = intervals;
         let length = (intervals.div_ceil(LANES) + 1) * LANES;
@@ -138,7 +139,7 @@ impl Band {
         store(&mut self.coupling[3], at, m[1][3] * h2);
     }
 
-    /// Takes away the terms beyond the last interval.
+    /// Sets the terms of lanes beyond the last interval to 0.
     #[inline(always)]
     pub fn close(&mut self) {
         for column in &mut self.start {
@@ -160,7 +161,7 @@ impl Band {
         let (last, middle) = (self.intervals, self.intervals / 2);
         let o = &self.coupling;
         let (mut up, mut down) = ([0.0; 3], [0.0; 3]);
-        // The station at the other end, as far from it as station i is from this one.
+        // Station j is as far from the last station as station i is from the first.
         for i in 0..last - middle {
             let j = last - i;
             let back = [o[0][j - 1], o[2][j - 1], o[1][j - 1], o[3][j - 1]];
@@ -316,7 +317,7 @@ mod tests {
         band.resize(4);
         for k in 0..3 {
             for (i, block) in diagonal.iter().enumerate() {
-                // Any division among the intervals.
+                // Any split of the block between the two neighbouring intervals.
                 band.start[k][i] = block[k] - 0.1;
                 band.end[k][i] = 0.1;
             }

@@ -1,23 +1,24 @@
-//! A closer lower bound, from two cases of the speed at each of some stations.
+//! Computes a closer lower bound, from two cases of the speed at each of some stations.
 //!
-//! The relaxation (`relaxed`) takes a speed that jerk does not allow where that costs least: at stations where the
-//! multipliers of jerk of the plan add up to far more than the weight of the time, mostly where q''' jumps. Every profile
-//! has w ≤ a or w ≥ a at such a station, for any a; here a is a part of the plan's w. Each case has a closer relaxation:
+//! The relaxation (`relaxed`) allows a speed that the limit of jerk forbids where that costs little time: at stations where the
+//! multipliers of jerk of the plan add up to far more than the weight of the time, mostly where q''' jumps. Every profile has w ≤
+//! a or w ≥ a at such a station, for any a; here a is a fraction of the plan's w. Each case has a closer relaxation:
 //!
-//!   low    w ≤ a: a limit of speed. To be so slow costs time.
+//!   low    w ≤ a: a limit of the speed, which costs time.
 //!   high   a ≤ w ≤ b, with the greatest speed b of `speed_limit`. There w^(−1/2), which is convex, lies below its chord:
-//!          y ≤ A − K w holds for y = w^(−1/2). A y above w^(−1/2) now has a limit, and w near a or b no room for it.
+//!          y ≤ A − K w holds for y = w^(−1/2). In the relaxation y may exceed w^(−1/2); this limits it, and at w = a or w = b
+//!          it leaves only y = w^(−1/2).
 //!
-//! The path is cut between such stations. By the multipliers of the relaxation a window between two cuts takes
+//! The path is cut between such stations. The multipliers of the relaxation prove for a window between two cuts
 //!
 //!   time ≥ L₀ + π · (w, w') at both ends,
 //!
-//! and the sum of these bounds is that of `lower_bound`, in which the prices π of neighbours cancel but for rounding. Each
-//! case of a window is solved with the same prices, to time ≥ L + π · (w, w'). One of both cases holds, whatever holds in
-//! other windows, so that min(L_low, L_high) may replace L₀. So n stations need 2 n small solutions, not 2ⁿ.
+//! and the sum of these bounds is that of `lower_bound`, in which the prices π of neighbours cancel except for rounding. Each
+//! case of a window is solved with the same prices, which proves time ≥ L + π · (w, w'). One of both cases holds, independently
+//! of the other windows, so that min(L_low, L_high) may replace L₀. n stations therefore need 2 n small solutions, not 2ⁿ.
 //!
-//! L is the value of the dual function (`lower_bound`), valid for any multipliers. Those of jerk may now exceed the weight c
-//! of the time where y has a chord: with the multiplier μ ≥ 0 of 1 − (K/A) w − y/A ≥ 0, up to c + μ/A.
+//! L is the value of the dual function (`lower_bound`), valid for any multipliers. Where y has a chord, the multipliers of jerk
+//! may exceed the weight c of the time: with the multiplier μ ≥ 0 of 1 − (K/A) w − y/A ≥ 0 they may add up to c + μ/A.
 
 use std::ops::Range;
 
@@ -30,24 +31,25 @@ use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use feedplan_geometry::lanes::eight::{Lanes, LANES};
 
-/// A gap above this part of the time is wide.
+/// A gap above this fraction of the time counts as wide.
 const WIDE: f64 = 0.01;
-/// a, as a part of the plan's w: a greater part makes the chord closer, and the low case less slow.
+/// a, as a fraction of the plan's w. A greater fraction brings the chord closer to w^(−1/2), but makes the low case cost less
+/// time.
 const SPLIT: f64 = 0.7;
-/// The least loss of a chord that is worth two cases, as a part of the plan's time.
+/// Two cases are used at stations where the bound by a chord loses more than this fraction of the plan's time (see `stations`).
 const LEAST: f64 = 1e-5;
-/// The least number of intervals between such stations.
+/// The least number of intervals between two stations with cases.
 const APART: usize = 16;
-/// The solutions start at these parts of the plan's w, in the low case of a.
+/// In the low case the solution starts at `LOW` times `SPLIT` times the plan's w, in the high case at `HIGH` times the plan's w.
 const LOW: f64 = 0.9;
 const HIGH: f64 = 0.97;
-/// y starts above its least possible value by this part.
+/// y starts above its least possible value by this fraction.
 const ABOVE: f64 = 0.1;
-/// Complementarity gap at the end, as a part of a window's time.
+/// Complementarity gap at the end, as a fraction of a window's time.
 const TOLERANCE: f64 = 1e-4;
 const MAX_ITERATIONS: usize = 60;
 
-/// The line A − K w through two points of w^(−1/2).
+/// The line A − K w through two points of the curve w^(−1/2), with A = `most` and K = `fall`.
 #[derive(Clone, Copy, Debug)]
 struct Chord {
     most: f64,
@@ -55,7 +57,7 @@ struct Chord {
 }
 
 impl Chord {
-    /// From w = `low` to `high`.
+    /// The line through the points at w = `low` and w = `high`.
     fn new(low: f64, high: f64) -> Self {
         let [start, end] = [low, high].map(|w| 1.0 / w.sqrt());
         let fall = (start - end) / (high - low);
@@ -66,7 +68,8 @@ impl Chord {
         self.most - self.fall * w
     }
 
-    /// Limits y at a station, in the rows of speed at both of its collocation points; `of_y` are the coefficients of y.
+    /// Limits y at a station by the chord, in the rows of speed at both of its collocation points; `of_y` are the coefficients of
+    /// y.
     fn limit(&self, rows: &mut Constraints, of_y: &mut [[Lanes; COUNT]], station: usize) {
         for (n, p) in both_sides(station) {
             let (b, lane) = (n / LANES, n % LANES);
@@ -76,22 +79,22 @@ impl Chord {
     }
 }
 
-/// The collocation points at a station inside a window: their intervals, and their places in these.
+/// The two collocation points at a station inside a window: each as interval and index of the point in it.
 fn both_sides(station: usize) -> [(usize, usize); 2] {
     [(station - 1, LAST), (station, 0)]
 }
 
-/// A station with the window around it.
+/// A station with two cases, and the window around it.
 struct Place {
     station: usize,
     window: Range<usize>,
-    /// What the relaxation proves.
+    /// The bound that the relaxation proves for the window.
     known: Part,
-    /// The cost of the states at the ends, against those of the plan.
+    /// The cost of the states at the window's ends, relative to the states of the plan.
     prices: [Price; 2],
 }
 
-/// The part of the intervals `core` of a window, by cases where the relaxation leaves a wide gap.
+/// The part of the intervals `core` of a window, by cases if the relaxation leaves a wide gap.
 pub fn part(
     planned: &Planned,
     core: &Range<usize>,
@@ -143,11 +146,12 @@ fn by_cases(
 }
 
 impl Place {
-    /// The part of the window by the lesser one of both cases, as either may hold; with the prices that it had.
+    /// The bound of the window by the lesser bound of both cases, because either may hold; the prices are those of `known`. If a
+    /// case has no solution, this is `known`.
     fn with(&self, cases: [Option<f64>; 2]) -> Part {
         let mut part = self.known.clone();
         if let [Some(high), Some(low)] = cases {
-            // The cases count the cost of the ends from the states of the plan, the part counts it from 0.
+            // The cases count the cost of the ends from the states of the plan, the part counts it from state 0.
             let from_plan: f64 = self.prices.iter().map(|price| price.of([0.0; 2])).sum();
             part.least = part.least.max(high.min(low) - from_plan);
         }
@@ -155,8 +159,8 @@ impl Place {
     }
 }
 
-/// The stations with two cases, where a chord loses more than `least`, in s; `known` is what the relaxation proves of a
-/// window.
+/// The stations with two cases, where the bound by a chord loses more than `least`, in s. `known` gives the bound that the
+/// relaxation proves for a window.
 fn places(
     planned: &Planned,
     core: &Range<usize>,
@@ -165,7 +169,7 @@ fn places(
 ) -> Vec<Place> {
     let stations = stations(planned, core, least);
     let middle = |pair: &[usize]| (pair[0] + pair[1]) / 2;
-    // The intervals at the ends stay as they are, with what is known of these.
+    // The first and the last interval of the core have no cases; their bound is that of the relaxation.
     let starts = std::iter::once(core.start + 1).chain(stations.windows(2).map(middle));
     let ends = stations.windows(2).map(middle).chain([core.end - 1]);
     let place = |(&station, (start, end)): (&usize, (usize, usize))| {
@@ -177,8 +181,8 @@ fn places(
     stations.iter().zip(starts.zip(ends)).map(place).collect()
 }
 
-/// The stations where a chord loses more than `least`, in s, by the multipliers of the plan; those that lose most first
-/// take their place.
+/// The stations where the bound by a chord and by the plan's multipliers loses more than `least`, in s: the excess of the
+/// multipliers of jerk over c, times the height of the chord above w^(−1/2). Stations with greater losses are chosen first.
 fn stations(planned: &Planned, core: &Range<usize>, least: f64) -> Vec<usize> {
     let Planned { rows, x, .. } = *planned;
     let mut dual = vec![];
@@ -207,13 +211,13 @@ fn stations(planned: &Planned, core: &Range<usize>, least: f64) -> Vec<usize> {
     stations
 }
 
-/// The chord of the high case at a station, where the plan has this w.
+/// The chord of the high case at a station where the plan has this w.
 fn chord(rows: &Constraints, station: usize, w: f64) -> Chord {
     let high = both_sides(station).map(|(n, p)| 1.0 / rows.speed(n, p));
     Chord::new(SPLIT * w, high[0].min(high[1]))
 }
 
-/// What a case proves of the time of a window with the cost of its ends, in s; None without a solution.
+/// The lower bound that a case proves for the time of a window plus the cost of its ends, in s; None if no solution is found.
 fn case(
     planned: &Planned,
     place: &Place,
@@ -290,7 +294,7 @@ mod tests {
 
     #[test]
     fn the_lesser_case_counts_by_hand() {
-        // 1 s less 0.5 s for each of w at the start: at the plan's w = 4 there −1 s. Cases count from there.
+        // The part is 1 s − 0.5 s · w at the start, which is −1 s for the plan's w = 4. The cases count from that w.
         let known = Part { least: 1.0, price: [[-0.5, 0.0], [0.0; 2]], ..Part::default() };
         let prices = [Price { price: [0.5, 0.0], from: [4.0, 0.0] }, Price::default()];
         let place = Place { station: 1, window: 0..2, known, prices };
@@ -324,7 +328,8 @@ mod tests {
                     continue;
                 }
                 held += 1;
-                // A multiplier of jerk far above the weight of the time, where z keeps the limit, and one of the chord.
+                // A multiplier of jerk far above the weight of the time if z keeps the limit of jerk, and a multiplier of the
+                // chord.
                 let used = rows.utilisation(&z);
                 let keeps = used[station - 1][2] <= 1.0 && used[station][2] <= 1.0;
                 over += usize::from(keeps);

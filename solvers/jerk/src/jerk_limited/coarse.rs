@@ -1,9 +1,10 @@
-//! Starts near the optimum of a window, from a solution on a coarse grid.
+//! Computes starts near the optimum of a window from a solution on a coarse grid.
 //!
-//! Far from the optimum an interior point needs most of its iterations, and few digits of x. So the window is first solved
-//! with a third of its intervals: a spline on the coarse grid is one on the fine grid, too. Each collocation point of a
-//! long interval takes the path and its limits from the nearest collocation point of the short intervals. The coarse
-//! solution may exceed limits of the fine grid; a part of the way back to a valid plan leads inside them.
+//! An interior-point method needs most of its iterations far from the optimum, where few digits of x are enough. The window is
+//! therefore first solved with a third of its intervals: a spline on the coarse grid is also one on the fine grid. Each
+//! collocation point of a long interval takes the path's derivatives and limits from the nearest collocation point of the short
+//! intervals. The coarse solution may exceed limits of the fine grid; a point on the way from it back to a valid plan is inside
+//! them.
 
 use super::constraints::Constraints;
 use super::hermite::{self, COUNT};
@@ -12,20 +13,20 @@ use super::model::Model;
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 
-/// Short intervals in a long one, and the fewest in a window that is solved on the coarse grid.
+/// Short intervals per long interval, and the least number of short intervals of a window that is solved on the coarse grid.
 const GROUP: usize = 3;
 const FEWEST: usize = 30;
-/// Complementarity gap of the coarse solution, as a part of the time.
+/// Complementarity gap of the coarse solution, as a fraction of the time.
 const GAP: f64 = 0.2;
-/// Uses of a limit below this part do not count.
+/// Lower uses of a limit are replaced by this one in quotients.
 const LITTLE: f64 = 0.02;
-/// Use of a speed limit by a start that leaves room.
+/// A speed limit is not tightened so far that the start uses more than this of it.
 const FULL: f64 = 0.9;
-/// Parts of the way back that are tried.
+/// Fractions of the way from the coarse solution back to the valid plan that are tried.
 const BACK: [f64; 3] = [0.05, 0.15, 0.4];
 
-/// Splines to start from, each with its effort: the nearest to the coarse solution first, the valid plan `far` last. With the
-/// iterations spent, as a number of those on the fine grid.
+/// Splines to start from, each with its effort: the nearest to the coarse solution first, the valid plan `far` last. Also returns
+/// the number of iterations spent, converted to iterations on the fine grid.
 pub fn starts<'e, X: Model>(
     rows: &Constraints,
     ends: [WindowEnd; 2],
@@ -49,8 +50,9 @@ pub fn starts<'e, X: Model>(
     (starts, iterations)
 }
 
-/// The constraints on the coarse grid, tightened where limits change between its collocation points: by what `far` uses more
-/// of them on the fine grid, and to the least of the speed limits if x, which is `far` on the coarse grid, leaves room.
+/// The constraints on the coarse grid, tightened where limits change between its collocation points: by the factor by which `far`
+/// uses more of them on the fine grid than x, which is `far` on the coarse grid; and the speed also to the least limit of the
+/// short intervals, but only as far as x stays inside.
 fn on_coarse_grid(rows: &Constraints, far: &[f64], x: &[f64]) -> Constraints {
     let mut coarse = joined(rows);
     let (all_used, all_most) = (coarse.utilisation(x), rows.utilisation(far));
@@ -73,13 +75,13 @@ fn on_coarse_grid(rows: &Constraints, far: &[f64], x: &[f64]) -> Constraints {
     coarse
 }
 
-/// Long intervals, each in place of short ones.
+/// The constraints on long intervals, each in place of `GROUP` short ones.
 fn joined(rows: &Constraints) -> Constraints {
     let mut coarse = rows.emptied(rows.count().div_ceil(GROUP));
     for first in (0..rows.count()).step_by(GROUP) {
         let short = first..rows.count().min(first + GROUP);
         let h: f64 = short.clone().map(|n| rows.h(n)).sum();
-        // The short interval and the index of the nearest collocation point.
+        // The short interval and the index of its collocation point that is nearest.
         let nearest = hermite::POINTS.map(|part| {
             let (mut n, mut s) = (first, part * h);
             while n + 1 < short.end && s > rows.h(n) {
@@ -94,13 +96,13 @@ fn joined(rows: &Constraints) -> Constraints {
     coarse
 }
 
-/// A spline's values at the stations of the coarse grid.
+/// The values of a spline on the fine grid at the stations of the coarse grid.
 fn restrict(x: &[f64]) -> Vec<f64> {
     let last = x.len() - 2;
     x[..last].chunks(2 * GROUP).flat_map(|group| [group[0], group[1]]).chain([x[last], x[last + 1]]).collect()
 }
 
-/// A spline on the coarse grid at the stations of the fine grid.
+/// The values of a spline on the coarse grid at the stations of the fine grid.
 fn prolong(x: &[f64], rows: &Constraints) -> Vec<f64> {
     let lengths: Vec<f64> = (0..rows.count()).map(|n| rows.h(n)).collect();
     hermite::prolong(x, lengths.chunks(GROUP).map(<[f64]>::len), &lengths)
@@ -111,7 +113,7 @@ mod tests {
     use super::*;
     use crate::path_problem::Limits;
 
-    /// Intervals of these lengths; q' counts the collocation points, 4 for each interval.
+    /// Constraints on intervals of these lengths; q' is the index of the collocation point, 4 per interval.
     fn rows(lengths: &[f64]) -> Constraints {
         let limits = Limits { velocity: [[1.0]; 2], acceleration: [[1.0]; 2], jerk: [1.0] };
         let mut rows = Constraints::new(&limits);

@@ -1,5 +1,5 @@
-//! Numbers at the stations of a window, in columns: the n-th stations that a block of intervals sees are neighbours, so that
-//! they are read and written as one vector.
+//! Values (w, w') at the stations of a window, stored as one array of w and one of w'. The stations of a block's eight intervals
+//! are adjacent in each array, so that they are read and written as one SIMD vector.
 
 use fearless_simd::Simd;
 
@@ -10,12 +10,12 @@ use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 pub struct Columns {
     pub w: Vec<f64>,
     pub slope: Vec<f64>,
-    /// w in lanes without an interval; w' is 0 there.
+    /// The value of w beyond the last station, in lanes without an interval; w' is 0 there.
     beyond: f64,
 }
 
 impl Columns {
-    /// A spline x = (w_0, w'_0, w_1, …), and w = 1 beyond it.
+    /// The columns of a spline x = (w_0, w'_0, w_1, …), with w = 1 beyond its last station.
     pub fn new(x: &[f64]) -> Self {
         let mut columns = Self::default();
         columns.resize(x.len() / 2 - 1, 1.0);
@@ -23,7 +23,7 @@ impl Columns {
         columns
     }
 
-    /// Room for the stations of so many intervals.
+    /// Sizes both columns for a window of `intervals` intervals; w beyond its last station becomes `beyond`.
     pub fn resize(&mut self, intervals: usize, beyond: f64) {
         let length = (intervals.div_ceil(LANES) + 1) * LANES;
         self.beyond = beyond;
@@ -49,12 +49,12 @@ impl Columns {
         [self.w[station], self.slope[station]]
     }
 
-    /// The local coefficients of the intervals of a block, of length h; `live` is 1 for an interval, 0 without one.
+    /// The local coefficients of the intervals of a block, of length h. `live` is 1 for each lane with an interval, else 0.
     #[inline(always)]
     pub fn local<S: Simd>(&self, block: usize, h: Register<S>, live: Lanes) -> [Register<S>; 4] {
         let at = block * LANES;
         let load = |column: &[f64], at: usize| eight(column, at).load(h.simd());
-        // The last station is the start of no interval.
+        // The last station is the start of no interval: such lanes get `beyond` instead of w.
         let beyond = (Lanes::ONE - live.load(h.simd())) * self.beyond;
         [
             load(&self.w, at) * live + beyond,
@@ -65,7 +65,7 @@ impl Columns {
     }
 }
 
-/// Terms of each interval at the station where it starts and at the station where it ends.
+/// What each interval contributes to the values at its first station (`start`) and at its last station (`end`).
 #[derive(Clone, Debug, Default)]
 pub struct Terms {
     pub start: Columns,
@@ -79,7 +79,7 @@ impl Terms {
         (self.end.w[0], self.end.slope[0]) = (0.0, 0.0);
     }
 
-    /// Sets the terms of a block, given by its local coefficients.
+    /// Sets the contributions of a block of intervals, given in its local coefficients.
     #[inline(always)]
     pub fn set<S: Simd>(&mut self, block: usize, h: Register<S>, [w0, d0, w1, d1]: [Register<S>; 4]) {
         let at = block * LANES;
@@ -89,17 +89,17 @@ impl Terms {
         store(&mut self.end.slope, at + 1, d1 * h);
     }
 
-    /// Sets the sums of the terms of each station, times a factor.
+    /// Sets `out` to `factor` times the sum of both contributions at each station.
     pub fn give(&self, out: &mut Columns, factor: f64) {
         self.at_each(out, |out, sum| *out = factor * sum);
     }
 
-    /// Adds a part of the terms of each station.
+    /// Adds `part` times the sum of both contributions at each station to `out`.
     pub fn add_to(&self, out: &mut Columns, part: f64) {
         self.at_each(out, |out, sum| *out += part * sum);
     }
 
-    /// f(number of `out`, sum of the terms) at each station.
+    /// Calls f(value of `out`, sum of both contributions) at each station.
     #[inline(always)]
     fn at_each(&self, out: &mut Columns, f: impl Fn(&mut f64, f64)) {
         let Self { start, end } = self;
@@ -111,7 +111,7 @@ impl Terms {
         }
     }
 
-    /// Takes away the terms beyond the last interval.
+    /// Sets the contributions of lanes beyond the last interval to 0.
     #[inline(always)]
     pub fn close(&mut self, intervals: usize) {
         self.start.w[intervals..].fill(0.0);

@@ -6,13 +6,13 @@
 //!   jerk           w^(−1/2) ∓ (q''' w + 3/2 q'' w' + 1/2 q' w'')/J ≥ 0
 //!   speed          1 − w/w_max ≥ 0,   w ≥ 0
 //!
-//! At the ends of an interval the last row holds the inner Bernstein coefficients of the cubic above 0 instead of w. w
-//! at a station lies between the coefficients on both sides of it, so that w is above 0 everywhere.
+//! At the two ends of an interval the last row keeps the inner Bernstein coefficient of the cubic next to that end above 0,
+//! instead of w. w at a station lies between the coefficients on both sides of it, so that w is above 0 everywhere.
 //!
-//! The slack of the jerk is convex in w: its tangent at a valid plan is a safe inner constraint.
+//! The slack of the jerk is convex in w: a constraint on its tangent at a valid plan is a safe inner constraint.
 //!
-//! A block holds the limits of eight neighbouring intervals in the lanes of vectors. Lanes beyond the last interval have no
-//! limits, and weigh nothing.
+//! A block holds the limits of eight neighbouring intervals in the lanes of SIMD vectors. Lanes beyond the last interval have no
+//! limits and contribute nothing to sums.
 
 use std::ops::Range;
 
@@ -26,13 +26,14 @@ use super::window_end::WindowEnd;
 use crate::path_problem::{Geometry, Limits, PathPoint};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
-/// Steps from a collocation point along the tangent of w to an inner Bernstein coefficient, as parts of the interval.
+/// Step from a collocation point along the tangent of w that leads to an inner Bernstein coefficient, as a fraction of the
+/// interval; 0 where w itself is used.
 const INWARDS: [f64; COUNT] = [1.0 / 3.0, 0.0, 0.0, -1.0 / 3.0];
 
-/// The limits on neighbouring intervals between two stations, but for the derivatives of the axes.
+/// The limits on eight neighbouring intervals. The derivatives of the axes are in `Constraints`.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// Their lengths, in mm.
+    /// The lengths of the intervals, in mm.
     pub h: Lanes,
     /// Factor by which the jerk limit is tighter than the machine's: 1 or more.
     pub jerk: Lanes,
@@ -41,13 +42,14 @@ pub struct Block {
     pub live: Lanes,
 }
 
-/// The same at one collocation point of each.
+/// The limits at one collocation point of each of the eight intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
-    /// 1/w_max, and that by the speed cap of the path alone.
+    /// 1/w_max by all limits on the speed, in s²/mm².
     pub speed: Lanes,
+    /// 1/w_max by the speed cap of the path alone, in s²/mm².
     pub cap: Lanes,
-    /// Factor by which the acceleration limit is tighter: 1 or more, 0 where it does not apply.
+    /// Factor by which the acceleration limit is tighter than the machine's: 1 or more, 0 where it does not apply.
     pub acceleration: Lanes,
 }
 
@@ -61,7 +63,8 @@ pub struct Constraints {
     pub acceleration: Vec<Sides>,
     /// 1/J of each axis.
     pub per_jerk: Vec<f64>,
-    /// Whether the acceleration has rows: on most windows it stays far below its limits.
+    /// Whether the acceleration limits have rows. On most windows the acceleration stays far below its limits, and the rows are
+    /// left out.
     pub accelerates: bool,
 }
 
@@ -74,7 +77,7 @@ pub struct RowLayout {
 }
 
 impl RowLayout {
-    /// Both limits of one axis.
+    /// Rows per axis: one for its upper limit, one for its lower limit.
     pub const PAIR: usize = 2;
 
     #[inline(always)]
@@ -98,7 +101,7 @@ impl RowLayout {
         self.acceleration() + if self.accelerates { Self::PAIR * self.axes } else { 0 }
     }
 
-    /// Rows of an interval, and of a block.
+    /// Rows of an interval at all collocation points; also the number of row vectors of a block.
     #[inline(always)]
     pub const fn all(self) -> usize {
         COUNT * self.count()
@@ -115,7 +118,7 @@ impl RowLayout {
         &mut all[(block * COUNT + p) * self.count()..][..self.count()]
     }
 
-    /// The pairs of jerk and of acceleration among the rows at a collocation point.
+    /// The rows of jerk and the rows of acceleration at a collocation point, each in pairs of upper and lower limit.
     #[inline(always)]
     pub fn pairs(self, rows: &[Lanes]) -> [std::slice::ChunksExact<'_, Lanes>; 2] {
         [&rows[..self.speed()], &rows[self.acceleration()..]].map(|rows| rows.chunks_exact(Self::PAIR))
@@ -130,7 +133,7 @@ impl RowLayout {
 }
 
 impl Block {
-    /// No limits on intervals of 1 mm.
+    /// A block without intervals: lanes of length 1 mm, without limits.
     const NONE: Self = Self {
         h: Lanes::ONE,
         jerk: Lanes::ONE,
@@ -138,7 +141,7 @@ impl Block {
         live: Lanes::ZERO,
     };
 
-    /// Steps from collocation point p along the tangent of w to the inner Bernstein coefficients: if these and w at the
+    /// Steps in mm from collocation point p along the tangent of w to the inner Bernstein coefficients: if these and w at the
     /// stations are above 0, w is above 0 everywhere.
     #[inline(always)]
     pub fn inwards<S: Simd>(&self, simd: S, p: usize) -> Register<S> {
@@ -147,7 +150,7 @@ impl Block {
 }
 
 impl Constraints {
-    /// Without intervals.
+    /// Constraints for these limits of the axes, without intervals.
     pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
         Self {
             count: 0,
@@ -186,7 +189,7 @@ impl Constraints {
         self.blocks[n / LANES].h.values()[n % LANES]
     }
 
-    /// The factor by which the jerk limit of an interval is tighter.
+    /// The factor by which the jerk limit of an interval is tighter than the machine's.
     pub fn jerk(&self, n: usize) -> f64 {
         self.blocks[n / LANES].jerk.values()[n % LANES]
     }
@@ -201,7 +204,7 @@ impl Constraints {
         self.q(n / LANES, p)[axis].map(|lanes| lanes.values()[n % LANES])
     }
 
-    /// The greatest r = w^(3/4) on an interval if the slope of r is at most k.
+    /// The greatest r = w^(3/4) that the limits allow on an interval if |dr/ds| is at most k.
     pub fn envelope_cap<const M: usize>(&self, n: usize, limits: &Limits<M>, k: f64) -> f64 {
         let cap = |p: usize| {
             let of = |order: usize| std::array::from_fn(|axis| self.derivatives(n, p, axis)[order]);
@@ -221,7 +224,8 @@ impl Constraints {
         block.jerk.values_mut()[lane] *= jerk;
     }
 
-    /// Lowers the greatest w at a collocation point of an interval. A limit that does not apply stays so.
+    /// Lowers w_max at a collocation point of an interval to w, if w is less. A limit that was dropped (1/w_max = 0) stays
+    /// dropped.
     pub fn lower(&mut self, n: usize, p: usize, w: f64) {
         let per_w = &mut self.blocks[n / LANES].points[p].speed.values_mut()[n % LANES];
         if *per_w > 0.0 {
@@ -229,7 +233,7 @@ impl Constraints {
         }
     }
 
-    /// Takes away all intervals, and makes room for so many.
+    /// Removes all intervals and reserves memory for `room` intervals.
     pub fn clear(&mut self, room: usize) {
         let blocks = room.div_ceil(LANES);
         self.count = 0;
@@ -239,7 +243,7 @@ impl Constraints {
         self.q.reserve(blocks * COUNT * self.axes());
     }
 
-    /// The same limits of the axes, without intervals, but with room for so many.
+    /// Constraints with the same limits of the axes but without intervals; memory for `room` intervals is reserved.
     pub fn emptied(&self, room: usize) -> Self {
         let (acceleration, per_jerk) = (self.acceleration.clone(), self.per_jerk.clone());
         let mut empty = Self { blocks: vec![], q: vec![], acceleration, per_jerk, ..*self };
@@ -247,7 +251,7 @@ impl Constraints {
         empty
     }
 
-    /// Appends an interval of a length in mm, with a factor of its jerk limit and without other limits.
+    /// Appends an interval of length h in mm, with its factor of the jerk limit and without other limits.
     pub fn push(&mut self, h: f64, jerk: f64) {
         let (b, lane) = (self.count / LANES, self.count % LANES);
         if lane == 0 {
@@ -261,8 +265,8 @@ impl Constraints {
         self.count += 1;
     }
 
-    /// Sets 1/w_max, that by the speed cap of the path, the factor of the acceleration limit, and q', q'', q''' by the axis at
-    /// collocation point p of the last interval.
+    /// Sets the limits at collocation point p of the last interval: 1/w_max by all limits and by the speed cap of the path alone,
+    /// the factor of the acceleration limit, and q', q'', q''' of each axis.
     pub fn set(
         &mut self,
         p: usize,
@@ -283,7 +287,8 @@ impl Constraints {
         }
     }
 
-    /// Appends an interval. At each collocation point it has the limits of others, at the point `from` of an interval.
+    /// Appends an interval of length h in mm. Its limits at collocation point p are those of `others` at `from[p]`, a pair of
+    /// interval and collocation point.
     pub fn push_from(&mut self, others: &Self, h: f64, jerk: f64, from: [(usize, usize); COUNT]) {
         self.push(h, jerk);
         for (p, (n, at)) in from.into_iter().enumerate() {
@@ -294,8 +299,8 @@ impl Constraints {
         }
     }
 
-    /// Takes the intervals between `stations`. Interval n lies on `pieces[n]`, with limits of jerk tightened by
-    /// `jerk_factor[n]`; `station_cap` is the speed cap at a station, infinite without one.
+    /// Replaces all intervals by those between `stations` (arc lengths in mm). Interval n lies on `pieces[n]`, and its jerk limit
+    /// is tightened by `jerk_factor[n]`. `station_cap` is the additional speed cap at a station in mm/s, infinite if it has none.
     pub fn sample<const M: usize>(
         &mut self,
         geometry: &impl Geometry<M>,
@@ -327,9 +332,9 @@ impl Constraints {
         }
     }
 
-    /// Takes a range of the intervals of others.
+    /// Replaces all intervals by a range of the intervals of `others`.
     pub fn copy(&mut self, others: &Self, range: Range<usize>) {
-        // Blocks that are the same in both are copied whole.
+        // If the range starts at a block boundary of `others`, its full blocks are copied as they are.
         let whole = if range.start.is_multiple_of(LANES) { range.len() / LANES } else { 0 };
         let (first, q) = (range.start / LANES, COUNT * self.axes());
         self.clear(range.len());
@@ -342,7 +347,7 @@ impl Constraints {
         }
     }
 
-    /// The acceleration of an axis at collocation point p of a block, over A.
+    /// The acceleration of an axis at collocation point p of a block, divided by its (tightened) mean limit A.
     #[inline(always)]
     fn acceleration<S: Simd>(
         &self,
@@ -356,7 +361,7 @@ impl Constraints {
         (q2 * w + q1 * (w1 * 0.5)) * self.acceleration[k].per_mean * tight
     }
 
-    /// The jerk/√w of an axis at collocation point p of a block, over J.
+    /// The jerk/√w of an axis at collocation point p of a block, divided by its (tightened) limit J.
     #[inline(always)]
     pub fn jerk_of<S: Simd>(
         &self,
@@ -369,7 +374,8 @@ impl Constraints {
         (q3 * w + q2 * (w1 * 1.5) + q1 * (w2 * 0.5)) * self.per_jerk[k] * self.blocks[block].jerk
     }
 
-    /// The slacks at collocation point p of a block, with w^(−1/2) = `pace` and the last row as given.
+    /// The slacks at collocation point p of a block. `pace` is w^(−1/2) (or the variable in its place), `last` the slack of the
+    /// row w ≥ 0.
     #[inline(always)]
     pub fn slack<S: Simd>(
         &self,
@@ -396,7 +402,7 @@ impl Constraints {
         out[layout.positive()] = last.into();
     }
 
-    /// The change of the slacks for a step with this motion.
+    /// The change of the slacks for a step of (w, w', w'') by `motion`, of w^(−1/2) by `pace` and of the row w ≥ 0 by `last`.
     #[inline(always)]
     pub fn slack_step<S: Simd>(
         &self,
@@ -421,7 +427,8 @@ impl Constraints {
         out[layout.positive()] = last.into();
     }
 
-    /// Σ weight ∇s ∇sᵀ over the linear parts of the rows at collocation point p of a block.
+    /// Σ weight ∇s ∇sᵀ at collocation point p of a block, over the parts of the rows of jerk, speed and acceleration that are
+    /// linear in (w, w', w'').
     #[inline(always)]
     pub fn curvature<S: Simd>(&self, simd: S, block: usize, p: usize, weight: &[Lanes]) -> Form<S> {
         let (own, layout) = (&self.blocks[block], self.layout());
@@ -459,8 +466,8 @@ impl Constraints {
         m
     }
 
-    /// Σ aim ∇s over the linear parts of the rows at collocation point p of a block, as a form of (w, w', w''), and Σ aim
-    /// of the jerk's rows.
+    /// Σ aim ∇s at collocation point p of a block, over the parts of the rows of jerk, speed and acceleration that are linear in
+    /// (w, w', w''), as coefficients of these; and Σ aim of the rows of jerk.
     #[inline(always)]
     pub fn pull<S: Simd>(
         &self,
@@ -490,7 +497,7 @@ impl Constraints {
         (g, jerk)
     }
 
-    /// The greatest use of the limits of speed, acceleration and jerk on each interval by a spline; 1 is at a limit.
+    /// The greatest use of the limits of speed, acceleration and jerk by the spline x on each interval; 1 is at a limit.
     pub fn utilisation(&self, x: &[f64]) -> Vec<[f64; 3]> {
         dispatch!(Level::new(), simd => self.utilisation_on(simd, x))
     }
@@ -523,7 +530,7 @@ impl Constraints {
         out
     }
 
-    /// Drops the limits of speed and acceleration at ends that are given.
+    /// Drops the limits of speed and acceleration at the ends whose state (w, w') is given.
     pub fn drop_at_ends(&mut self, ends: &[WindowEnd; 2]) {
         let last = self.count - 1;
         for (kind, (n, p)) in ends.iter().zip([(0, 0), (last, LAST)]) {

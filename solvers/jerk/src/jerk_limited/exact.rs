@@ -1,4 +1,4 @@
-//! The true problem on a window: the time ∫ ds/√w under the constraints as they are.
+//! The true problem on a window, without relaxation: least time ∫ ds/√w under `Constraints`.
 
 use fearless_simd::Simd;
 
@@ -9,7 +9,7 @@ use super::hermite::{combine, AT_NODES, COUNT, WEIGHTS};
 use super::model::Model;
 use feedplan_geometry::lanes::eight::{Lanes, Register};
 
-/// w^(−1/2) at the collocation points of each block, as the slacks were last evaluated.
+/// w^(−1/2) at the collocation points of each block, from the last evaluation of the slacks.
 #[derive(Default)]
 pub struct Exact {
     pace: Vec<[Lanes; COUNT]>,
@@ -77,7 +77,7 @@ impl Model for Exact {
             form[3] += last * inwards * inwards;
             let [jerks, _] = layout.pairs(weight);
             for ((weight, &[q1, q2, q3]), per_jerk) in jerks.zip(rows.q(block, p)).zip(&rows.per_jerk) {
-                // The slope of w^(−1/2) adds to the two rows of an axis's jerk.
+                // The two jerk rows of an axis also contain w^(−1/2), whose derivative by w is −`fall`.
                 let [up, down] = [weight[0].load(simd), weight[1].load(simd)];
                 let (both, turn) = (up + down, (up - down) * fall);
                 let turn = turn * own.jerk * *per_jerk;

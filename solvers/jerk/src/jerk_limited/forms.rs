@@ -1,14 +1,15 @@
-//! Forms of (w, w', w'') at a collocation point of neighbouring intervals, in their local coefficients; powers of w.
+//! Converts linear and quadratic forms of (w, w', w'') at a collocation point to the local coefficients of the intervals of a
+//! block; powers of w.
 
 use fearless_simd::Simd;
 use feedplan_geometry::lanes::eight::Register;
 
 use super::hermite::{combine, Basis, BEND, LAST, SLOPE, VALUE};
 
-/// The symmetric form of (w, w', w''): 00 01 02 11 12 22.
+/// A symmetric quadratic form of (w, w', w''): the matrix elements 00 01 02 11 12 22.
 pub type Form<S> = [Register<S>; 6];
 
-/// The upper half of a matrix, and a gradient, in the local coefficients (w, h w') at both ends.
+/// The upper triangle of a matrix, and a gradient, in the local coefficients (w, h w') at both ends.
 pub struct Local<S: Simd> {
     pub matrix: [[Register<S>; 4]; 4],
     pub gradient: [Register<S>; 4],
@@ -21,7 +22,7 @@ impl<S: Simd> Local<S> {
         Self { matrix: [[zero; 4]; 4], gradient: [zero; 4] }
     }
 
-    /// Adds a form at collocation point `p` of intervals of length 1/`per_h`.
+    /// Adds a quadratic form of (w, w', w'') at collocation point `p` of intervals of length 1/`per_h`.
     #[inline(always)]
     pub fn add(&mut self, p: usize, per_h: Register<S>, form: &Form<S>) {
         let per_h2 = per_h * per_h;
@@ -53,7 +54,7 @@ impl<S: Simd> Local<S> {
         }
     }
 
-    /// The same where w and h w' are the local coefficients K and K + 1.
+    /// Adds a quadratic form at an end of the intervals, where w and h w' are the local coefficients K and K + 1.
     #[inline(always)]
     fn add_at_end<const K: usize>(&mut self, m: &Form<S>, bend: &Basis) {
         for j in 0..4 {
@@ -83,7 +84,7 @@ pub fn motion<S: Simd>(p: usize, per_h: Register<S>, u: &[Register<S>; 4]) -> [R
     [w, slope * per_h, combine(&BEND[p], u) * (per_h * per_h)]
 }
 
-/// Adds a linear form of (w, w', w'') at collocation point `p`, in local coefficients.
+/// Adds a linear form of (w, w', w'') at collocation point `p` to `out`, in local coefficients.
 #[inline(always)]
 pub fn project<S: Simd>(p: usize, per_h: Register<S>, linear: &[Register<S>; 3], out: &mut [Register<S>; 4]) {
     let [g0, g1, g2] = [linear[0], linear[1] * per_h, linear[2] * (per_h * per_h)];

@@ -1,6 +1,6 @@
-//! The stations of the spline, from the samples of the speed envelope and the speed caps: about equal in travel time
-//! where the speed changes, closer where the path turns and an axis may limit the speed, far apart elsewhere, and on
-//! every knot of the path.
+//! Computes the stations of the spline, from the samples of the speed envelope and the speed caps: about equally spaced in travel
+//! time where the speed changes, closer where the path turns and an axis may limit the speed, far apart elsewhere, and on every
+//! knot of the path.
 
 use super::speed_envelope::{Change, EnvelopeSample, Slopes, ROUNDING};
 use std::ops::Range;
@@ -9,19 +9,19 @@ use super::constraints::Constraints;
 use super::window_end::WindowEnd;
 use crate::path_problem::{Geometry, Problem, SpeedCap};
 
-/// r counts as changing where it uses more than this part of its greatest slope.
+/// r counts as changing where its slope is more than this fraction of its greatest slope.
 const CHANGING: f64 = 0.02;
 /// A path that turns by less than this (in radians) over the length r/K counts as straight.
 const TURNING: f64 = 0.02;
-/// Lengths of intervals grow at most by this part of the distance along the path, where the speed is that of one feed and
-/// elsewhere.
+/// The length of intervals, times the resolution, grows by at most this multiple of the distance along the path: where one feed
+/// sets the speed, and elsewhere.
 const GROWTH: [f64; 2] = [3.0, 0.5];
-/// The longest interval, as a part of the length over which the path turns: about one radian of a circle. No interval
-/// is planned longer than the path.
+/// The longest interval, as a fraction of the length over which the path turns: about one radian of a circle. No interval is
+/// longer than the path.
 const LONGEST: f64 = 0.5;
-/// An interval that overlaps the reach of a cap by less than this part of the reach is outside (rounding).
+/// An interval that overlaps the reach of a cap by less than this fraction of the reach counts as outside (rounding).
 const CLOSE: f64 = 1e-6;
-/// From rest to speed and from speed to rest there are at least this many intervals times the resolution.
+/// For each end at rest, the grid has at least this many intervals times the resolution.
 const FEWEST: f64 = 13.0;
 
 /// Arc lengths of the stations, the piece of each interval, and the speed caps at stations.
@@ -29,9 +29,9 @@ const FEWEST: f64 = 13.0;
 pub struct Grid {
     pub stations: Vec<f64>,
     pub pieces: Vec<u32>,
-    /// Index of the station, rising, and speed.
+    /// The index of the station (rising) and the speed in mm/s of each cap.
     caps: Vec<(usize, f64)>,
-    /// Factor by which the limits of jerk are tighter on each interval: 1 or more.
+    /// Factor by which the limits of jerk on each interval are tighter than the machine's: 1 or more.
     jerk_factor: Vec<f64>,
 }
 
@@ -76,7 +76,7 @@ impl Grid {
         self.stations.windows(2).map(|pair| pair[1] - pair[0]).collect()
     }
 
-    /// The grid with each interval in a number of equal parts.
+    /// The grid with interval n split into `parts[n]` equal parts.
     pub fn refined(&self, parts: &[u32]) -> Self {
         let mut grid = Self { stations: vec![self.stations[0]], ..Self::default() };
         let mut caps = self.caps.iter().peekable();
@@ -95,7 +95,8 @@ impl Grid {
         grid
     }
 
-    /// Adds stations from the last one to the end of some samples of one piece.
+    /// Appends stations up to the last of these samples, which are all on one piece, so that `density` has the same integral over
+    /// each new interval, at most 1/`more`.
     fn fill(&mut self, samples: &[EnvelopeSample], density: &[f64], more: f64) {
         let mut sum = Vec::with_capacity(samples.len());
         let mut total = 0.0;
@@ -118,7 +119,7 @@ impl Grid {
         self.pieces.resize(self.stations.len() - 1, samples[0].piece);
     }
 
-    /// Samples the constraints on a range of intervals.
+    /// Sets `rows` to the constraints on a range of intervals.
     pub fn sample<G: Geometry<M>, const M: usize>(
         &self,
         problem: &Problem<G, M>,
@@ -131,7 +132,7 @@ impl Grid {
         rows.sample(problem.geometry, &problem.limits, stations, pieces, jerk_factor, cap);
     }
 
-    /// The speed cap at a station; infinite without one.
+    /// The speed cap at a station in mm/s; infinite if it has none.
     pub fn cap(&self, station: usize) -> f64 {
         match self.caps.binary_search_by_key(&station, |cap| cap.0) {
             Ok(at) => self.caps[at].1,
@@ -140,7 +141,7 @@ impl Grid {
     }
 }
 
-/// The factor by which the caps tighten the limits of jerk on each interval.
+/// The factor by which the speed caps tighten the limits of jerk on each interval.
 fn jerk_factor(stations: &[f64], caps: &[SpeedCap]) -> Vec<f64> {
     let mut jerk_factor = vec![1.0_f64; stations.len() - 1];
     for cap in caps.iter().filter(|cap| cap.share > 0.0) {
@@ -164,7 +165,7 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
         let change = if r[i + 1] < r[i] { Change::Fall } else { Change::Rise };
         (r[i + 1] - r[i]).abs() > CHANGING * (slopes.reach(r[i], h, change) - r[i])
     };
-    // Where one feed sets the speed, it is constant however the path turns.
+    // Where one feed sets the speed, the speed is constant however the path turns.
     let even: Vec<bool> = (0..=last)
         .map(|i| {
             let near = &samples[i.saturating_sub(1)..=(i + 1).min(last)];
@@ -189,7 +190,8 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
             }
         })
         .collect();
-    // The first interval is at most as long as the ramp before it, and the last one as the ramp after it.
+    // The first interval, times the resolution, is at most as long as the ramp before it; likewise the last interval and the ramp
+    // after it.
     for (kind, i) in ends.iter().zip([0, last]) {
         if let WindowEnd::Rest { ramp, .. } = *kind {
             length[i] = length[i].min(1.0 / (1.0 / ramp.length + samples[i].turning));

@@ -1,10 +1,10 @@
-//! Where a subrun holds its feed: a look ahead of the solver, at the cost of a few sums for each part.
+//! Finds where a subrun can hold its feed, before the solver runs, at the cost of a few sums for each part.
 //!
-//! A part can be passed at its feed v if |q'| v ≤ V, |q''| v² ≤ A and |q'''| v³ ≤ J for every axis, by bounds on the
-//! derivatives that are proven over the whole piece. The speed envelope r = w^(3/4) (`speed_envelope`) over all parts
-//! says how far from slower places v is reached at the latest: it rises more slowly than the optimum. Between two such
-//! distances v is the optimum, and there is nothing to solve. What is left are stretches from one held feed to the
-//! next, which know nothing of one another.
+//! A part can be passed at its feed v if |q'| v ≤ V, |q''| v² ≤ A and |q'''| v³ ≤ J for every axis, with bounds on the
+//! derivatives that are proven over the whole piece. The speed envelope r = w^(3/4) (`speed_envelope`) over all parts gives the
+//! distance from slower places within which v is certainly reached: it rises more slowly than the optimum. Beyond these distances
+//! v is the optimum, and there is nothing to solve. The remaining stretches lead from one held feed to the next and are
+//! independent of one another.
 
 use feedplan_geometry::elementary::Elementary;
 use rayon::prelude::*;
@@ -17,35 +17,34 @@ use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;
 
-/// Bounds that are computed closely exceed the derivatives by about this part, …
+/// Closely computed bounds exceed the derivatives by about this fraction.
 const ACCURACY: f64 = 0.2;
-/// … except where looser ones leave this part of acceleration and jerk for changes of speed.
+/// Looser bounds are accepted if they leave this fraction of acceleration and jerk for changes of speed.
 const EASY: f64 = 0.8;
-/// A stretch that is planned goes on at the held feed for this many lengths over which r doubles at its greatest slope:
-/// the optimum may slow down to gain acceleration before the feed rises, and the first plan is smoothed over as much.
+/// A planned stretch continues at the held feed for this many lengths over which r doubles at its greatest slope: the optimum may
+/// slow down to gain acceleration before the feed rises, and the first plan is smoothed over such a length.
 const MARGIN: f64 = 1.5;
-/// A stretch ends at a knot that is less than this part of the margin away.
+/// A stretch ends at a knot if there is one within this fraction of the margin.
 const NEAR: f64 = 0.5;
-/// Nor are there intervals of less than this part of that distance.
+/// It also ends at a knot on the other side within this fraction of that distance, to avoid very short intervals.
 const HARDLY: f64 = 0.05;
-/// Parts that one thread looks at together.
+/// Least number of parts that one thread takes at a time.
 const TOGETHER: usize = 64;
 
-/// The way between two lengths of a subrun in mm, with what is known at its ends.
+/// A stretch between two arc lengths of a subrun in mm, with the states at its ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Stretch {
     pub ends: [f64; 2],
     pub states: [End; 2],
-    /// The feed in mm/s, if it is the speed all the way.
+    /// The feed in mm/s, if the whole stretch is passed at it; None if the stretch is to be planned.
     pub held: Option<f64>,
 }
 
-/// A stretch as a path of its own, by the arc length from the start of its first part. The tables that its plan needs go with
-/// it.
+/// A stretch as a path of its own, by the arc length from the start of its first part. It owns the tables that its plan needs.
 pub struct Between<'a, 'b, const M: usize> {
     pub path: ArcLengthPath<'a, M>,
     knots: Vec<f64>,
-    /// The knots of the subrun at those of `path`.
+    /// The knots of the subrun that correspond to the knots of `path`.
     outer: &'b [f64],
 }
 
@@ -59,18 +58,19 @@ impl<'a, 'b, const M: usize> Between<'a, 'b, M> {
         own
     }
 
-    /// The arc length of the stretch at one of the subrun.
+    /// Converts an arc length of the subrun to one of the stretch.
     pub fn within(&self, s: f64) -> f64 {
         moved(self.outer, self.path.knots(), s)
     }
 
-    /// The arc length of the subrun at one of the stretch.
+    /// Converts an arc length of the stretch to one of the subrun.
     pub fn outside(&self, s: f64) -> f64 {
         moved(self.path.knots(), self.outer, s)
     }
 }
 
-/// As far from its knot among `to` as s is from that among `from`.
+/// Converts the arc length s between corresponding knots: the result is as far from its knot in `to` as s from the last knot of
+/// `from` before it.
 fn moved(from: &[f64], to: &[f64], s: f64) -> f64 {
     let knot = from.partition_point(|&knot| knot <= s).max(1) - 1;
     to[knot] + (s - from[knot])
@@ -90,21 +90,21 @@ impl<const M: usize> Geometry<M> for Between<'_, '_, M> {
     }
 }
 
-/// What the look ahead knows of a part.
+/// What is known of a part before the solver runs.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     length: f64,
-    /// The greatest r: that of the feed where it can be held.
+    /// The greatest r; that of the feed if it can be held.
     cap: f64,
-    /// The feed that can be held; 0 for none.
+    /// The feed that can be held, in mm/s; 0 if there is none.
     feed: f64,
-    /// The part of acceleration and jerk that holding the feed leaves for changes of speed.
+    /// The fraction of the limits of acceleration and jerk that holding the feed leaves for changes of speed.
     ease: f64,
-    /// Whether the envelope has the feed there, too.
+    /// Whether the cap of the envelope reaches the feed as well.
     easy: bool,
 }
 
-/// The stretches of a subrun, in order, those that hold their feed apart.
+/// Divides a subrun into stretches, in order: those that hold a feed and those that are to be planned.
 pub fn stretches<const M: usize>(
     problem: &Problem<M>,
     path: &ArcLengthPath<M>,
@@ -155,7 +155,7 @@ pub fn stretches<const M: usize>(
     out
 }
 
-/// Whether each axis moves between two lengths of a path.
+/// Whether each axis moves between two arc lengths of a path.
 pub fn moving<const M: usize>(
     problem: &Problem<M>,
     path: &ArcLengthPath<M>,
@@ -170,7 +170,7 @@ pub fn moving<const M: usize>(
     moving
 }
 
-/// The speed caps of a path between two lengths, and those before and after that reach in: of the neighbours beyond.
+/// The speed caps of a path between two arc lengths, and those before and after that reach into this range.
 pub fn caps_between(caps: &[SpeedCap], [from, to]: [f64; 2]) -> &[SpeedCap] {
     let reaches = |cap: &SpeedCap| cap.s + cap.reach > from && cap.s - cap.reach < to;
     let mut first = caps.partition_point(|cap| cap.s < from);
@@ -184,7 +184,7 @@ pub fn caps_between(caps: &[SpeedCap], [from, to]: [f64; 2]) -> &[SpeedCap] {
     &caps[first..end]
 }
 
-/// The part by which the limits of jerk are lower somewhere on each part.
+/// For each part of the path, the greatest fraction by which the limits of jerk are lowered somewhere on it.
 fn shares<const M: usize>(path: &ArcLengthPath<M>, junctions: &[Junction]) -> Vec<f64> {
     let mut shares = vec![0.0_f64; path.parts.len()];
     for Junction { cap, .. } in junctions.iter().filter(|junction| junction.cap.share > 0.0) {
@@ -207,7 +207,7 @@ fn look<const M: usize>(
     let i = at.piece;
     let feed = problem.feed[i];
     let own = piece(problem, i);
-    // A bound on r that the envelope's own parts of the limits leave.
+    // The cap of r by those fractions of the limits that the envelope uses.
     let cap_of = |shape: &Shape<M>| {
         let point = |sign: usize| PathPoint {
             first: shape.first[sign],
@@ -254,7 +254,8 @@ fn look<const M: usize>(
     Look { length, cap, feed: 0.0, ease: 1.0, easy: false }
 }
 
-/// The use of the limits of acceleration and jerk at a constant speed; None where it is above that of an axis.
+/// The use of the limits of acceleration and jerk at the constant speed v. None if v exceeds a velocity limit or a use is not
+/// finite.
 fn uses<const M: usize>(limits: &Limits<M>, shape: &Shape<M>, v: f64) -> Option<[f64; 2]> {
     let [mut a, mut j] = [0.0_f64; 2];
     for k in 0..M {
@@ -274,7 +275,7 @@ fn uses<const M: usize>(limits: &Limits<M>, shape: &Shape<M>, v: f64) -> Option<
 ///
 ///   |q''| ≤ b/d²,   |q'''| ≤ c/d³ + 3 a b²/d⁵ + a² (5 a b² + a² c)/d⁷
 ///
-/// by the formulas in the head of `arc_length_path`. None where C' may vanish.
+/// by the formulas in the head of `arc_length_path`. None for rational pieces and where C' may vanish.
 fn rough<const M: usize>(piece: &Piece<M>) -> Option<Shape<M>> {
     if piece.is_rational() {
         return None;
@@ -316,12 +317,12 @@ fn moves<const M: usize>(piece: &Piece<M>) -> [bool; M] {
     std::array::from_fn(|k| piece.control.iter().any(|point| point[k] != piece.control[0][k]))
 }
 
-/// The greatest q' of each axis: 1 where it moves.
+/// An upper bound of |q'| of each axis: 1 if it moves.
 fn directions<const M: usize>(moves: &[bool; M]) -> [f64; M] {
     moves.map(|moves| if moves { 1.0 } else { 0.0 })
 }
 
-/// r at the knots: no greater than the parts and junctions allow, nor than it can be reached from its neighbours.
+/// r at the knots: at most what the parts and junctions allow, and what can be reached from the neighbouring knots.
 fn envelope(looks: &[Look], junctions: &[Junction], slopes: Slopes, speeds: [f64; 2]) -> Vec<f64> {
     let count = looks.len();
     let mut r = vec![0.0; count + 1];
@@ -345,8 +346,8 @@ fn envelope(looks: &[Look], junctions: &[Junction], slopes: Slopes, speeds: [f64
     r
 }
 
-/// The distance from one end of some parts that hold a feed to where the envelope has reached it and goes on at it on
-/// easy parts for the margin; None where there is no such place.
+/// The distance from one end of some parts that hold a feed to the place where the envelope has reached the feed and has
+/// continued on easy parts for the margin; None if there is no such place.
 fn reached<'a>(
     looks: impl Iterator<Item = &'a Look>,
     slopes: Slopes,
@@ -375,7 +376,8 @@ fn reached<'a>(
     None
 }
 
-/// The knot at most a distance ahead of s, or behind it for a negative one, or hardly on the other side; else s.
+/// The first knot up to `distance` ahead of s (behind it if negative), or up to the fraction `HARDLY` of that on the other side;
+/// s if there is none.
 fn to_knot(knots: &[f64], s: f64, distance: f64) -> f64 {
     let [a, b] = [s - HARDLY * distance, s + distance];
     let next = knots.partition_point(|&knot| knot < a.min(b));
@@ -398,7 +400,8 @@ mod tests {
         })
     }
 
-    /// Pieces of one run from rest to rest, each of so many control points, by their feeds.
+    /// Does `work` on one run from rest to rest, with a piece for each feed; the control points are divided equally among the
+    /// pieces.
     fn on_path<T>(
         control: &[[f64; 2]],
         feed: &[f64],
@@ -443,7 +446,7 @@ mod tests {
             let own = Between::new(path, [knots[2], path.total()]);
             assert!(own.knots().windows(2).all(|pair| off(pair) < 1e-12), "{:?}", own.knots());
             assert_eq!((own.within(knots[3]), own.outside(own.knots()[2])), (own.knots()[1], knots[4]));
-            // It begins and ends within parts as well.
+            // A stretch may also begin and end within parts.
             let own = Between::new(path, [knots[2] + 4e-5, knots[4] + 4e-5]);
             assert_eq!(own.knots().len(), 4);
             assert!((own.knots()[0] - 4e-5).abs() < 1e-9 && (own.knots()[3] - 2.4e-4).abs() < 1e-9);
@@ -459,7 +462,7 @@ mod tests {
         assert_eq!(held, [None, Some(50.0), None, Some(20.0), None]);
         assert!(found.windows(2).all(|pair| pair[0].ends[1] == pair[1].ends[0]));
         assert_eq!((found[0].ends[0], found[4].ends[1]), (0.0, 200.5));
-        // From rest to 50 mm/s takes at least √(50³/50 000) = 1.58 mm, with half the margin beyond.
+        // From rest to 50 mm/s takes at least √(50³/50 000) = 1.58 mm; half the margin follows.
         let [_, at] = found[0].ends;
         assert!((1.6..15.0).contains(&at), "{at} mm to 50 mm/s");
     }

@@ -4,12 +4,12 @@
 
 use std::ops::{Add, Mul};
 
-/// Collocation points of an interval, where the limits are enforced, …
+/// The number of collocation points of an interval. The limits are enforced at these points.
 pub const COUNT: usize = 4;
 pub const LAST: usize = COUNT - 1;
-/// … as parts of its length.
+/// The positions of the collocation points, as fractions of the interval's length.
 pub const POINTS: [f64; COUNT] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
-/// Gauss–Legendre nodes and weights on [0, 1].
+/// Gauss–Legendre nodes and weights on [0, 1], for the time of an interval.
 const NODES: [f64; 4] =
     [0.069_431_844_202_973_71, 0.330_009_478_207_571_87, 0.669_990_521_792_428_1, 0.930_568_155_797_026_3];
 pub const WEIGHTS: [f64; 4] =
@@ -63,12 +63,13 @@ pub fn local(x: &[f64], n: usize, h: f64) -> [f64; 4] {
     [x[0], x[1] * h, x[2], x[3] * h]
 }
 
-/// y plus a part of the way to x.
+/// Linear interpolation from y to x: y + part (x − y).
 pub fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
     x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
 }
 
-/// The spline x at the stations of a finer grid, from the number of parts of each interval and the lengths of all parts.
+/// The spline x at the stations of a finer grid. `counts` is the number of parts of each interval, `lengths` are the lengths of
+/// all parts, in mm.
 pub fn prolong(x: &[f64], counts: impl Iterator<Item = usize>, mut lengths: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(2 * lengths.len() + 2);
     for (n, count) in counts.enumerate() {
@@ -87,7 +88,7 @@ pub fn prolong(x: &[f64], counts: impl Iterator<Item = usize>, mut lengths: &[f6
     out
 }
 
-/// ∫ ds/√w over interval n, in s; infinite where w is not positive.
+/// ∫ ds/√w over interval n, in s; infinite if w is not positive.
 pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
     let u = local(x, n, h);
     let at = |i: usize| match combine(&AT_NODES[i], &u) {

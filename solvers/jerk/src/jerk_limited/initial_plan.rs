@@ -1,8 +1,8 @@
-//! A first plan within all limits, in O(n), from the speed envelope r = w^(3/4): ln r, smoothed over local time.
+//! Computes a first plan within all limits, in O(n), from the speed envelope r = w^(3/4): ln r, smoothed over local time.
 //!
-//! ln r rises by at most 1 per unit of the local time τ = ∫ K ds/r (see `Slopes::length`). So does its least value over
-//! τ ± δ. The mean of that over τ ± δ exceeds ln r nowhere, is equal to it where ln r is constant over τ ± 2 δ, and is
-//! smooth enough for the limits of jerk.
+//! ln r rises by at most 1 per unit of the local time τ = ∫ K ds/r (see `Slopes::length`). The least value of ln r over τ ± δ
+//! rises no faster. The mean of these least values over τ ± δ never exceeds ln r, equals it where ln r is constant over τ ± 2 δ,
+//! and is smooth enough for the limits of jerk.
 
 use feedplan_geometry::elementary::Elementary;
 use std::collections::VecDeque;
@@ -12,19 +12,20 @@ use super::window_end::WindowEnd;
 
 /// δ: half the width of the smoothing, in local time.
 const MEAN: f64 = 0.7;
-/// w at the end of a ramp, as a part of the greatest.
+/// w at the end of a ramp, as a fraction of the greatest w allowed there.
 const END: f64 = 0.8;
-/// The inner Bernstein coefficients of w differ from w by at most this part, so that they stay above 0.
+/// The inner Bernstein coefficients of w differ from w by at most this fraction of w, so that they stay above 0.
 const STEEPEST: f64 = 0.9;
-/// The greatest use of the limits of acceleration and jerk at the collocation points: it leaves room for the points
-/// between. The limit of speed is used fully, but for rounding.
+/// The greatest use of the limits of acceleration and jerk at the collocation points; it leaves room for the points between them.
+/// The limit of speed is used fully, except for rounding.
 pub const USE: f64 = 0.9;
 const FULL: f64 = 1.0 + 1e-9;
-/// The greatest such use on a refined grid, for a plan that was made with `USE` on the coarse one.
+/// The greatest use of the limits of acceleration and jerk on a refined grid, for a plan that was made with `USE` on the coarse
+/// grid.
 const KEPT: f64 = 0.96;
 /// Relative rounding of w.
 const ROUNDING: f64 = 1e-12;
-/// An interval that uses more is lowered to this use.
+/// An interval that uses more than `USE` is lowered to this use.
 const LOWERED: f64 = 0.8;
 
 /// x = (w_0, w'_0, …) at the stations, from the caps of r on each interval.
@@ -42,7 +43,7 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
         let rho = (high.1 - low.1) / (2.0 * MEAN);
         let slope = (high.0 - low.0) / (2.0 * MEAN);
         let w = (rho * 4.0 / 3.0).exponential();
-        // Long intervals limit the slope.
+        // On long intervals the Bernstein coefficients limit the slope.
         let steepest = |h: f64| 3.0 * STEEPEST * w / h;
         let falls = if i < last { steepest(stations[i + 1] - stations[i]) } else { f64::INFINITY };
         let rises = if i > 0 { steepest(stations[i] - stations[i - 1]) } else { f64::INFINITY };
@@ -55,7 +56,7 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
                 x[at] = x[at].min(END * greatest);
                 x[at + 1] = sign * ramp.slope() * x[at];
             }
-            // An end that holds the speed of its cap is met but for rounding.
+            // If the plan has the given w except for rounding, it gets exactly the given values.
             WindowEnd::Fixed { w, slope } => {
                 if (x[at] / w - 1.0).abs() < ROUNDING {
                     (x[at], x[at + 1]) = (w, slope);
@@ -67,7 +68,8 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
     x
 }
 
-/// The least ln r over local times up to `MEAN` away, and its integral over local time, continued beyond both ends.
+/// The least ln r over local times up to `MEAN` away, and the integral of this least value over local time. Both are continued
+/// beyond both ends.
 struct Mean {
     tau: Vec<f64>,
     rho: Vec<f64>,
@@ -99,7 +101,7 @@ impl Mean {
         Self { tau, rho, sum }
     }
 
-    /// ln r and its integral at a time; `near` is an index that moves forward with the calls.
+    /// The least ln r and its integral at a local time; `near` is an index that moves forward from call to call.
     fn at(&self, tau: f64, near: &mut usize) -> (f64, f64) {
         while *near + 2 < self.tau.len() && self.tau[*near + 1] <= tau {
             *near += 1;
@@ -111,14 +113,14 @@ impl Mean {
     }
 }
 
-/// The least value of a function up to `MEAN` to both sides of each of its points, between which it is linear.
+/// At each point of a piecewise linear function, its least value up to `MEAN` to both sides.
 fn least(tau: &[f64], rho: &[f64]) -> Vec<f64> {
     let between = |i: usize, at: f64| {
         let part = (at - tau[i]) / (tau[i + 1] - tau[i]);
         rho[i] + part * (rho[i + 1] - rho[i])
     };
     let last = tau.len() - 1;
-    // Points within reach that have no lower one after them.
+    // Points within reach that have no lower point after them.
     let mut low: VecDeque<usize> = VecDeque::new();
     let (mut from, mut to) = (0, 0);
     (0..=last)
@@ -149,14 +151,14 @@ fn least(tau: &[f64], rho: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The use of the limits of speed, acceleration and jerk on an interval, in terms of w, over what a first plan may use of
-/// them: w divided by it meets them.
+/// From the uses of the limits of speed, acceleration and jerk on an interval: w divided by this factor is within what a first
+/// plan may use of them.
 pub fn used([v, a, j]: [f64; 3]) -> f64 {
     (v * v / FULL).max(a.max(j.cbrt().powi(2)) / USE)
 }
 
-/// The use of the limits of acceleration and jerk by a first plan that was made on a coarser grid, in terms of w, over `KEPT`;
-/// infinite where it exceeds the limit of speed.
+/// From the uses of the limits by a first plan that was made on a coarser grid: w divided by this factor uses at most `KEPT` of
+/// the limits of acceleration and jerk. Infinite if the plan exceeds the limit of speed.
 pub fn kept([v, a, j]: [f64; 3]) -> f64 {
     if v * v > FULL {
         f64::INFINITY

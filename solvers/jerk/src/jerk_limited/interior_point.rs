@@ -18,16 +18,16 @@ use super::window_end::WindowEnd;
 use super::working_space::{EndRow, InteriorPoint};
 use feedplan_geometry::watch::Watch;
 
-/// When to stop.
+/// When to stop, and how to start.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort<'a> {
-    /// Complementarity gap, as a part of the time.
+    /// Complementarity gap, as a fraction of the time.
     pub tolerance: f64,
     pub max_iterations: usize,
     pub deadline: Option<Instant>,
-    /// First μ, as a part of the time per row: 1 from afar, less from a nearly optimal plan.
+    /// First μ, as a fraction of the time per row: 1 for a start far from the optimum, less for a nearly optimal plan.
     pub barrier: f64,
-    /// Whether multipliers start from the last solution on the same intervals, but not below those of the first μ.
+    /// Whether the multipliers start from those of the last solution on the same intervals (raised to μ/s where they are less).
     pub warm: bool,
     pub watch: Watch<'a>,
 }
@@ -55,15 +55,16 @@ pub struct Report {
     pub excess: f64,
 }
 
-/// Steps go this part of the distance to the boundary.
+/// Steps go this fraction of the distance to the boundary of the feasible set.
 const STEP: f64 = 0.995;
 /// Given ends count as met within this relative error.
 const MET: f64 = 1e-9;
-/// The least μ aimed at in the first steps, as a part of the time per row, where `barrier` is 1; near a solution less.
+/// Lower limit of the target μ in the first steps for `barrier` = 1, as a fraction of the time per row. It is scaled by
+/// `barrier`².
 const FLOOR: f64 = 0.3;
-/// Steps shorter than this part of Newton's step count as no progress.
+/// Steps shorter than this fraction of Newton's step count as no progress.
 const LEAST_STEP: f64 = 1e-6;
-/// λ s stays above this part of the complementarity aimed at.
+/// λ s stays above this fraction of the target μ.
 pub(super) const LEAST_DUAL: f64 = 1e-4;
 
 impl<X: Model> InteriorPoint<X> {
@@ -81,7 +82,8 @@ impl<X: Model> InteriorPoint<X> {
         report
     }
 
-    /// A step, without regard to the limits, that balances the multipliers of a solution; see `newton`.
+    /// One Newton step that balances the multipliers of a solution; see `balance`. The step may break the limits. Returns false,
+    /// with x unchanged, if there is no such step.
     pub fn settle(&mut self, rows: &Constraints, ends: &[WindowEnd; 2], x: &mut [f64]) -> bool {
         let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
         self.x.take(x);
@@ -98,9 +100,9 @@ impl<X: Model> InteriorPoint<X> {
             return Report { outcome: Outcome::NotInside, iterations: 0, time, excess: time };
         };
         let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
-        // Far from the optimum the centring has a least μ; it falls with the steps.
+        // Far from the optimum the target μ has a lower limit, which falls after each long step that gains little time.
         let mut floor = FLOOR * effort.barrier * effort.barrier;
-        // The part of the multipliers' last step that is still to be added, and their least complementarity after it.
+        // The fraction of the multipliers' last step that is still to be added, and the lower limit of λ s after it.
         let (mut dual, mut least_dual) = (0.0, 0.0);
         let mut gain = f64::INFINITY;
         let mut excess = time;
@@ -175,7 +177,7 @@ impl<X: Model> InteriorPoint<X> {
         Report { outcome, iterations, time: self.time(rows, ends, false), excess }
     }
 
-    /// Slacks and multipliers of the start. Returns Σ ln s, or None unless the start is strictly inside.
+    /// Computes slacks and multipliers of the start. Returns Σ ln s, or None unless the start is strictly inside the limits.
     fn enter(&mut self, rows: &Constraints, ends: [WindowEnd; 2], mu: f64, warm: bool) -> Option<f64> {
         let last = self.ends;
         self.ends = std::array::from_fn(|end| match ends[end] {
@@ -201,12 +203,12 @@ impl<X: Model> InteriorPoint<X> {
         Some(logarithm)
     }
 
-    /// The station at an end.
+    /// The index of the station at an end: 0 at the first end, the number of intervals at the second.
     fn station(&self, end: usize) -> usize {
         end * self.band.intervals()
     }
 
-    /// The steps of (w, w') that are missing at given ends.
+    /// The steps of (w, w') that lead from x to the given values; 0 at ends that are not given.
     fn missing(&self, ends: &[WindowEnd; 2]) -> [[f64; 2]; 2] {
         std::array::from_fn(|end| match ends[end] {
             WindowEnd::Rest { .. } | WindowEnd::Free => [0.0; 2],
@@ -217,7 +219,7 @@ impl<X: Model> InteriorPoint<X> {
         })
     }
 
-    /// The greatest relative error at given ends.
+    /// The greatest error of x at given ends, relative to the given w.
     fn miss(&self, ends: &[WindowEnd; 2], rows: &Constraints) -> f64 {
         let lacks = self.missing(ends);
         let h = [rows.h(0), rows.h(rows.count() - 1)];
@@ -230,7 +232,7 @@ impl<X: Model> InteriorPoint<X> {
         worst
     }
 
-    /// Sets given ends exactly, without rounding.
+    /// Sets (w, w') at given ends to exactly the given values, to remove rounding errors.
     fn snap_ends(&mut self, ends: &[WindowEnd; 2]) {
         for (end, kind) in ends.iter().enumerate() {
             if let WindowEnd::Fixed { w, slope } = *kind {
@@ -241,7 +243,7 @@ impl<X: Model> InteriorPoint<X> {
     }
 }
 
-/// The condition on the unknowns of an end; `sign` is −1 at the end of the path.
+/// The condition on the unknowns of an end; `sign` is 1 at the first end and −1 at the last.
 fn end_condition(kind: &WindowEnd, sign: f64) -> EndCondition {
     match kind {
         WindowEnd::Rest { ramp, .. } => EndCondition::Slope(sign * ramp.slope()),

@@ -1,5 +1,5 @@
-//! The use of the limits between the collocation points of a spline w: by the path's true derivatives at 16 samples of
-//! each interval, and by the peaks of polynomials through these samples.
+//! Computes the use of the limits by a spline w between the collocation points: with the path's true derivatives at 16 samples of
+//! each interval, and with the peaks of polynomials through these samples.
 
 use fearless_simd::{dispatch, Level, Simd};
 
@@ -10,19 +10,19 @@ use super::sides::Sides;
 use crate::path_problem::{Geometry, Limits};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
-/// Steps between the samples of an interval from one collocation point to the next, and samples, the ends included.
+/// Sample steps from one collocation point to the next, and the number of samples of an interval, its ends included.
 const STEPS: usize = 5;
 const SAMPLES: usize = STEPS * LAST + 1;
-/// Peaks are only sought where a sample uses more than this part of a limit.
+/// Peaks between samples are computed only where a sample uses more than this fraction of a limit.
 const NEAR: f64 = 0.97;
 
-/// The error of an interval's length where a plan is stored as phases, in units of the rounding of the path's length.
+/// The error of an interval's length when a plan is stored as phases, in units of the machine epsilon times the path's length.
 const ROUNDINGS: f64 = 4.0;
 
 /// w, w'/2, w''/2 and √w at each sample of a block.
 type Motions<S> = [[Register<S>; 4]; SAMPLES];
 
-/// The basis and its first two derivatives at each sample.
+/// The Hermite basis and its first two derivatives at each sample.
 const BASES: [[Basis; 3]; SAMPLES] = bases();
 
 const fn bases() -> [[Basis; 3]; SAMPLES] {
@@ -35,21 +35,21 @@ const fn bases() -> [[Basis; 3]; SAMPLES] {
     out
 }
 
-/// Weights of the samples in a mean over the interval.
+/// Weights of the samples in the mean over the interval (trapezoidal rule).
 const MEAN: [f64; SAMPLES] = {
     let mut out = [1.0 / (SAMPLES - 1) as f64; SAMPLES];
     (out[0], out[SAMPLES - 1]) = (0.5 * out[0], 0.5 * out[0]);
     out
 };
 
-/// The limits on neighbouring intervals.
+/// The limits on eight neighbouring intervals.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     /// 1/w_max by the speed cap at each sample.
     caps: [Lanes; SAMPLES],
-    /// 1/w_max at the stations on both sides.
+    /// 1/w_max at the stations at both ends of each interval.
     at_stations: [Lanes; 2],
-    /// Factor by which the limits of jerk are tighter.
+    /// Factor by which the limits of jerk are tighter than the machine's.
     jerk_factor: Lanes,
     /// The relative error of the length of each interval.
     rounding: Lanes,
@@ -73,7 +73,7 @@ struct Axis {
 }
 
 impl IntersampleCheck {
-    /// Without samples.
+    /// A check without samples, for these limits of the axes.
     pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
         let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::of);
         let axis = |k: usize| Axis {
@@ -84,7 +84,8 @@ impl IntersampleCheck {
         Self { axes: (0..M).map(axis).collect(), blocks: vec![], q: vec![] }
     }
 
-    /// Samples between `stations`; those at collocation points, speed caps at stations and factors of jerk are those of `rows`.
+    /// Evaluates the path at the samples between `stations` (in mm). The values at collocation points, w_max at stations and the
+    /// factors of jerk are copied from `rows`.
     pub fn sample<const M: usize>(
         &mut self,
         geometry: &impl Geometry<M>,
@@ -94,7 +95,7 @@ impl IntersampleCheck {
     ) {
         self.blocks.clear();
         self.blocks.reserve(rows.blocks.len());
-        // All lanes of all blocks but the last one are set below.
+        // Only the last block needs clearing: all lanes of all others are set below.
         self.q.truncate(rows.blocks.len().saturating_sub(1) * M);
         self.q.resize(rows.blocks.len() * M, [[Lanes::ZERO; 3]; SAMPLES]);
         let knots = geometry.knots();
@@ -132,10 +133,10 @@ impl IntersampleCheck {
         }
     }
 
-    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x. That of jerk includes
-    /// the rounding of the interval's length, which counts on short intervals of long paths.
+    /// The greatest use of the limits of speed, acceleration and jerk on each interval by the spline x. The use of jerk includes
+    /// the effect of the rounding error of the interval's length, which matters on short intervals of long paths.
     ///
-    /// Peaks are sought for each axis alone: the maximum over several axes is not smooth.
+    /// Peaks are computed for each axis alone: the maximum over several axes is not smooth.
     pub fn utilisation(&self, rows: &Constraints, x: &[f64]) -> Vec<[f64; 3]> {
         dispatch!(Level::new(), simd => self.utilisation_on(simd, rows, x))
     }
@@ -145,7 +146,7 @@ impl IntersampleCheck {
         let x = Columns::new(x);
         let mut out = vec![[0.0; 3]; rows.count()];
         let zero = Register::all(simd, 0.0);
-        // Room for one block, which is not cleared for the next.
+        // Work arrays for one block; each block overwrites all of them.
         let (mut motion, mut uses) = ([[zero; 4]; SAMPLES], [zero; SAMPLES]);
         for (b, (block, out)) in self.blocks.iter().zip(out.chunks_mut(LANES)).enumerate() {
             let h = rows.blocks[b].h.load(simd);
@@ -173,7 +174,7 @@ impl IntersampleCheck {
                     let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
                     uses[i] = (q3 * w + q2 * half * 3.0 + q1 * bend) * v * jerk;
                 }
-                // An error of the length changes w' by the same part of itself, and w'' by twice that part.
+                // A relative error e of the length changes w' by e w', and w'' by 2 e w''.
                 let mut terms = zero;
                 for i in [0, SAMPLES - 1] {
                     let ([_, half, bend, v], [q1, q2, _]) = (motion[i], q[i]);
@@ -190,8 +191,9 @@ impl IntersampleCheck {
         out
     }
 
-    /// The time that each interval loses because the spline x uses limits in it unevenly, to first order in s: Σ λ (greatest −
-    /// mean use) over all limits, λ the sum of its multipliers at the collocation points. `used` is that of `utilisation`.
+    /// First-order estimate of the time in s that each interval loses because the spline x uses its limits unevenly: Σ λ
+    /// (greatest − mean use) over all limits, where λ is the sum of a limit's multipliers at the collocation points. `used` is
+    /// the result of `utilisation`.
     pub fn losses(&self, rows: &Constraints, x: &[f64], dual: &[Lanes], used: &[[f64; 3]]) -> Vec<f64> {
         dispatch!(Level::new(), simd => self.losses_on(simd, rows, x, dual, used))
     }
@@ -231,7 +233,7 @@ impl IntersampleCheck {
                 let pace = combine(value, &u).sqrt().inverse();
                 for (k, (sum, own)) in multipliers.iter_mut().zip(layout.of(dual, b, p)).enumerate() {
                     let own = own.load(simd);
-                    // Those of jerk are of the jerk over √w.
+                    // The rows of jerk limit jerk/√w: times w^(−1/2), their multipliers are those of the jerk.
                     *sum += if k < layout.speed() { own * pace } else { own };
                 }
             }
@@ -270,7 +272,7 @@ impl IntersampleCheck {
     }
 }
 
-/// Sets the motion by the local coefficients u on intervals of length 1/`per_h`.
+/// Sets the motion at all samples from the local coefficients u on intervals of length 1/`per_h`.
 #[inline(always)]
 fn set_motion<S: Simd>(motions: &mut Motions<S>, u: &[Register<S>; 4], per_h: Register<S>) {
     let zero = Register::all(per_h.simd(), 0.0);
@@ -284,7 +286,7 @@ fn set_motion<S: Simd>(motions: &mut Motions<S>, u: &[Register<S>; 4], per_h: Re
 
 /// Number of samples in each polynomial that interpolates half-way between samples.
 const STENCIL: usize = 6;
-/// Weights of these samples, and the index of the first.
+/// Weights of these samples, and the index of the first of them.
 const HALFWAY: [([f64; STENCIL], usize); SAMPLES - 1] = halfway();
 
 const fn halfway() -> [([f64; STENCIL], usize); SAMPLES - 1] {
@@ -312,9 +314,9 @@ const fn halfway() -> [([f64; STENCIL], usize); SAMPLES - 1] {
     out
 }
 
-/// The greatest use of the limits by smooth functions with these values at the samples; `per_high` and `per_low` are 1
-/// over the limits of positive and of negative values. Takes the values, those interpolated half-way between, and the
-/// peaks of the parabolas through each three.
+/// The greatest use of the limits by smooth functions with these values at the samples; `per_high` and `per_low` are 1 over the
+/// limits of positive and of negative values. It is the greatest of the sample values and of the peaks of parabolas, each through
+/// three neighbours among the samples and the interpolated values half-way between them.
 #[inline(always)]
 fn peak<S: Simd>(f: &[Register<S>; SAMPLES], [per_high, per_low]: [f64; 2]) -> Register<S> {
     let zero = Register::all(f[0].simd(), 0.0);
@@ -340,7 +342,8 @@ fn peak<S: Simd>(f: &[Register<S>; SAMPLES], [per_high, per_low]: [f64; 2]) -> R
     worst
 }
 
-/// The peak of the parabola through three values at equal distances; less than one of them where it is beyond them.
+/// The value at the vertex of the parabola through three equally spaced values. If the vertex lies outside them, the result is
+/// less than the greatest of the three in size.
 #[inline(always)]
 fn top<S: Simd>([before, here, after]: [Register<S>; 3]) -> Register<S> {
     let bend = here + here - before - after;
@@ -356,7 +359,7 @@ mod tests {
     use super::*;
     use crate::path_problem::{Effort, End, PathPoint, Problem};
 
-    /// A line of this length in mm.
+    /// A line between two arc lengths, in mm.
     struct Line([f64; 2]);
 
     impl Geometry<1> for Line {
@@ -386,7 +389,7 @@ mod tests {
         }
     }
 
-    /// The greatest use by eight functions; each is alone in the others' place, too.
+    /// The greatest use by each of eight functions, computed in the lanes of one vector.
     fn peaks(functions: [&dyn Fn(f64) -> f64; LANES], per_most: [f64; 2]) -> [f64; LANES] {
         let at = |i: usize| Lanes::new(functions.map(|f| f(i as f64 / (SAMPLES - 1) as f64)));
         dispatch!(Level::new(), simd => peak(&std::array::from_fn(|i| at(i).load(simd)), per_most).values())
@@ -410,7 +413,7 @@ mod tests {
         }
     }
 
-    /// The loss of interval n by the definition, without vectors.
+    /// The loss of interval n by its definition, without SIMD vectors.
     fn loss(window: &Window, x: &[f64], dual: &[Lanes], used: &[f64; 3], n: usize) -> f64 {
         let Window { rows, check } = window;
         let (b, lane, layout, h) = (n / LANES, n % LANES, rows.layout(), rows.h(n));

@@ -1,4 +1,4 @@
-//! The kernel on every level of instructions that this processor has: the same numbers, bit for bit.
+//! Tests that the kernel computes the same numbers, bit for bit, with every SIMD instruction set of this processor.
 
 use fearless_simd::{dispatch, Level, Simd};
 
@@ -16,7 +16,7 @@ use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
 use feedplan_geometry::lanes::eight::Lanes;
 use feedplan_geometry::watch::Watch;
 
-/// A space curve that turns to both sides, its derivatives known by the length.
+/// A space curve that turns to both sides, with known derivatives by its arc length.
 struct Winding([f64; 2]);
 
 impl Geometry<3> for Winding {
@@ -47,7 +47,7 @@ fn levels() -> Vec<Level> {
     vec![Level::new()]
 }
 
-/// What an interior point leaves from a plan, as bits.
+/// All numbers that the interior-point method leaves after a solution, as bits.
 fn solved<X: Model>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Constraints) -> Vec<u64> {
     let effort = Effort {
         tolerance: 1e-7,
@@ -67,7 +67,7 @@ fn solved<X: Model>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Co
     all.map(f64::to_bits).collect()
 }
 
-/// What the checks of a plan and its bound find on each interval.
+/// The results of the checks of a plan and of its lower bound on each interval.
 #[inline(always)]
 fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints, between: &IntersampleCheck) -> Vec<f64> {
     let mut out = rows.utilisation_on(simd, x).concat();

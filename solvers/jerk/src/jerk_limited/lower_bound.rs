@@ -1,26 +1,26 @@
-//! A lower bound on the time, by duality, from the multipliers that the interior point leaves on each window.
+//! Computes a lower bound on the time by duality, from the multipliers of the interior-point method on each window.
 //!
 //! The true problem and its relaxation (`relaxed`, y eliminated) have the same Lagrangian: with weights c of the time and
 //! multipliers λ ≥ 0 of the rows
 //!
 //!   Λ(w) = Σ (c − Σ λ_jerk) w^(−1/2) + terms that are linear in w.
 //!
-//! Where the multipliers of jerk add up to at most c at each collocation point, Λ is convex in w and at least its tangent
-//! at any w₀ > 0. For every w within the limits
+//! If the multipliers of jerk add up to at most c at each collocation point, Λ is convex in w and nowhere below its tangent at
+//! any w₀ > 0. For every w within the limits
 //!
 //!   time ≥ Λ(w) ≥ Λ(w₀) + Σ g (w − w₀) ≥ Λ(w₀) + Σ (least g (w − w₀) in the box of w),   g the gradient at w₀,
 //!
-//! with boxes of w and w' at the stations that follow from the limits of speed and acceleration. So the bound holds for
-//! all such multipliers and all w₀, within the limits or not; it is close where g vanishes. The multipliers are those of
-//! the plan. Where they add up to more than c, the relaxation has another solution, which is sought from a point far
-//! inside the limits, under the speeds of `speed_limit`.
+//! with boxes of w and w' at the stations that follow from the limits of speed and acceleration. The bound therefore holds for
+//! all such multipliers and for every w₀, within the limits or not; it is close if g is nearly 0. The multipliers of the plan are
+//! used to solve the relaxation from a start beside the plan. If those of jerk add up to more than c, the relaxation has another
+//! solution: it is then solved with the lower speeds of `speed_limit` from starts farther inside the limits.
 //!
-//! The sums divide into those of windows without their overlaps (`Part`). Only at the stations where two of them meet
-//! does g have a term from each side; both are added before the box is used (`join`).
+//! The sums are divided into one `Part` for each window without its overlaps. At a station where two parts meet, g has a term
+//! from each of them; `join` adds both before it uses the box.
 //!
-//! Where this leaves a wide gap, a bound by cases is closer (`cases`).
+//! If this leaves a wide gap, a bound by cases is closer (`cases`).
 //!
-//! The bound is that of the problem on its grid: splines, limits at collocation points, the time by the 3/8 rule.
+//! The bound applies to the problem on its grid: splines, limits at collocation points, the time by the 3/8 rule.
 
 use std::ops::Range;
 
@@ -38,62 +38,64 @@ use super::window_end::WindowEnd;
 use super::working_space::{EndRow, InteriorPoint};
 use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 
-/// How the solution of the relaxation begins and ends.
+/// Start and accuracy of a solution of the relaxation.
 struct Start {
-    /// w is below the plan by this part.
+    /// w starts below the plan by this fraction.
     below: f64,
-    /// y is above its least possible value by this part.
+    /// y starts above its least possible value by this fraction.
     above: f64,
-    /// The first barrier, as a part of the time per row; with `warm` multipliers are at least those of the barrier.
+    /// The first barrier, as a fraction of the time per row. With `warm`, multipliers start from their present values, but at
+    /// least at those of the barrier.
     barrier: f64,
     warm: bool,
-    /// Complementarity gap at the end, as a part of the time.
+    /// Complementarity gap at the end, as a fraction of the time.
     tolerance: f64,
 }
 
-/// Beside the plan, with its multipliers, where these are nearly those of the relaxation …
+/// A start beside the plan, with its multipliers, if these are nearly those of the relaxation.
 const BESIDE: Start = Start { below: 1e-3, above: 1e-3, barrier: 1e-3, warm: true, tolerance: 1e-5 };
-/// … and where they are not. Where the multipliers exceed c by a greater part of it, the start is farther from the plan: that
-/// part times SPREAD.
+/// A start near the plan if they are not. If the multipliers of jerk exceed c by a great fraction, y and the barrier start
+/// higher, at that fraction times `SPREAD`.
 const NEAR: Start = Start { below: 1e-2, above: 0.1, barrier: 0.03, warm: true, tolerance: 3e-5 };
 const SPREAD: f64 = 2.5;
-/// Far inside the limits, where no solution is found from there.
+/// A start far inside the limits, if no solution is found from the first start.
 const FAR: Start = Start { below: 0.03, above: 0.1, barrier: 1.0, warm: false, tolerance: 3e-5 };
-/// The solution starts beside the plan where its multipliers of jerk exceed c by at most this part.
+/// The solution starts beside the plan if its multipliers of jerk exceed c by at most this fraction.
 const TIGHT: f64 = 2e-5;
 const MAX_ITERATIONS: usize = 60;
-/// The multipliers are balanced until the boxes cost less than this part of the time, at most so many times.
+/// The multipliers are balanced until the boxes cost less than this fraction of the time, at most `BALANCES` times.
 const LOSS: f64 = 1e-6;
 const BALANCES: usize = 8;
-/// A bound above the time of a plan by this part is rounding; one by more is an error, and proves nothing.
+/// A bound that exceeds the time of the plan by up to this fraction is due to rounding; a higher one is an error and is rejected.
 const ROUNDING: f64 = 1e-9;
 
-/// The bound on the intervals of a window without its overlaps: at least `least` + Σ price · (w, w') at both ends.
+/// The bound on the intervals of a window without its overlaps: their time is at least `least` + Σ price · (w, w') at both ends.
 #[derive(Clone, Debug, Default)]
 pub struct Part {
-    /// The time of the plan, and at the greatest speeds, by the 3/8 rule, in s.
+    /// The time of the plan, and the time at the greatest speeds, both by the 3/8 rule, in s.
     pub time: f64,
     pub fastest: f64,
-    /// In s.
+    /// The constant term of the bound, in s.
     pub least: f64,
-    /// Prices of (w, w') at both ends, 0 at those of the path.
+    /// Prices of (w, w') at both ends; 0 at the ends of the path.
     pub price: [[f64; 2]; 2],
     /// Least and greatest w and w' at both ends.
     pub boxes: [[[f64; 2]; 2]; 2],
 }
 
 impl Part {
-    /// The bound of the intervals `core` for the states of the spline x at both their ends, in s.
+    /// The bound in s for the intervals `core` if the states at both their ends are those of the spline x.
     pub fn at(&self, x: &[f64], core: &Range<usize>) -> f64 {
         let cost = |end: usize, n: usize| self.price[end][0] * x[2 * n] + self.price[end][1] * x[2 * n + 1];
         self.least + cost(0, core.start) + cost(1, core.end)
     }
 }
 
-/// A lower bound from the parts along a path, as a part of the plan's time; NaN where they prove none above 0.
+/// The lower bound from all parts along a path, as a fraction of the plan's time; NaN if they prove no bound above 0 or if the
+/// bound exceeds the plan's time.
 pub fn join(parts: &[Part]) -> f64 {
     let whole = joined(parts);
-    // At very low feeds rounding leaves the multipliers few digits; the greatest speeds need none.
+    // At very low feeds rounding spoils the multipliers; the time at the greatest speeds does not depend on them.
     let part = whole.least.max(whole.fastest) / whole.time;
     if part > 0.0 && part < 1.0 + ROUNDING {
         part.min(1.0)
@@ -102,7 +104,7 @@ pub fn join(parts: &[Part]) -> f64 {
     }
 }
 
-/// The part that neighbours make together.
+/// Combines neighbouring parts to one part.
 pub(super) fn joined(parts: &[Part]) -> Part {
     let mut least: f64 = parts.iter().map(|part| part.least).sum();
     for pair in parts.windows(2) {
@@ -122,7 +124,7 @@ pub(super) fn joined(parts: &[Part]) -> Part {
     }
 }
 
-/// The least slope · z in a box of z, whose ends may be infinite.
+/// The least value of slope · z for z in a box, whose ends may be infinite.
 fn lowest(slope: f64, [low, high]: [f64; 2]) -> f64 {
     match slope {
         0.0 => 0.0,
@@ -131,33 +133,34 @@ fn lowest(slope: f64, [low, high]: [f64; 2]) -> f64 {
     }
 }
 
-/// What is known of a window that was planned.
+/// A planned window, as the input of its lower bound.
 pub struct Planned<'a> {
-    /// The limits as they are, and as they were tightened for the plan.
+    /// The limits before any tightening, and the limits as tightened for the plan.
     pub rows: &'a Constraints,
     pub tight: &'a Constraints,
     pub ends: [WindowEnd; 2],
-    /// Whether an end is one of the path.
+    /// Whether each end is an end of the path.
     pub at_ends: [bool; 2],
     pub x: &'a [f64],
-    /// With the multipliers under the tightened limits.
+    /// The solver, with the multipliers under the tightened limits.
     pub solved: &'a InteriorPoint<Exact>,
 }
 
-/// A solution x of the relaxation that is not beside the plan, with the limits under the speeds of `speed_limit`.
+/// A solution x of the relaxation that is not beside the plan, and the limits under which it was found: with the speeds of
+/// `speed_limit`.
 pub struct Solution {
     pub rows: Constraints,
     pub x: Vec<f64>,
 }
 
-/// The start where the multipliers of jerk exceed c by this part of it.
+/// The start near the plan if the multipliers of jerk exceed c by this fraction of it.
 fn near(excess: f64) -> Start {
     let far = SPREAD * excess;
     Start { above: NEAR.above.max(far), barrier: NEAR.barrier.max(far), ..NEAR }
 }
 
-/// The part of the intervals `core` of a window, with the solution of the relaxation unless it is beside the plan; its
-/// multipliers stay in `space`.
+/// Computes the part of the intervals `core` of a window. Also returns the solution of the relaxation, unless it is beside the
+/// plan. The multipliers of the relaxation stay in `space`.
 pub fn part(
     planned: &Planned,
     core: &Range<usize>,
@@ -202,7 +205,7 @@ pub fn part(
     (part, lowered.map(|rows| Solution { rows, x }))
 }
 
-/// The part by the solution x of the relaxation, whose multipliers are balanced.
+/// The best part that follows from the solution x of the relaxation while its multipliers are balanced (`settle`).
 pub(super) fn balanced(
     planned: &Planned,
     core: &Range<usize>,
@@ -223,7 +226,7 @@ pub(super) fn balanced(
     best
 }
 
-/// The part by the tangent at x, and what the boxes take from it, in s.
+/// The part from the tangent at x, and by how much the boxes lower it, in s.
 fn tangent(
     planned: &Planned,
     core: &Range<usize>,
@@ -234,7 +237,7 @@ fn tangent(
     sum(planned, core, x, &terms, &space.ends)
 }
 
-/// The terms of all intervals of a window at x; the multipliers are made admissible.
+/// The terms of all intervals of a window at x, with the prices of its ends. Changes the multipliers to admissible ones.
 pub(super) fn terms(planned: &Planned, x: &[f64], space: &mut InteriorPoint<Relaxed>) -> Vec<Terms> {
     let Planned { rows, x: plan, .. } = *planned;
     let InteriorPoint { state, model: Relaxed { chord, prices, .. }, .. } = space;
@@ -248,7 +251,7 @@ pub(super) fn terms(planned: &Planned, x: &[f64], space: &mut InteriorPoint<Rela
     terms
 }
 
-/// The part of some intervals from their terms at x, and what the boxes take from it, in s.
+/// The part of the intervals `core` from their terms at x, and by how much the boxes lower it, in s.
 pub(super) fn sum(
     planned: &Planned,
     core: &Range<usize>,
@@ -315,7 +318,7 @@ pub(super) fn sum(
     (Part { time, fastest, least: least - loss, price, boxes: ends }, loss)
 }
 
-/// The part by which the multipliers of jerk exceed the weights of the time.
+/// The total excess of the multipliers of jerk over the weights c of the time, as a fraction of the sum of c.
 fn excess(rows: &Constraints, dual: &[Lanes]) -> f64 {
     let layout = rows.layout();
     let (mut excess, mut length) = (0.0, 0.0);
@@ -331,7 +334,7 @@ fn excess(rows: &Constraints, dual: &[Lanes]) -> f64 {
     excess / length
 }
 
-/// c less the multipliers of jerk at collocation point p of intervals of length h.
+/// c minus the sum of the multipliers of jerk at collocation point p of intervals of length h.
 pub(super) fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> Lanes {
     let mut rest = h.map(|h| MASS[p] * h);
     for row in &dual[..layout.speed()] {
@@ -342,12 +345,13 @@ pub(super) fn rest(h: &Lanes, dual: &[Lanes], layout: RowLayout, p: usize) -> La
     rest
 }
 
-/// Takes the multipliers of the limits as they are that pull like those of the tightened limits.
+/// Sets `out` to multipliers of the limits before tightening that have the same gradients as those of the tightened limits. The
+/// multiplier of y ≥ w^(−1/2) becomes what the multipliers of jerk leave of c.
 pub(super) fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
     out.clone_from(&planned.solved.state.dual);
     let scale = |dual: &mut Lanes, tight: &Lanes, own: &Lanes| {
         for (lane, dual) in dual.values_mut().iter_mut().enumerate() {
-            // Limits that do not apply have a factor of 0.
+            // Limits that were dropped have a factor of 0.
             if own.values()[lane] != 0.0 {
                 *dual *= tight.values()[lane] / own.values()[lane];
             }
@@ -370,10 +374,10 @@ pub(super) fn loosen(planned: &Planned, out: &mut Vec<Lanes>) {
     }
 }
 
-/// What the bound takes from an interval.
+/// The contributions of an interval to the bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
-    /// The times of the plan and at the greatest speeds, in s.
+    /// The time of the plan and the time at the greatest speeds, in s.
     pub time: f64,
     pub fastest: f64,
     /// Value and local slope of the Lagrangian.
@@ -381,11 +385,11 @@ pub struct Terms {
     pub slope: [f64; 4],
     /// The greatest w, w' and −w' at both ends.
     pub most: [[f64; 3]; 2],
-    /// How much w can rise and fall at most: the 3/8 rule is exact for the quadratic w'.
+    /// How much w can rise and fall at most: the limits of w', integrated by the 3/8 rule, which is exact for the quadratic w'.
     pub moves: [f64; 2],
 }
 
-/// The terms of all intervals at a spline x, without prices; the multipliers are made admissible.
+/// The terms of all intervals at a spline x, without prices. Changes the multipliers to admissible ones.
 fn lagrangian(
     rows: &Constraints,
     plan: &[f64],
@@ -427,8 +431,8 @@ pub(super) fn lagrangian_on<S: Simd>(
             for row in &dual[..layout.speed()] {
                 jerk += row.load(simd);
             }
-            // The Lagrangian is bounded below in y only if the multipliers of jerk add up to its cost at most; the multiplier
-            // of a chord adds to the cost.
+            // The Lagrangian is bounded below in y only if the multipliers of jerk add up to at most the cost of y; the
+            // multiplier of a chord adds to this cost.
             let chord = chord.get(b).map_or(Lanes::ZERO, |chord| chord[p]);
             let speed = dual[layout.speed()].values_mut().iter_mut();
             for ((speed, chord), over) in speed.zip(chord.values()).zip((jerk - cost).values()) {
@@ -482,7 +486,7 @@ fn limits_at<S: Simd>(simd: S, rows: &Constraints, block: usize, p: usize) -> [R
         let bend = q2.load(simd).abs() * w;
         let [with, against] =
             limit.most.map(|most| (bend + Register::all(simd, most / limit.per_mean)) * 2.0);
-        // The one of these that is against the direction of the axis limits nothing.
+        // One of these is practically infinite and limits nothing: the one for the direction in which the axis does not move.
         let q1 = q1.load(simd);
         let [ahead, back] = [q1.max(least).inverse(), (-q1).max(least).inverse()];
         most[0] = (with * ahead).min(against * back).min(most[0]);
@@ -491,7 +495,7 @@ fn limits_at<S: Simd>(simd: S, rows: &Constraints, block: usize, p: usize) -> [R
     [w, most[0], most[1]]
 }
 
-/// Narrows the boxes of w to the values that can be reached from station to station, forward and backward.
+/// Lowers the greatest w of the boxes to what can be reached from station to station, forward and backward.
 fn narrow(change: &[[f64; 2]], boxes: &mut [[f64; 2]]) {
     for n in 0..change.len() {
         boxes[2 * n + 2][1] = boxes[2 * n + 2][1].min(boxes[2 * n][1] + change[n][0]);
@@ -508,7 +512,7 @@ mod tests {
     use super::super::window::ramps;
     use super::*;
 
-    /// The time over some intervals, where jerk beyond its limit takes time instead.
+    /// The time of the relaxation over the intervals `core`: jerk beyond its limit costs time there.
     fn relaxed_time(rows: &Constraints, x: &[f64], core: &Range<usize>) -> f64 {
         relaxed_times(rows, x)[core.clone()].iter().sum()
     }
@@ -520,7 +524,7 @@ mod tests {
             let profiles = around(own.x, own.rows, 40);
             let (count, blocks) = (own.rows.count(), &own.rows.blocks);
             for _ in 0..20 {
-                // Of one row or all, up to more than the weights of the time.
+                // Multipliers of one row or of all rows, up to more than the weights of the time.
                 let (most, one) = (1.0 + random(), 8.0 * random());
                 let of_row = |row: usize| if one < 0.0 || row == one as usize { most } else { 0.0 };
                 let rows_of = |h: Lanes, p: usize| {
@@ -568,7 +572,7 @@ mod tests {
                     .collect();
                 let least = times.iter().copied().fold(f64::INFINITY, f64::min);
                 assert!((1.0..1.05).contains(&(least / bound)), "{least} s, {bound} s proven");
-                // Other multipliers prove less, but no more.
+                // Other multipliers may prove less, but never more than the least time.
                 let mut random = random();
                 let known = space.state.dual.clone();
                 for i in 0..30 {

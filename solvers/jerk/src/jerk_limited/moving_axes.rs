@@ -1,11 +1,11 @@
-//! The plan of a path by those axes alone that move on it: an axis at rest has no rows in the solver. Most pieces of most
-//! programs move two axes of three, or three of five.
+//! Plans a path with only those axes that move on it: an axis at rest gets no rows in the solver. Most pieces of most programs
+//! move two axes of three, or three of five.
 
 use super::profile::Plan;
 use super::windows::Rough;
 use crate::path_problem::{Effort, Fault, Geometry, Limits, PathPoint, PathPoints, Problem};
 
-/// A path by K of its axes.
+/// A path with K of its axes.
 struct MovingAxes<'a, const K: usize> {
     knots: &'a [f64],
     at: &'a (dyn Fn(usize, f64) -> PathPoint<K> + Sync),
@@ -26,7 +26,7 @@ impl<const K: usize> Geometry<K> for MovingAxes<'_, K> {
     }
 }
 
-/// What is to be done with a problem by the axes that move.
+/// Work on a problem that is reduced to K of its axes.
 trait Work {
     type Done;
 
@@ -53,7 +53,7 @@ impl Work for Finely<'_> {
     }
 }
 
-/// The rough plan. The axes that do not move by `moves` are at rest on the whole path.
+/// The rough plan of a path. Axes with `moves` false are at rest on the whole path.
 pub fn rough<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     moves: &[bool; M],
@@ -62,7 +62,7 @@ pub fn rough<G: Geometry<M>, const M: usize>(
     work(problem, moves, Roughly(effort))
 }
 
-/// The plan of least time from a rough one, on a grid for a price of an interval in s.
+/// The plan of least time from a rough plan, on the grid that results from this price of an interval, in s.
 pub fn plan<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     moves: &[bool; M],
@@ -88,7 +88,7 @@ fn work<G: Geometry<M>, W: Work, const M: usize>(
     }
 }
 
-/// The work by K axes, all that move among them.
+/// Does the work with K axes, which include all axes that move.
 fn by<G: Geometry<M>, W: Work, const M: usize, const K: usize>(
     problem: &Problem<G, M>,
     moves: &[bool; M],

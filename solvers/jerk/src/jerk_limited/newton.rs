@@ -12,8 +12,7 @@ use super::working_space::InteriorPoint;
 use feedplan_geometry::lanes::eight::{Lanes, Register};
 
 impl<X: Model> InteriorPoint<X> {
-    /// Assembles matrix and gradient at x, after `part` of the multipliers' step with λ ≥ `least_dual`/s; returns Σ λ
-    /// s.
+    /// Adds `part` of the multipliers' step, with λ ≥ `least_dual`/s, then assembles matrix and gradient at x. Returns Σ λ s.
     pub(super) fn assemble(&mut self, rows: &Constraints, part: f64, least_dual: f64) -> f64 {
         dispatch!(self.level, simd => self.assemble_on(simd, rows, part, least_dual))
     }
@@ -64,8 +63,8 @@ impl<X: Model> InteriorPoint<X> {
         work
     }
 
-    /// Returns Σ λ s, now `work`, after the predictor's longest step. Keeps the predictor's products −ds dλ, each at
-    /// most `most` in size, and the pulls of these products and of the centring on each station.
+    /// Returns Σ λ s after the predictor's longest step; `work` is Σ λ s before it. Stores the predictor's products −ds dλ,
+    /// limited to ±`most`, and the right-hand sides of these products and of the centring at each station.
     pub(super) fn predict(&mut self, rows: &Constraints, work: f64, most: f64) -> f64 {
         dispatch!(self.level, simd => self.predict_on(simd, rows, work, most))
     }
@@ -137,7 +136,8 @@ impl<X: Model> InteriorPoint<X> {
         self.gradient.give(&mut self.rhs, -1.0);
     }
 
-    /// The corrector's right-hand side: λ s of every row to `target`, and `second` times the predictor's products.
+    /// The corrector's right-hand side: it moves λ s of every row to `target` and includes `second` times the predictor's
+    /// products.
     pub(super) fn correct(&mut self, target: f64, second: f64) {
         self.descend();
         for (terms, part) in self.pulls.iter().zip([target, second]) {
@@ -177,7 +177,8 @@ impl<X: Model> InteriorPoint<X> {
                     step[k] = next.into();
                 }
             }
-            // Few intervals need a shorter step than all before; only these divide. No lane is above 0.
+            // Few blocks need a shorter step than all blocks before; only for these the quotients are computed. No lane of
+            // `beyond` is above 0, so that the sum is below 0 if any lane is.
             if beyond.sum() < 0.0 {
                 let all = b * layout.all()..(b + 1) * layout.all();
                 let mut most = known;
@@ -197,9 +198,10 @@ impl<X: Model> InteriorPoint<X> {
         (1.0 / primal, 1.0 / dual)
     }
 
-    /// Moves x and the multipliers by a Newton step that keeps λ s: to first order the gradient of the Lagrangian
-    /// vanishes there. The multipliers stay at 0 or above, and w above 0, but x may leave the limits. False where there
-    /// is no such step.
+    /// Moves x and the multipliers by a Newton step that keeps each product λ s. After the step the gradient of the Lagrangian is
+    /// 0 to first order. The multipliers stay at 0 or above and w stays above 0, but x may break the limits. Returns false, with
+    /// x unchanged, if x is not strictly inside the limits, if the matrix is not positive definite, or if the step leads to w ≤
+    /// 0.
     pub(super) fn balance(&mut self, rows: &Constraints, conditions: [EndCondition; 2]) -> bool {
         if self.slacks(rows, false).is_none() {
             return false;
@@ -221,7 +223,7 @@ impl<X: Model> InteriorPoint<X> {
         true
     }
 
-    /// The pulls of the multipliers on each station.
+    /// Sets `pulls[0]` to Σ λ ∇s over all rows, at each station.
     #[inline(always)]
     fn pull_on<S: Simd>(&mut self, simd: S, rows: &Constraints) {
         let layout = rows.layout();
@@ -275,7 +277,8 @@ impl<X: Model> InteriorPoint<X> {
         dispatch!(self.level, _simd => self.band.factor(conditions))
     }
 
-    /// The step for the right-hand side; `missing` are the steps at given ends, `pulls` the parts of both pulls in it.
+    /// Solves for the step with the present right-hand side. `missing` are the steps at given ends, `pulls` the factors of the
+    /// centring and of the predictor's products in the right-hand side.
     pub(super) fn step_to(&mut self, rows: &Constraints, missing: [[f64; 2]; 2], pulls: [f64; 2]) {
         self.band.solve(&self.rhs, missing, &mut self.step);
         dispatch!(self.level, simd => self.model.solved(simd, rows, &self.step, pulls));
@@ -291,7 +294,7 @@ impl<X: Model> InteriorPoint<X> {
         }
     }
 
-    /// The trial is x and a part of the step.
+    /// Sets the trial to x plus `part` of the step.
     fn try_step(&mut self, part: f64) {
         let Self { trial, x, step, .. } = self;
         let columns = [(&mut trial.w, &x.w, &step.w), (&mut trial.slope, &x.slope, &step.slope)];
@@ -302,7 +305,7 @@ impl<X: Model> InteriorPoint<X> {
         }
     }
 
-    /// Adds a part of the multipliers' last step.
+    /// Adds `part` of the multipliers' last step.
     pub(super) fn finish(&mut self, part: f64) {
         for (dual, step) in self.state.dual.iter_mut().zip(&self.state.step) {
             for (dual, step) in dual.values_mut().iter_mut().zip(step.values()) {

@@ -1,11 +1,10 @@
 //! The jerk-limited planner on a path of the package, with the problem's limits and jerk limits [mm/s³]: a profile of
 //! phases over the pieces' parameters, and a lower bound on its time.
 //!
-//! Each subrun is planned along its arc length, except where its feed is held (`held`). Two more speed caps hold inside
-//! it: a corner is passed at its speed, and a junction where q'' jumps at the speed at which third differences of
-//! setpoints keep the limits of jerk
-//! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
-//! the acceleration goes on (`turns`).
+//! Each subrun is planned along its arc length, except where its feed is held (`held`). Two more kinds of speed caps apply inside
+//! it: a corner is passed at its speed, and a junction where q'' jumps at the speed at which third differences of setpoints keep
+//! the limits of jerk (`curvature_jumps`). Lines get sections of constant jerk. Where the path turns back, the tool is at rest
+//! only for an instant, and the acceleration continues (`turns`).
 
 use std::mem::take;
 
@@ -23,22 +22,24 @@ use crate::s_curve::{self, Segment};
 use crate::subruns::{over_chains, Chain, Subrun};
 use feedplan_planner::problem::{along, Fault, Problem};
 
-/// A junction holds the speed where the plan is within this part of its cap.
+/// A junction counts as limiting the speed where the plan reaches this fraction of its cap.
 const HELD: f64 = 0.998;
-/// A subrun without a plan is cut at most this often where the planner finds no speed.
+/// A subrun without a plan is divided by stops where the planner finds no speed, at most this many times one within another.
 const CUTS: u32 = 12;
-/// Other subruns turn back with at most this part of what lines can: a line must reach the rest.
+/// Subruns that are no lines turn back with at most this fraction of the acceleration that lines allow, so that lines can reach
+/// it.
 const BELOW: f64 = 0.9999;
-/// How often subruns are planned that do not meet, and meet without acceleration at last.
+/// Rounds in which neighbouring subruns that do not meet are planned again with the lesser acceleration; after these they meet
+/// with acceleration 0.
 const ROUNDS: usize = 4;
-/// The error of the grid counts as a part of the time of the whole subrun, and falls with the square of the resolution
-/// r. Where the planned stretches are the part p of the length, their resolution is r/√(1 + FINER (1/p − 1)), and at
-/// least `LEAST`: the error is at most about p + FINER (1 − p) of that of a subrun that is planned as a whole.
+/// The error of the grid counts as a fraction of the time of the whole subrun, and falls with the square of the resolution r. If
+/// the planned stretches are the fraction p of the length, their resolution is r/√(1 + FINER (1/p − 1)), and at least `LEAST`:
+/// the error is then at most about p + FINER (1 − p) times that of a subrun that is planned as a whole.
 const FINER: f64 = 0.3;
 const LEAST: f64 = 6.0;
-/// A stretch shorter than this part of its path has lengths of few digits.
+/// The arc lengths of a stretch shorter than this fraction of its path have few correct digits.
 const FEW_DIGITS: f64 = 1e-7;
-/// It is planned with so many times the resolution.
+/// Such a stretch is planned with this multiple of the resolution.
 const FINER_THERE: f64 = 3.0;
 /// Bisection steps for the greatest speed that an end can have.
 const TRIALS: u32 = 12;
@@ -60,24 +61,24 @@ pub fn plan<const M: usize>(
 /// The subruns of a chain.
 struct Strokes<'a, const M: usize> {
     paths: Vec<ArcLengthPath<'a, M>>,
-    /// Those that are lines.
+    /// The line of each subrun that is a line.
     lines: Vec<Option<Line>>,
-    /// The greatest accelerations at their ends that the lines allow, in mm/s².
+    /// The greatest accelerations at the ends of all subruns that the lines allow, in mm/s².
     accelerations: Vec<f64>,
 }
 
-/// A path between two ends with rough plans of its stretches.
+/// A path between two ends, with rough plans of its stretches.
 struct RoughPath {
     junctions: Vec<Junction>,
     caps: Vec<SpeedCap>,
-    /// That of the stretches.
+    /// The resolution of the plans of its stretches.
     resolution: f64,
     stretches: Vec<RoughStretch>,
 }
 
 struct RoughStretch {
     stretch: Stretch,
-    /// Known of those that do not hold their feed.
+    /// The rough plan; None for a stretch that holds its feed.
     rough: Option<Result<Rough, path_problem::Fault>>,
     phases: Option<JerkProfile>,
 }
@@ -87,7 +88,7 @@ struct RoughChain<'a, const M: usize> {
     strokes: Strokes<'a, M>,
     /// The greatest accelerations at the ends of its subruns, in mm/s².
     greatest: Vec<f64>,
-    /// Its subruns that are no lines, with their numbers in it.
+    /// Each subrun that is no line, with its index in the chain.
     known: Vec<(usize, RoughPath)>,
 }
 
@@ -112,8 +113,8 @@ impl<'a, const M: usize> Task<'a, M> {
 }
 
 impl<const M: usize> Task<'_, M> {
-    /// The profiles of the subruns of some chains; unplanned after the deadline. All are planned roughly first, which shows
-    /// how short the intervals are to be for the least time in all.
+    /// The profiles of the subruns of some chains; unplanned after the deadline. All subruns are planned roughly first: this
+    /// gives one price of an interval for all of them (`refinement`).
     pub fn chains(&self, chains: &[Chain]) -> Result<Vec<JerkProfile>, Fault> {
         let look = |chain| (!self.effort.expired()).then(|| self.rough_chain(chain)).transpose();
         let known: Vec<Option<RoughChain<M>>> = chains.par_iter().map(look).collect::<Result<_, _>>()?;
@@ -130,8 +131,8 @@ impl<const M: usize> Task<'_, M> {
         Ok(planned.into_iter().flatten().collect())
     }
 
-    /// A chain with rough plans. Between its subruns the tool is to turn back with the greatest accelerations that all lines
-    /// allow; other subruns take what accelerations are the best for them, and the lines beside them the same.
+    /// Plans a chain roughly. Between two lines the tool turns back with the greatest acceleration that all lines allow. Other
+    /// subruns take the accelerations up to these that are best for them, and the lines beside them take the same.
     fn rough_chain<'b>(&self, chain: &Chain<'b>) -> Result<RoughChain<'b, M>, Fault>
     where
         Self: 'b,
@@ -156,7 +157,7 @@ impl<const M: usize> Task<'_, M> {
         Ok(RoughChain { strokes, greatest, known })
     }
 
-    /// The profiles of a chain of subruns. Two subruns in a row that are no lines are planned again, with at most the lesser
+    /// The profiles of a chain of subruns. Two neighbouring subruns that are no lines are planned again, with at most the lesser
     /// acceleration of both, until they meet.
     fn chain(&self, chain: &Chain, known: RoughChain<M>) -> Result<Vec<JerkProfile>, Fault> {
         let count = chain.subruns.len();
@@ -219,7 +220,7 @@ impl<const M: usize> Task<'_, M> {
                 planned[i] = self.along_line(&paths[i], line, [accelerations[i], accelerations[i + 1]]);
             }
         }
-        // A bound holds with the greatest accelerations at the turns, whatever the plan takes there.
+        // The lower bound holds for all accelerations at the turns up to the greatest, whatever the plan takes there.
         if self.effort.proves {
             for i in 0..count {
                 if let Some(line) = &lines[i] {
@@ -247,19 +248,19 @@ impl<const M: usize> Task<'_, M> {
         Ok(Strokes { paths, lines, accelerations })
     }
 
-    /// The profile of a subrun that rests at its ends, or moves as it says; unplanned if the deadline has passed.
+    /// The profile of a subrun between its end speeds, at rest where these are 0; unplanned if the deadline has passed.
     pub fn subrun(&self, subrun: &Subrun) -> Result<JerkProfile, Fault> {
         let own = Chain { subruns: std::slice::from_ref(subrun), turns: &[] };
         Ok(self.chains(&[own])?.remove(0))
     }
 
-    /// Does work on a subrun of a chain, with its part of the watch.
+    /// Does `work` on a subrun of a chain, with the subrun's share of the progress.
     fn of_subrun<T>(&self, chain: &Chain, i: usize, work: impl FnOnce(&Task<M>) -> T) -> T {
         let watch = self.effort.watch.part(chain.subruns[i].parts.len() as f64);
         work(&Task { effort: &Effort { watch, ..*self.effort }, ..*self })
     }
 
-    /// A path between two ends with rough plans.
+    /// Divides a path between two ends into stretches and plans them roughly.
     fn rough_path(&self, path: &ArcLengthPath<M>, ends: [End; 2]) -> RoughPath {
         let junctions = path.junctions(&self.limits.jerk);
         let caps = path.caps(&junctions);
@@ -281,7 +282,7 @@ impl<const M: usize> Task<'_, M> {
         known
     }
 
-    /// The profile of a path between two ends, after this number of cuts.
+    /// The profile of a path between two ends. `cuts` is the number of stops that were already inserted one within another.
     fn plan(
         &self,
         path: &ArcLengthPath<M>,
@@ -291,7 +292,7 @@ impl<const M: usize> Task<'_, M> {
     ) -> Result<JerkProfile, Fault> {
         let moving = ends.iter().any(|end| matches!(end, End::Moving { .. }));
         match self.stretches(path, &mut known) {
-            // The deadline came before the first iteration of all windows.
+            // The deadline came before the first iteration of any window.
             Ok(planned) if self.effort.expired() && planned.iter().all(|own| own.excess.is_empty()) => {
                 Ok(JerkProfile::unplanned())
             }
@@ -318,7 +319,7 @@ impl<const M: usize> Task<'_, M> {
         }
     }
 
-    /// The phases of all stretches. Those of one without an iteration before the deadline have no excess.
+    /// The phases of all stretches. A stretch that had no iteration before the deadline has no excess.
     fn stretches(
         &self,
         path: &ArcLengthPath<M>,
@@ -345,7 +346,8 @@ impl<const M: usize> Task<'_, M> {
             if failed.is_empty() {
                 return Ok(all.into_iter().filter_map(|own| own.phases).collect());
             }
-            // Where the end of a stretch at its feed is too near, it is joined with the next ones.
+            // A stretch without a plan ends at a held feed that is too near: it is joined with two stretches before it and two
+            // after it.
             for i in failed.into_iter().rev() {
                 let joined = i.saturating_sub(2)..(i + 3).min(all.len());
                 let (first, last) = (all[joined.start].stretch, all[joined.end - 1].stretch);
@@ -381,7 +383,7 @@ impl<const M: usize> Task<'_, M> {
                 Ok(rough)
             });
             let plan = rough.and_then(|rough| {
-                // With its neighbours a stretch finds a first plan sooner than on a finer grid.
+                // Joined with its neighbours, a stretch finds a first plan sooner than on a finer grid.
                 if is_alone || rough.is_planned() {
                     moving_axes::plan(problem, moves, rough, price, effort)
                 } else {
@@ -405,7 +407,7 @@ impl<const M: usize> Task<'_, M> {
         })
     }
 
-    /// Does work on a stretch as a problem of its own, by those axes that move, with its effort.
+    /// Does `work` on a stretch as a problem of its own, with the axes that move on it and its share of the effort.
     fn on_stretch<T>(
         &self,
         path: &ArcLengthPath<M>,
@@ -418,7 +420,7 @@ impl<const M: usize> Task<'_, M> {
         let caps: Vec<SpeedCap> = caps_between(&known.caps, ends).iter().map(within).collect();
         let problem =
             path_problem::Problem { geometry: &own, limits: self.limits, caps: &caps, ends: states };
-        // Short intervals leave room below the limits for the rounding of such lengths.
+        // Short intervals leave room below the limits for the rounding errors of such lengths.
         let few_digits = ends[1] - ends[0] < FEW_DIGITS * path.total();
         let resolution = if few_digits { FINER_THERE } else { 1.0 } * known.resolution;
         let watch = self.effort.watch.part((ends[1] - ends[0]) / path.total());
@@ -426,7 +428,8 @@ impl<const M: usize> Task<'_, M> {
         work(&own, &problem, &moving(self.problem, path, ends), &effort)
     }
 
-    /// Adds the pieces of the junctions between two lengths whose jump limits the speed; w is its square at a length.
+    /// Adds to `phases.kinks` the pieces that begin at those junctions between two arc lengths where a jump of q'' limits the
+    /// speed; w(s) is the square of the planned speed.
     fn kinks(
         &self,
         path: &ArcLengthPath<M>,
@@ -443,7 +446,7 @@ impl<const M: usize> Task<'_, M> {
         }
     }
 
-    /// The quickest profile of a line with these accelerations at its ends.
+    /// The fastest profile of a line with these accelerations at its ends, in mm/s².
     fn along_line(&self, path: &ArcLengthPath<M>, line: &Line, accelerations: [f64; 2]) -> JerkProfile {
         let ends = line.ends(accelerations);
         let mut phases = JerkProfile::default();
@@ -451,8 +454,8 @@ impl<const M: usize> Task<'_, M> {
         phases
     }
 
-    /// A line with one feed; None where it is too short for the speeds at its ends, or its limits differ for speeding up
-    /// and down.
+    /// The path as a line with one feed; None if it is no such line, if it is too short for the speeds at its ends, or if its
+    /// limits differ for speeding up and slowing down.
     fn line(&self, path: &ArcLengthPath<M>, speeds: [f64; 2]) -> Result<Option<Line>, Fault> {
         let Some((direction, feed)) = path.line() else { return Ok(None) };
         let Limits { velocity, acceleration, jerk } = &self.limits;
@@ -472,7 +475,7 @@ impl<const M: usize> Task<'_, M> {
         Ok(segment.can_cross(line.ends([0.0; 2])).then_some(line))
     }
 
-    /// The profile with a stop at s, where the planner finds no speed, or half-way.
+    /// The profile with a stop at s, where the planner finds no speed, or half-way if s is at an end.
     fn cut(&self, path: &ArcLengthPath<M>, s: f64, cuts: u32) -> Result<JerkProfile, Fault> {
         let total = path.total();
         let s = if s > 1e-6 * total && s < (1.0 - 1e-6) * total { s } else { 0.5 * total };
@@ -494,7 +497,7 @@ impl<const M: usize> Task<'_, M> {
             return Ok(JerkProfile::unplanned());
         }
         let mut whole = JerkProfile::joined(both);
-        // The bounds of both hold with the stop alone.
+        // The bounds of both parts hold only for plans with this stop.
         whole.lower_bound = vec![f64::NAN];
         Ok(whole)
     }
@@ -527,7 +530,7 @@ impl<const M: usize> Task<'_, M> {
             });
             plan.is_ok()
         };
-        // The end is at fault where the start alone can be met.
+        // The end is at fault if the start alone can be met.
         let at = usize::from(speeds[0] == 0.0 || (speeds[1] > 0.0 && possible([speeds[0], 0.0])));
         let with = |speed: f64| if at == 0 { [speed, 0.0] } else { [speeds[0], speed] };
         let (mut low, mut high) = (0.0, speeds[at]);
@@ -548,14 +551,14 @@ impl<const M: usize> Task<'_, M> {
     }
 }
 
-/// The ends of a subrun of a chain with these accelerations at its turns, in mm/s², where the bound is for all up to the
-/// greatest.
+/// The ends of a subrun of a chain, with these accelerations in mm/s² at its turns; the lower bound is to hold for all
+/// accelerations up to the greatest.
 fn ends_of(chain: &Chain, i: usize, accelerations: &[f64], greatest: &[f64]) -> [End; 2] {
     [0, 1].map(|end| end_of(chain.subruns[i].ends[end], [accelerations[i + end], greatest[i + end]]))
 }
 
-/// The end of a path at a speed in mm/s; at rest with an acceleration of at most this, in mm/s², where the bound is for
-/// all up to another.
+/// The end of a path at a speed in mm/s; if it is at rest, with at most this acceleration in mm/s², and a lower bound for all
+/// accelerations up to `greatest`.
 fn end_of(speed: f64, [acceleration, greatest]: [f64; 2]) -> End {
     if speed > 0.0 {
         End::Moving { speed, acceleration: 0.0 }

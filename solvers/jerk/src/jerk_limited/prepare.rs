@@ -1,4 +1,4 @@
-//! What the solver starts from: the checked problem, its grid, the known ends, and a first plan within all limits.
+//! Prepares what the solver starts from: the checked problem, its grid, the known ends, and a first plan within all limits.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ use feedplan_geometry::watch::Watch;
 const CHUNK: usize = 1024;
 /// Rounds in which the first plan is lowered where it exceeds a limit.
 const ROUNDS: usize = 12;
-/// The share of the preparation in the work of a plan.
+/// The fraction of a plan's progress that the preparation takes.
 pub const PREPARING: f64 = 0.1;
 
 /// A problem on its grid.
@@ -28,11 +28,11 @@ pub struct Prepared<'a, G, const M: usize> {
     pub problem: &'a Problem<'a, G, M>,
     pub grid: Grid,
     pub ends: [WindowEnd; 2],
-    /// The ends of every motion that the lower bound is for.
+    /// The ends for the lower bound, which holds for every motion between these ends.
     pub bound_ends: [WindowEnd; 2],
-    /// The constraints on all intervals, where one window takes them all.
+    /// The constraints on all intervals if one window takes them all, else None.
     rows: Option<Constraints>,
-    /// A valid plan (w_0, w'_0, w_1, …); empty where none was found.
+    /// A valid plan (w_0, w'_0, w_1, …); empty if none was found.
     pub x: Vec<f64>,
     /// The greatest speed that the envelope allows on each interval, in mm/s.
     pub speeds: Vec<f64>,
@@ -65,7 +65,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         Ok(prepared)
     }
 
-    /// What a plan on a finer grid starts from.
+    /// Keeps only what the preparation on a finer grid needs.
     pub fn start(self) -> Start {
         let Self { grid, ends, bound_ends, x, slopes, .. } = self;
         Start { grid, ends: [ends, bound_ends], x, slopes }
@@ -98,7 +98,8 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         }
     }
 
-    /// Makes the first plan.
+    /// Computes the first plan: smooths the speed envelope, with lower caps of r where the plan exceeds a limit. If it still does
+    /// after all rounds, all of w is scaled down; x is left empty where given ends do not allow that.
     fn begin(&mut self) {
         let (limits, slopes) = (&self.problem.limits, self.slopes);
         let mut caps =
@@ -128,7 +129,8 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         self.x.iter_mut().for_each(|x| *x *= scale);
     }
 
-    /// f(constraints of some intervals, x at their stations) for all intervals.
+    /// Calls f(constraints of some intervals, x at their stations) for all intervals, in parallel. Returns one value for each
+    /// interval.
     fn each(&self, f: impl Fn(&Constraints, &[f64]) -> Vec<f64> + Sync) -> Vec<f64> {
         let mut out = vec![0.0; self.grid.pieces.len()];
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
@@ -142,7 +144,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out
     }
 
-    /// Takes the constraints on a range of intervals.
+    /// Sets `rows` to the constraints on a range of intervals.
     fn take(&self, range: Range<usize>, rows: &mut Constraints) {
         match &self.rows {
             Some(all) => rows.copy(all, range),
@@ -150,7 +152,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         }
     }
 
-    /// Makes the window one of a range of intervals.
+    /// Sets the constraints and the check of a window to those of a range of intervals.
     pub fn fill(&self, range: Range<usize>, window: &mut Window) {
         self.take(range.clone(), &mut window.rows);
         let stations = &self.grid.stations[range.start..=range.end];
@@ -167,7 +169,8 @@ pub struct Start {
 }
 
 impl Start {
-    /// The problem with each interval of the grid in a number of equal parts; with the same first plan, where that is valid.
+    /// The problem on a finer grid, in which interval n is split into `parts[n]` equal parts. The first plan is kept if it is
+    /// valid there, else a new one is made.
     pub fn refined<'a, G: Geometry<M>, const M: usize>(
         &self,
         problem: &'a Problem<'a, G, M>,
@@ -210,8 +213,8 @@ fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [[Win
         }
         End::Held { speed } => [WindowEnd::Fixed { w: speed * speed, slope: 0.0 }, WindowEnd::Free],
     });
-    // Lengths are rounded by up to this, which is 1e-5 of the shortest ramps. A plan stays below the limit at the end of a ramp
-    // by the same part.
+    // The rounding error of arc lengths, about 2e-5 of the shortest ramps. A plan's w at the end of a ramp stays below its limit
+    // by the fraction that this error is of the ramp's length.
     let rounding = f64::EPSILON * total;
     let planned = both.map(|end| match end[0] {
         WindowEnd::Rest { ramp, greatest } => {
@@ -227,7 +230,7 @@ fn rising(numbers: impl Iterator<Item = f64> + Clone) -> bool {
     numbers.clone().zip(numbers.skip(1)).all(|(a, b)| a < b)
 }
 
-/// Checks the problem's numbers.
+/// Checks the problem's numbers; the fault names the first wrong one.
 fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), Fault> {
     let wrong = |what: String| Err(Fault::Input(what));
     let knots = problem.geometry.knots();

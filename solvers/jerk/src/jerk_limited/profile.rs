@@ -1,18 +1,18 @@
-//! The result of the planner: w = v² [mm²/s²] over the arc length [mm], a C¹ cubic spline between ramps of constant
-//! jerk.
+//! The result of the planner: w = v² [mm²/s²] over the arc length [mm], a C¹ cubic spline between ramps of constant jerk or of
+//! constant acceleration.
 
 use super::hermite;
 use super::rest_ramp::Ramp;
 use feedplan_geometry::elementary::Elementary;
 
-/// w at the stations. At rest, a ramp joins the end of the path and the nearest station.
+/// w at the stations. A ramp joins an end of the path that is at rest to the nearest station.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Profile {
     /// Arc lengths of the stations, in mm.
     pub s: Vec<f64>,
     /// v² at the stations, in mm²/s².
     pub speed_sq: Vec<f64>,
-    /// Its derivative along the path, twice the acceleration, in mm/s².
+    /// w' at the stations, the derivative of v² along the path: twice the acceleration, in mm/s².
     pub slope: Vec<f64>,
     /// Arc lengths of the ends of the path; without a ramp they are the first and the last station.
     pub ends: [f64; 2],
@@ -21,8 +21,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// w, w' and w'' at an arc length; w'' at a station is that of the interval after it, at the last one of that
-    /// before.
+    /// w, w' and w'' at an arc length in mm. At a station w'' is that of the interval after it, at the last station that of the
+    /// interval before it.
     pub fn at(&self, s: f64) -> [f64; 3] {
         let last = self.s.len() - 1;
         if s < self.s[0] {
@@ -61,7 +61,7 @@ impl Profile {
     }
 }
 
-/// w, w', w'' at a distance from rest on a ramp with w = `greatest` at its end.
+/// w, w', w'' at a distance from rest on a ramp with w = `greatest` at its end; `sign` is −1 at the end of the path.
 fn on_ramp(distance: f64, ramp: Ramp, greatest: f64, sign: f64) -> [f64; 3] {
     let part = distance / ramp.length;
     let w = greatest * part.power(ramp.power);
@@ -79,8 +79,8 @@ pub struct Plan {
     pub lower_bound: f64,
     /// Whether every window reached its optimum.
     pub converged: bool,
-    /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.
-    /// It is no bound, and it has no meaning where the deadline stopped the iterations.
+    /// Estimate of the time above the least time on the grid, in s, from the complementarity gap. It is no bound, and it has no
+    /// meaning if the deadline stopped the iterations.
     pub excess: f64,
     /// Newton steps, averaged over the intervals.
     pub iterations: f64,

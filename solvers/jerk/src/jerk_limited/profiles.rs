@@ -15,7 +15,7 @@ use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
 use feedplan_geometry::lanes::eight::Register;
 use feedplan_geometry::watch::Watch;
 
-/// A plane curve that turns to both sides ever more sharply.
+/// A plane curve that turns to both sides; `turn` is its greatest curvature, in 1/mm.
 pub struct Winding {
     knots: [f64; 2],
     turn: f64,
@@ -42,7 +42,7 @@ impl Geometry<2> for Winding {
     }
 }
 
-/// Σ c max(w^(−1/2), |L(w)|/J) on each interval: jerk beyond its limit takes time instead.
+/// Σ c max(w^(−1/2), |L(w)|/J) on each interval: the time of the relaxation, in which jerk beyond its limit costs time.
 pub fn relaxed_times(rows: &Constraints, x: &[f64]) -> Vec<f64> {
     let x = Columns::new(x);
     dispatch!(Level::new(), simd => {
@@ -64,8 +64,8 @@ pub fn relaxed_times(rows: &Constraints, x: &[f64]) -> Vec<f64> {
     })
 }
 
-/// Speed profiles around a plan that keep the limits of speed and acceleration, from 1e-4 to half of it away, rough
-/// and smooth; the ends are multiplied by the same factor as the slopes there.
+/// Speed profiles around a plan that keep the limits of speed and acceleration. Their w differs from that of the plan by 1e-4 to
+/// half of it, by noise or by a wave; at both ends w and w' are multiplied by the same factor.
 pub fn around(plan: &[f64], rows: &Constraints, count: usize) -> Vec<Vec<f64>> {
     let mut random = random();
     let keeps = |x: &[f64]| {
@@ -98,7 +98,7 @@ pub fn around(plan: &[f64], rows: &Constraints, count: usize) -> Vec<Vec<f64>> {
     out
 }
 
-/// Numbers from −1 to 1.
+/// Pseudo-random numbers from −1 to 1.
 pub fn random() -> impl FnMut() -> f64 {
     let mut seed = 1u64;
     move || {
@@ -107,7 +107,7 @@ pub fn random() -> impl FnMut() -> f64 {
     }
 }
 
-/// Plans a path whole and calls `work` with what the bound takes, and the effort.
+/// Plans a path in one window, and calls `work` with the input of the lower bound and the effort.
 pub fn planned(geometry: &impl Geometry<2>, work: impl Fn(&Planned, &Effort)) {
     let limits = Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
     let problem = Problem { geometry, limits, caps: &[], ends: [End::Rest; 2] };

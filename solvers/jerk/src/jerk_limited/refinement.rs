@@ -1,52 +1,54 @@
-//! Where the grid of a plan needs short intervals, as rough plans on a coarse grid show.
+//! Computes where the grid of a plan needs short intervals, from rough plans on a coarse grid.
 //!
-//! The optimum uses some limit fully at each place. A cubic spline cannot: within an interval the use of that limit varies,
-//! and the interval loses about Σ λ (greatest use − mean use) of time (`IntersampleCheck::losses`). The loss falls with the
-//! square of its length h, also where the jerk changes from one limit to another, as λ is small there. The least number of
-//! intervals for a loss in all has one price of an interval: each is split into one part more where that saves more.
+//! The optimum uses some limit fully at each place. A cubic spline cannot: within an interval the use of that limit varies, and
+//! the interval loses about Σ λ (greatest use − mean use) of time (`IntersampleCheck::losses`). The loss falls with the square of
+//! the interval's length h, also where the jerk changes from one limit to another, as λ is small there. For a given total loss
+//! the number of intervals is least if all intervals have the same price in s: an interval is split into one more part if that
+//! saves more time than the price.
 
 use super::constraints::Constraints;
 use super::hermite;
 use super::intersample_check::IntersampleCheck;
 use feedplan_geometry::lanes::eight::Lanes;
 
-/// Intervals of an even grid of the resolution in one of the coarse grid.
+/// Intervals of the even grid, which has the full resolution everywhere, in one interval of the coarse grid.
 pub const COARSE: u32 = 3;
-/// The greatest price of an interval, as a part of the mean time of the coarse intervals, times the square of the resolution.
+/// The greatest price of an interval: this fraction of the mean time of the coarse intervals, divided by the square of the
+/// resolution.
 const PRICE: f64 = 0.06;
-/// It is lowered by this factor until the grid loses no more in all than the even grid, at most so many times.
+/// The price is lowered by this factor until the grid's total loss is at most that of the even grid, at most this many times.
 const LOWER: f64 = 0.93;
 const TIMES: i32 = 255;
-/// A grid whose loss is at most this part of the time, over the square of the resolution, is fine enough.
+/// A total loss of at most this fraction of the time, divided by the square of the resolution, is always accepted.
 const LITTLE: f64 = 0.0025;
-/// The most parts of an interval.
+/// Greatest number of parts of an interval.
 const MOST: u32 = 8;
-/// Complementarity gap of the rough plan, as a part of the time, times the square of the resolution.
+/// Complementarity gap of the rough plan: this fraction of the time, divided by the square of the resolution.
 const GAP: f64 = 0.022;
-/// A limit counts as used where the rough plan uses more than this part of it.
+/// A limit counts as used where the rough plan uses more than this fraction of it.
 const USED: f64 = 0.97;
-/// An acceleration above this part of its limit is near to it: that of the plan may be greater.
+/// An acceleration above this fraction of its limit counts as near to it: the final plan may use more.
 const NEAR: f64 = 0.9;
-/// Peaks that exceed the collocation points by more than this factor still move.
+/// Peaks that exceed the use at the collocation points by more than this factor move on a finer grid, and are ignored.
 const FIRM: f64 = 1.05;
-/// Peaks are taken to exceed the collocation points of parts by this multiple of what is expected.
+/// On split intervals, peaks are assumed to exceed the use at the collocation points by this multiple of the expected excess.
 const MARGIN: f64 = 1.1;
 
-/// The optimum of a window on the coarse grid, roughly.
+/// A rough optimum of a window on the coarse grid.
 #[derive(Clone, Debug)]
 pub struct RoughPlan {
     /// (w_0, w'_0, w_1, …)
     pub x: Vec<f64>,
     /// The time that each interval loses, in s.
     pub losses: Vec<f64>,
-    /// By what factors the uses of the limits of speed, acceleration and jerk between the collocation points exceed those at
+    /// The factors by which the uses of the limits of speed, acceleration and jerk between the collocation points exceed those at
     /// them; 1 where such a peak would move on a finer grid.
     pub peaks: Vec<[f32; 3]>,
     /// Whether the acceleration comes near to a limit, so that it needs rows.
     pub accelerates: bool,
 }
 
-/// The complementarity gap of a rough plan.
+/// The complementarity gap of a rough plan, as a fraction of the time.
 pub fn tolerance(resolution: f64) -> f64 {
     GAP / (resolution * resolution)
 }
@@ -56,11 +58,11 @@ pub fn tolerance(resolution: f64) -> f64 {
 pub struct Losses {
     /// In s.
     pub each: Vec<f64>,
-    /// The time over the square of the resolution, in s.
+    /// The time of the path divided by the square of the resolution, in s.
     pub unit: f64,
 }
 
-/// The price of an interval in s with which paths lose no more in all than on even grids.
+/// The price of an interval in s for which the paths together lose no more time than on even grids, or than `LITTLE` allows.
 pub fn price<'a>(paths: impl Iterator<Item = &'a Losses> + Clone) -> f64 {
     let paths = paths.filter(|path| path.unit > 0.0);
     let sum = |of: fn(&Losses) -> f64| paths.clone().map(of).sum::<f64>();
@@ -79,26 +81,26 @@ pub fn price<'a>(paths: impl Iterator<Item = &'a Losses> + Clone) -> f64 {
     lowered(low)
 }
 
-/// The number of parts in which an interval is to be split at a price of an interval, in s.
+/// The number of parts into which an interval with this loss in s is to be split at a price of an interval in s.
 fn parts(loss: f64, price: f64) -> u32 {
     let of = |parts: u32| 1.0 / f64::from(parts * parts);
     1 + (1..MOST).map(|parts| u32::from(loss * (of(parts) - of(parts + 1)) > price)).sum::<u32>()
 }
 
 impl Losses {
-    /// The loss of the even grid, in s.
+    /// The total loss of the even grid, in s.
     fn even(&self) -> f64 {
         self.each.iter().sum::<f64>() / f64::from(COARSE * COARSE)
     }
 
-    /// The numbers of parts in which the intervals are to be split at a price of an interval, in s.
+    /// The numbers of parts into which the intervals are to be split at a price of an interval, in s.
     pub fn parts(&self, price: f64) -> Vec<u32> {
         self.each.iter().map(|&loss| parts(loss, price)).collect()
     }
 }
 
 impl RoughPlan {
-    /// From the optimum x on the coarse grid and its multipliers.
+    /// The rough plan for the optimum x on the coarse grid and its multipliers.
     pub fn new(rows: &Constraints, check: &IntersampleCheck, x: Vec<f64>, dual: &[Lanes]) -> Self {
         let used = check.utilisation(rows, &x);
         let losses = check.losses(rows, &x, dual, &used);
@@ -113,8 +115,8 @@ impl RoughPlan {
         Self { x, losses, peaks, accelerates }
     }
 
-    /// The same on intervals that were split into numbers of parts with these lengths. Between collocation points that are
-    /// closer together by a factor, peaks exceed them by its square less.
+    /// Converts the plan to a grid where interval n was split into `splits[n]` parts; `lengths` are the lengths of all parts in
+    /// mm. With k parts, the excess of peaks over the use at the collocation points falls to 1/k².
     pub fn refine(&mut self, splits: &[u32], lengths: &[f64]) {
         self.x = hermite::prolong(&self.x, splits.iter().map(|&parts| parts as usize), lengths);
         let lower = |(&parts, peak): (&u32, &[f32; 3])| {
@@ -166,7 +168,7 @@ mod tests {
                 let all = losses.iter().map(|&loss| parts(loss, price));
                 all.sum::<u32>() as f64 / losses.len() as f64
             });
-            // The number goes with the power 2/3 of the resolution, where not with 0: 3^(2/3) = 2.1.
+            // The number of intervals grows with the power 2/3 of the resolution, 3^(2/3) = 2.1, except where one part is enough.
             assert!(counts[1] > 1.4 * counts[0] && counts[2] > 1.4 * counts[1], "{counts:?}");
         }
     }
@@ -181,7 +183,7 @@ mod tests {
 
     #[test]
     fn one_part_more_must_save_its_price_by_hand() {
-        // Of a loss of 36 s two parts save 27 s, the third one 5 s, the fourth 1.75 s.
+        // Of a loss of 36 s, the second part saves 27 s, the third one 5 s, the fourth one 1.75 s.
         for (price, known) in [(30.0, 1), (20.0, 2), (6.0, 2), (4.0, 3), (1.8, 3), (1.7, 4), (0.0, MOST)] {
             assert_eq!(parts(36.0, price), known, "{price} s");
         }
@@ -190,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_grid_loses_no_more_than_the_even_one() {
-        // By hand: thirds of all lose 1/9; a loss in one of eight places only is split there.
+        // By hand: three parts of every interval lose 1/9. If only one of eight intervals loses time, only that one is split.
         let (all, one) = ([1e-3; 8], std::array::from_fn::<_, 8, _>(|n| if n == 3 { 8e-3 } else { 0.0 }));
         for losses in [all, one] {
             let path = Losses { each: losses.to_vec(), unit: 50.0 / 256.0 };
@@ -214,7 +216,7 @@ mod tests {
             let (each, time) = losses(turn, 16.0 / 3.0);
             Losses { each, unit: time / 256.0 }
         });
-        // A path without a rough plan has no losses, and does not count.
+        // A path without a rough plan has no losses and is ignored.
         let none = Losses { each: vec![0.0; 1000], unit: 0.0 };
         let price = price([&none, &easy, &hard].into_iter());
         let paths = [&easy, &hard];

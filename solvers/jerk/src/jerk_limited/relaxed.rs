@@ -6,7 +6,7 @@
 //! with L(w) = q''' w + 3/2 q'' w' + 1/2 q' w'' and the weights c of the 3/8 rule. Its minimum is at most that of the
 //! true problem. y is eliminated at each point, so that Newton's matrix keeps its bandwidth.
 //!
-//! For `cases` the row of speed may limit y too, and the states at the ends may have a price.
+//! For `cases`, the row of speed may limit y as well (`chord`), and the states (w, w') at both ends may have a price (`Price`).
 
 use fearless_simd::Simd;
 
@@ -20,22 +20,22 @@ use feedplan_geometry::lanes::eight::{Lanes, Register, LANES};
 /// The variables of the relaxation at the collocation points of each block.
 pub struct Relaxed {
     pub y: Vec<[Lanes; COUNT]>,
-    /// y starts above its least possible value by this part of it.
+    /// y starts at 1 + `above` times its least possible value.
     pub above: f64,
-    /// The coefficients of y in the rows of speed, 1 − w/w_max − chord y ≥ 0; 0 beyond the given blocks.
+    /// The coefficients of y in the rows of speed, 1 − w/w_max − chord y ≥ 0; 0 for blocks that have none given.
     pub chord: Vec<[Lanes; COUNT]>,
     pub prices: [Price; 2],
     step: Vec<[Lanes; COUNT]>,
     trial: Vec<[Lanes; COUNT]>,
-    /// w^(−1/2), as the slacks were last evaluated.
+    /// w^(−1/2) from the last evaluation of the slacks.
     pace: Vec<[Lanes; COUNT]>,
-    /// 1 over the second derivative by y and y, and the second derivatives by y and (w, w', w'').
+    /// Of the Newton matrix: the inverse of the second derivative by y, then the mixed second derivatives by y and (w, w', w'').
     cross: Vec<[[Lanes; 4]; COUNT]>,
-    /// The pulls of the rows on y.
+    /// Σ aim ∂s/∂y over the rows, for the aims of the centring and of the predictor's second-order term.
     pulls: Vec<[[Lanes; 2]; COUNT]>,
 }
 
-/// An end's share of the time, price · ((w, w') − from), in s.
+/// The cost of the state (w, w') at an end, price · ((w, w') − from), in s; it is added to the time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Price {
     pub price: [f64; 2],
@@ -43,7 +43,7 @@ pub struct Price {
 }
 
 impl Price {
-    /// The share of a state.
+    /// The cost of a state (w, w'), in s.
     pub fn of(&self, state: [f64; 2]) -> f64 {
         (0..2).map(|i| self.price[i] * (state[i] - self.from[i])).sum()
     }
@@ -93,7 +93,7 @@ impl Model for Relaxed {
                 for k in 0..rows.axes() {
                     least = least.max(rows.jerk_of(b, p, k, motion).abs());
                 }
-                // Half-way to the chord at most.
+                // y starts at most half-way between its least value and the greatest one that the row of speed allows.
                 let room = Register::all(simd, 1.0) - motion[0] * block.points[p].speed;
                 let chord = self.chord[b][p].load(simd).max(Register::all(simd, f64::MIN_POSITIVE));
                 let half = (least + room * chord.inverse()) * 0.5;

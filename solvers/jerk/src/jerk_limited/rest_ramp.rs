@@ -1,6 +1,6 @@
-//! The ramp from rest, or to rest, with the distance s [mm] from rest: constant jerk along the path, w = c s^(4/3), or,
-//! where the path turns back, constant acceleration c/2, w = c s. Its length follows from the derivatives and limits at
-//! the end of the path, the greatest c from all points of the ramp.
+//! Computes the ramp from rest, or to rest, as a function of the distance s [mm] from rest: constant jerk along the path, w = c
+//! s^(4/3), or, where the path turns back, constant acceleration c/2, w = c s. The length of the ramp follows from the
+//! derivatives and limits at the end of the path, the greatest c from all points of the ramp.
 
 use feedplan_geometry::elementary::Elementary;
 use std::ops::Range;
@@ -8,23 +8,27 @@ use std::ops::Range;
 use crate::path_problem::{Geometry, Limits, PathPoint, SpeedCap};
 use feedplan_planner::problem::lesser;
 
-/// The length of a ramp, as a part of the length on which constant jerk reaches the acceleration or the speed …
+/// The length of a ramp, as a fraction of the length on which constant jerk reaches the limit of acceleration or of speed,
+/// whichever is shorter.
 const RAMP: f64 = 1.0 / 90.0;
-/// … and its range, in parts of the path: the rounding of s would leave no digits on a shorter one.
+/// The least and the greatest length of a ramp, as fractions of the path's length: the rounding of s would spoil a shorter ramp.
 const PARTS: [f64; 2] = [SHORTEST, 1.0 / 400.0];
 pub const SHORTEST: f64 = 1e-11;
-/// Points of a piece under a ramp, equal in time, are halved with this range of depths …
+/// On each piece under a ramp, the range of t (see `LEAST_TIME`) is halved recursively, to depths in this range …
 const DEPTH: Range<u32> = 4..40;
-/// … where ln c changes by more than `CHANGE` between them, and they are further apart than `APART` of their time.
+/// … while the second difference of ln c exceeds `CHANGE` and the points are further apart than the fraction `APART` of t.
 const CHANGE: f64 = 0.05;
 const APART: f64 = 1e-5;
-/// The part of the limit of jerk that a ramp of constant acceleration uses: the rest is for changes of it.
+/// The fraction of the limit of jerk that a ramp of constant acceleration may use: the rest is left for changes of the
+/// acceleration.
 const USED: f64 = 0.75;
-/// The least time for which a point is looked at, in units where the distance from rest is its cube in mm.
+/// The least t at which a point is evaluated. t is the cube root of the distance from rest in mm, proportional to the time at
+/// constant jerk.
 const LEAST_TIME: f64 = 1e-30;
-/// Number of octaves of time in which points begin near rest: the path may turn within any length there.
+/// On the piece that begins at rest, points are laid out separately in each of this many octaves of t: the path may turn within
+/// any length there.
 const OCTAVES: i32 = 12;
-/// Points between the neighbours of the worst point, and rounds of this refinement.
+/// Steps between the two neighbours of the worst point, and rounds of this refinement.
 const SAMPLES: usize = 16;
 const ROUNDS: usize = 4;
 
@@ -42,12 +46,12 @@ impl Ramp {
     /// The power at constant acceleration.
     pub const ACCELERATION: f64 = 1.0;
 
-    /// The slope w' at its end, over w there, in 1/mm.
+    /// The slope w' at the ramp's end, divided by w there, in 1/mm.
     pub fn slope(&self) -> f64 {
         self.power / self.length
     }
 
-    /// Its time, times the speed at its end, in mm.
+    /// The ramp's time multiplied by the speed at its end, in mm.
     pub fn way(&self) -> f64 {
         self.length / (1.0 - 0.5 * self.power)
     }
@@ -55,8 +59,8 @@ impl Ramp {
 
 /// The length of a ramp, in mm, from the derivatives and the speed cap at the end of the path and the path's length.
 ///
-/// It is rounded to a distance that the arc length can express: the slope at the ramp's station is w over the ramp's
-/// length, times its power, which a rounded station would change.
+/// The length is rounded to a distance that the arc length of the ramp's station can express: the slope there is w' = power ·
+/// w/length, so that a rounded station would not fit the slope.
 pub fn length<const M: usize>(limits: &Limits<M>, point: &PathPoint<M>, path: f64) -> f64 {
     let [least, most] = PARTS.map(|part| part * path);
     let along = |limit: &[f64; M]| {
@@ -70,7 +74,7 @@ pub fn length<const M: usize>(limits: &Limits<M>, point: &PathPoint<M>, path: f6
     path - (path - ramp.max(least))
 }
 
-/// The greatest w at the end of a ramp of this length; `end` is 0 at the start of the path and 1 at its end.
+/// The greatest w in mm²/s² that the limits allow at the end of a ramp; `end` is 0 at the start of the path and 1 at its end.
 pub fn greatest<const M: usize>(
     geometry: &impl Geometry<M>,
     limits: &Limits<M>,
@@ -97,7 +101,7 @@ pub fn greatest<const M: usize>(
         if start >= stop {
             continue;
         }
-        // The greatest c at a time t, in units where the distance from rest is t³.
+        // The greatest c at a point with t, the cube root of the distance from rest.
         let at = |t: f64| {
             let t = t.max(LEAST_TIME);
             let x = t * t * t;
@@ -144,7 +148,7 @@ pub fn greatest<const M: usize>(
     c * ramp.power(power) * (1.0 - 1e-9)
 }
 
-/// Appends points (t, greatest c) from the first to the second of a pair.
+/// Appends points (t, greatest c) after a, up to b, by halving the range between them.
 fn halve(at: &impl Fn(f64) -> (f64, f64), [a, b]: [(f64, f64); 2], depth: u32, points: &mut Vec<(f64, f64)>) {
     let middle = at(0.5 * (a.0 + b.0));
     let changes = (middle.1 * middle.1 / (a.1 * b.1)).natural_log().abs() > CHANGE && b.0 - a.0 > APART * b.0;
@@ -189,7 +193,7 @@ mod tests {
         assert!((w / (2.0 * 1000.0 * 0.01) - 1.0).abs() < 1e-8, "{w}");
         // 2 s/v.
         assert_eq!((ramp.way(), ramp.slope()), (0.02, 100.0));
-        // The direction of a circle turns at v a/radius: jerk across the path is 3/2 q'' √w w'.
+        // On a circle there is also jerk across the path: 3/2 q'' √w w' = 3 v a/radius.
         let circle = greatest(&Circle { curvature: 10.0 }, &LIMITS, &[], ramp, 1);
         assert!(circle < w, "{circle} and {w}");
     }

@@ -1,21 +1,21 @@
-//! Limits that differ for positive and negative values, scaled by their mean: one factor scales values of both signs,
-//! so that the scaled value stays smooth where its sign changes.
+//! Limits that differ for positive and negative values, scaled by the mean of both: one scale factor for both signs keeps the
+//! scaled value smooth where its sign changes.
 
 use feedplan_planner::problem::Both;
 
-/// The limits of an axis, scaled by the mean of both.
+/// The two limits of an axis, scaled by their mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sides {
     /// 1/mean of both limits.
     pub per_mean: f64,
-    /// The limits of positive and of negative values over the mean: 1 where both are the same.
+    /// The limits of positive and of negative values, divided by the mean: 1 where both are the same.
     pub most: [f64; 2],
     /// 1/`most`.
     pub per_most: [f64; 2],
 }
 
 impl Sides {
-    /// Those of each axis.
+    /// The scaled limits of each axis.
     pub fn of<const M: usize>(limits: &Both<M>) -> [Self; M] {
         std::array::from_fn(|k| {
             let mean = 0.5 * (limits[0][k] + limits[1][k]);

@@ -1,5 +1,6 @@
-//! A rough estimate of the speed along a path, from the axes' derivatives, their limits and the speed caps: the lower
-//! envelope of r = w^(3/4), at samples dense enough to lay the grid by. r is linear in s under constant jerk from rest.
+//! Estimates the speed along a path roughly, from the axes' derivatives, their limits and the speed caps: the lower envelope of
+//! the variable r = w^(3/4), at samples dense enough to place the stations of the grid. r is linear in s under constant jerk from
+//! rest.
 
 use super::rest_ramp;
 use super::window_end::WindowEnd;
@@ -8,30 +9,31 @@ use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, lesser, Both};
 
-/// Parts of the limits of acceleration and jerk that the caps of r use.
+/// Fractions of the limits of acceleration and jerk that the caps of r use.
 const ACCELERATION: f64 = 0.4;
 const JERK: f64 = 0.25;
-/// K: the greatest slope of r, in √(J/|q'|). Constant jerk J has √4.5 = 2.12; the smoothing of `initial_plan` needs the
-/// rest.
+/// K: the greatest slope of r, in units of √(J/|q'|). Constant jerk J has √4.5 = 2.12; the smoothing of `initial_plan` needs the
+/// difference.
 const SLOPE: f64 = 0.447;
-/// The slope by acceleration, in A r^(−1/3): 1.5 at the limit A, of which the envelope takes 0.6 · 0.79.
+/// The greatest slope by acceleration, in units of A r^(−1/3): it is 1.5 at the limit A, of which the envelope uses 0.6 · 0.79.
 const RISE: f64 = 1.5 * 0.6 * 0.79;
-/// Samples of a piece are halved where ln r of the caps changes by more than this between them …
+/// Intervals between samples of a piece are halved while the second difference of ln r of the caps, or the relative deviation of
+/// `turning` from its linear interpolation, exceeds this …
 const CHANGE: f64 = 0.2;
-/// … with this range of depths.
+/// … to depths in this range.
 const DEPTH: std::ops::Range<u32> = 2..30;
 /// Relative rounding of r.
 pub const ROUNDING: f64 = 1e-9;
-/// Samples are at most this part of r/K apart.
+/// Where the envelope meets the caps, samples are at most this fraction of r/K apart.
 const SPACING: f64 = 0.25;
 
 /// The greatest slope of the envelope: |r'| ≤ min(k, acceleration · r^(−1/3), r/shortest).
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes {
     pub k: f64,
-    /// For rising r and for falling r.
+    /// The factor of r^(−1/3) for rising r and for falling r.
     acceleration: [f64; 2],
-    /// The shortest length over which r may double, in mm: arc lengths along the path have no digits for less.
+    /// The shortest length over which r may double, in mm: arc lengths along the path cannot resolve less.
     shortest: f64,
 }
 
@@ -47,7 +49,7 @@ pub enum Change {
 pub struct EnvelopeSample {
     pub s: f64,
     pub piece: u32,
-    /// The greatest r.
+    /// The greatest r at this point alone.
     pub cap: f64,
     /// 1/length over which the path turns or its curvature changes, in 1/mm.
     pub turning: f64,
@@ -66,10 +68,10 @@ impl<const M: usize> Limits<M> {
         worst
     }
 
-    /// The greatest r at a point, if the slope of r is at most k.
+    /// The greatest r that the limits allow at a point if |dr/ds| is at most k.
     pub(super) fn envelope_cap(&self, point: &PathPoint<M>, k: f64) -> f64 {
         let tiny = f64::MIN_POSITIVE;
-        // The least r^(4/3), r² and r.
+        // The lowest limits found so far for r^(4/3) = w, for r² and for r.
         let (mut speed_sq, mut square, mut cap) =
             (1.0 / self.per_speed_sq(point).max(tiny), f64::INFINITY, f64::INFINITY);
         for axis in 0..M {
@@ -85,7 +87,7 @@ impl<const M: usize> Limits<M> {
 }
 
 impl Slopes {
-    /// From the greatest q' and −q' of each axis and the length of the path in mm.
+    /// The slopes for the greatest q' and −q' of each axis and the length of the path in mm.
     pub fn new<const M: usize>(limits: &Limits<M>, greatest: &Both<M>, path: f64) -> Self {
         let least = |limit: &[f64; M], greatest: &[f64; M]| {
             (0..M).map(|k| limit[k] / greatest[k].max(f64::MIN_POSITIVE)).fold(f64::INFINITY, f64::min)
@@ -102,20 +104,20 @@ impl Slopes {
         }
     }
 
-    /// At least the slope k of every path of the axes that move.
+    /// An upper bound of the slope `k` on every path on which only the axes in `moves` move.
     pub fn steepest<const M: usize>(limits: &Limits<M>, moves: &[bool; M]) -> f64 {
-        // On every path some q' is at least 1/√M.
+        // The tangent has length 1, so that some |q'| is at least 1/√M.
         let most = (0..M).filter(|&k| moves[k]).map(|k| limits.jerk[k]).fold(0.0, f64::max);
         SLOPE * (most * (M as f64).sqrt()).sqrt()
     }
 
-    /// The length over which r doubles at its greatest slope.
+    /// The length in mm over which r doubles at its greatest slope.
     #[inline]
     pub fn length(&self, r: f64) -> f64 {
         (r / self.k).max(self.shortest)
     }
 
-    /// The greatest r at a distance h, starting from r.
+    /// The greatest r at a short distance h in mm from a place with this r: the greatest slope is that of this r all along h.
     #[inline]
     pub fn reach(&self, r: f64, h: f64, change: Change) -> f64 {
         let (k, a) = (self.k, self.acceleration[change as usize]);
@@ -124,12 +126,12 @@ impl Slopes {
         r + h * steepest.min(r / self.shortest)
     }
 
-    /// The distance from one r to a greater one at the greatest slopes.
+    /// The distance in mm over which r can change between the first and the second, greater value, at the greatest slopes.
     pub fn distance(&self, [from, to]: [f64; 2], change: Change) -> f64 {
         self.place(to, change) - self.place(from, change)
     }
 
-    /// The greatest r at any distance h, starting from r.
+    /// The greatest r at any distance h in mm from a place with this r: the greatest slopes are integrated over h.
     pub fn far(&self, r: f64, h: f64, change: Change) -> f64 {
         let (a, turn) = (self.acceleration[change as usize], self.turn(change));
         let place = self.place(r, change) + h;
@@ -145,7 +147,7 @@ impl Slopes {
         (self.acceleration[change as usize] / self.k).powi(3)
     }
 
-    /// The distance of an r from rest at the greatest slopes.
+    /// The distance in mm from rest to this r, at the greatest slopes.
     fn place(&self, r: f64, change: Change) -> f64 {
         let (a, turn) = (self.acceleration[change as usize], self.turn(change));
         if r <= turn {
@@ -155,7 +157,7 @@ impl Slopes {
         }
     }
 
-    /// The time from rest to a speed, or from it to rest if that takes longer.
+    /// The time in s from rest to a speed in mm/s, or from that speed to rest if this takes longer.
     pub fn stop_time(&self, speed: f64) -> f64 {
         let [rise, fall] = self.acceleration;
         let (a, j) = (rise.min(fall) / RISE, (self.k / SLOPE).powi(2));
@@ -166,7 +168,7 @@ impl Slopes {
         }
     }
 
-    /// r at the samples.
+    /// The envelope r at the samples: the caps, lowered to the ends and to the greatest slopes.
     pub fn envelope(&self, samples: &[EnvelopeSample], ends: &[WindowEnd; 2]) -> Vec<f64> {
         let s: Vec<f64> = samples.iter().map(|sample| sample.s).collect();
         let mut r: Vec<f64> = samples.iter().map(|sample| sample.cap).collect();
@@ -175,7 +177,7 @@ impl Slopes {
         r
     }
 
-    /// Lowers r at both ends to the known ends.
+    /// Lowers r at the first and the last station to what the known ends allow.
     pub fn end(&self, r: &mut [f64], ends: &[WindowEnd; 2]) {
         for (kind, station) in ends.iter().zip([0, r.len() - 1]) {
             r[station] = r[station].min(match *kind {
@@ -186,7 +188,7 @@ impl Slopes {
         }
     }
 
-    /// Lowers r at arc lengths s until no slope is too great.
+    /// Lowers r at arc lengths s in mm until no slope is too great.
     pub fn limit(&self, s: &[f64], r: &mut [f64]) {
         // Forward, then backward: no value is greater than what its neighbour can reach.
         for i in 1..s.len() {
@@ -198,7 +200,8 @@ impl Slopes {
     }
 }
 
-/// Samples on the pieces from s = `from` to `to`, and the slopes of their envelope. Fails where no speed is possible.
+/// Samples on the pieces from s = `from` to `to`, and the greatest slopes of their envelope. Fails if no speed above 0 is
+/// possible at a sample.
 pub fn sample_envelope<const M: usize>(
     geometry: &impl Geometry<M>,
     limits: &Limits<M>,
@@ -253,7 +256,7 @@ pub fn sample_envelope<const M: usize>(
             last = there;
         }
     }
-    // A NaN is no speed either. No grid resolves a turn that is shorter than the rounding of s.
+    // A NaN is not a speed either. No grid resolves a turn that is shorter than the rounding of s.
     let is_bad = |sample: &&EnvelopeSample| {
         let (cap, turns) = (sample.cap, sample.turning * slopes.shortest);
         cap.is_nan() || cap <= 0.0 || turns.is_nan() || turns > 1.0
@@ -264,7 +267,7 @@ pub fn sample_envelope<const M: usize>(
     Ok((densify(&samples, slopes, ends, watch), slopes))
 }
 
-/// Adds samples between two samples of a piece by halving.
+/// Appends the samples between two samples of a piece, by halving.
 fn halve(
     sample: &impl Fn(u32, f64) -> EnvelopeSample,
     a: EnvelopeSample,
@@ -286,7 +289,7 @@ fn halve(
     }
 }
 
-/// Adds samples with interpolated caps: dense where the envelope meets the caps, sparser with the distance from there.
+/// Adds samples with interpolated caps: densely where the envelope meets the caps, more sparsely with the distance from there.
 fn densify(
     samples: &[EnvelopeSample],
     slopes: Slopes,

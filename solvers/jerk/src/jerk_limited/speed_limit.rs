@@ -1,4 +1,4 @@
-//! The greatest speed at each collocation point that follows from all limits, in a few passes along a window.
+//! Computes upper bounds of the speed at each collocation point that follow from all limits, in a few passes along a window.
 //!
 //! With w = v², the unit vector q' along the path, and q'' = κ N at right angles to it:
 //!
@@ -9,19 +9,19 @@
 //! The first two bound the change of w and of κ w^(3/2) from point to point. By the last one v³ plus twice the integral
 //! of 3 J is convex: it lies below the lower convex hull of its bounds. Each bound makes the others closer.
 //!
-//! The relaxation (`relaxed`) lets jerk exceed its limit where that costs time. It is closer with these speeds.
+//! The relaxation (`relaxed`) lets jerk exceed its limit at a cost of time. With these speeds its bound is closer.
 
 use super::constraints::Constraints;
 use super::hermite::COUNT;
 use crate::path_problem::MOST_AXES;
 
-/// Rounds of all passes.
+/// Number of rounds of all passes.
 const ROUNDS: usize = 4;
 /// Relative rounding of the sums along a window.
 const ROUNDING: f64 = 1e-12;
-/// κ w^(3/2) is lowered to less than this part of itself, or not at all: cube roots take long.
+/// κ w^(3/2) is lowered only if the new bound is below this fraction of the old one: cube roots take long.
 const CLOSE: f64 = 1.0 - 1e-6;
-/// q'' jumps where it changes by more than this part of itself at a station; κ w^(3/2) jumps there as well.
+/// q'' jumps where it changes by more than this fraction at a station; κ w^(3/2) jumps there as well.
 const JUMP: f64 = 1e-6;
 
 struct Point<const N: usize> {
@@ -30,7 +30,7 @@ struct Point<const N: usize> {
     square: [[f64; N]; 2],
     normal: [f64; N],
     bend: f64,
-    /// Bounds of w, of v³, and of v³ plus the integral.
+    /// Upper bounds of w, of v³, and of v³ plus the integral.
     w: f64,
     cube: f64,
     convex: f64,
@@ -39,16 +39,16 @@ struct Point<const N: usize> {
     integral: f64,
 }
 
-/// The way from a point to the next.
+/// The limits on the changes from a point to the next.
 struct Step<const N: usize> {
-    /// The greatest changes of q_k'² w forward and backward.
+    /// The greatest changes of q_k'² w, forward and backward.
     energy: [[f64; N]; 2],
     /// The greatest change of κ w^(3/2), and the least κ.
     bending: f64,
     straight: f64,
 }
 
-/// Lowers the speed caps of a window.
+/// Lowers w_max at the collocation points of a window.
 pub fn lower(rows: &mut Constraints) {
     match rows.axes() {
         0..=2 => lower_by::<2>(rows),
@@ -60,7 +60,7 @@ pub fn lower(rows: &mut Constraints) {
     }
 }
 
-/// With numbers for N axes, 0 beyond the last one.
+/// `lower` with arrays for N axes; values beyond the last axis are 0.
 fn lower_by<const N: usize>(rows: &mut Constraints) {
     let (mut points, steps) = points::<N>(rows);
     for _ in 0..ROUNDS {
@@ -85,7 +85,8 @@ impl<const N: usize> Point<N> {
         self.normal[k] * self.bend
     }
 
-    /// Lowers w to what can be reached from another point. An axis that does not move sets no limit: w.min(NaN) = w.
+    /// Lowers w to what can be reached from the neighbouring point `from`. An axis that does not move sets no limit: w.min(NaN) =
+    /// w.
     fn lower(&mut self, from: &Self, energy: &[f64; N], step: &Step<N>) {
         let mut w = self.w;
         if self.s == from.s {
@@ -105,7 +106,7 @@ impl<const N: usize> Point<N> {
         }
     }
 
-    /// Lowers v³.
+    /// Lowers the bound of v³ to `cube`, and that of w accordingly.
     fn lower_to(&mut self, cube: f64) {
         (self.w, self.cube) = (cube.cbrt().powi(2), cube);
     }
@@ -162,7 +163,7 @@ fn step<const N: usize>(
 ) -> Step<N> {
     let energy = [false, true].map(|back| {
         std::array::from_fn(|k| {
-            // Acceleration against the axis is negative; on the way back the signs change.
+            // An acceleration against the axis is negative; on the way backward the signs change.
             let against = last.first[k] + next.first[k] < 0.0;
             2.0 * h * mean[k] * most(k, against != back)
         })
@@ -174,7 +175,8 @@ fn step<const N: usize>(
         let bending = if jumps { f64::INFINITY } else { 0.0 };
         return Step { energy, bending, straight: f64::INFINITY };
     }
-    // On an arc of N between the points, Σ |N_k| J_k exceeds both ends by 1/cos of half its angle at most.
+    // On an arc of N between the points, Σ |N_k| J_k exceeds the greater of its values at the ends by at most the factor 1/cos of
+    // half the arc's angle.
     let turn = length(&difference(&last.normal, &next.normal));
     let steep = along(&last.normal).max(along(&next.normal)) * (1.0 + turn * turn / 6.0);
     // The least |q''| where q'' changes evenly.
@@ -184,16 +186,17 @@ fn step<const N: usize>(
     Step { energy, bending: h * if turn < 1.0 { steep.min(all) } else { all }, straight }
 }
 
-/// The greatest mean of |q_k'| between two points, h apart: by the trapezoidal rule on an arc, or by the cubic with the same q''
-/// at both points.
+/// An upper bound of the mean of |q_k'| between two points, h mm apart: by the trapezoidal rule on an arc, or by the cubic with
+/// the same q'' at both points.
 fn mean_direction<const N: usize>(last: &Point<N>, next: &Point<N>, h: f64) -> [f64; N] {
-    // The mean of a component on an arc of the angle 2 φ exceeds that of its ends by tan φ/φ; this is more for chords up to 1.
+    // On an arc of the angle 2 φ the mean of a component exceeds the mean of its ends by at most the factor tan φ/φ; 1 + chord²/8
+    // is greater than that for chords up to 1.
     let chord = length(&difference(&last.first, &next.first));
     let arc = 1.0 + chord * chord / 8.0;
     std::array::from_fn(|k| {
         let (a, b) = (last.first[k], next.first[k]);
         let ends = 0.5 * (a.abs() + b.abs());
-        // |q_k'| is convex where it becomes 0.
+        // Where q_k' changes its sign, |q_k'| is convex and has no bulge.
         let bulge = if a * b > 0.0 { (last.second(k) - next.second(k)) * a.signum() * h / 12.0 } else { 0.0 };
         (arc * ends).max(ends + bulge)
     })
@@ -217,7 +220,7 @@ fn convex<const N: usize>(points: &mut [Point<N>]) {
         let [(s, convex), (end, last)] = [pair[0], pair[1]].map(|n| (points[n].s, points[n].convex));
         for point in &mut points[pair[0] + 1..pair[1]] {
             let most = convex + (last - convex) * (point.s - s) / (end - s);
-            // Where rounding takes the digits of a low speed, it stays as it is.
+            // Where the difference is only rounding of the sums, the bound of a low speed stays as it is.
             if most < (1.0 - ROUNDING) * point.convex {
                 point.lower_to((most - point.integral).max(0.0));
             }
@@ -238,7 +241,7 @@ mod tests {
     use super::*;
     use crate::path_problem::{Geometry, Limits, PathPoint};
 
-    /// A plane curve with the curvature c s, seen from the middle of its length.
+    /// A plane curve with the curvature c s, where s is the arc length from the middle of the curve.
     struct Clothoid(f64);
 
     impl Geometry<2> for Clothoid {
@@ -259,7 +262,7 @@ mod tests {
         }
     }
 
-    /// 1/w on 40 intervals of 2 mm, lowered; `cap` in mm/s at the stations.
+    /// The lowered w_max at the starts of 40 intervals on 2 mm; `cap` is the speed cap in mm/s at a station.
     fn lowered(c: f64, acceleration: f64, cap: impl Fn(usize) -> f64) -> Vec<f64> {
         let limits =
             Limits { velocity: [[1e3; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };

@@ -1,11 +1,11 @@
-//! The accelerations with which lines turn back, at rest for no time: the greatest that all lines of a chain can be
-//! crossed with.
+//! Computes the accelerations with which the lines of a chain turn back, at rest only for an instant: the greatest with which all
+//! lines can be crossed.
 //!
-//! A line is crossed the quicker the more it speeds up at its start and slows down at its end: at every place it is as
-//! fast as with less, or faster. But from the acceleration a it must get to 0, and this takes a length of its own. So
-//! the acceleration at one end of a line is at most a number that rises with the acceleration at the other. The
-//! greatest accelerations within all these bounds exist, and each line takes its least time with them. They come from
-//! the greatest accelerations of the axes by lowering both ends of each line that is too short, until none is.
+//! The greater the acceleration at the start of a line and the deceleration at its end, the less time the line takes: it is
+//! nowhere slower than with lesser ones. But the acceleration must change from its value at an end to 0, and this takes some
+//! length. The acceleration at one end of a line is therefore at most a number that rises with the acceleration at the other end.
+//! There are greatest accelerations within all these bounds, and each line takes its least time with them. They are found from
+//! the greatest accelerations of the axes by lowering both ends of each line that is too short, until no line is too short.
 
 use feedplan_geometry::bisection::boundary;
 
@@ -19,7 +19,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Its ends with these accelerations, in mm/s².
+    /// The ends of the line with these accelerations, in mm/s².
     pub fn ends(&self, accelerations: [f64; 2]) -> [SegmentEnd; 2] {
         [0, 1].map(|end| SegmentEnd { speed: self.speeds[end], acceleration: accelerations[end] })
     }
@@ -28,14 +28,15 @@ impl Line {
         self.segment.can_cross(self.ends(accelerations))
     }
 
-    /// The accelerations, at most these, of which the greater one is as great as can be.
+    /// Both accelerations, lowered to at most the greatest common value with which the line can be crossed.
     fn lowered(&self, [from, to]: [f64; 2]) -> [f64; 2] {
         let at_most = |most: f64| [from.min(most), to.min(most)];
         let [most, _] = boundary(0.0, from.max(to), |most| self.can_cross(at_most(most)));
         at_most(most)
     }
 
-    /// The greatest acceleration, at most this, at an end, whatever that at the other end.
+    /// The greatest acceleration up to `most` at one end with which the line can be crossed, whatever the acceleration at the
+    /// other end.
     pub fn alone(&self, end: usize, most: f64) -> f64 {
         let mut accelerations = [0.0; 2];
         accelerations[end] = most;
@@ -47,8 +48,7 @@ impl Line {
     }
 }
 
-/// Lowers the accelerations between subruns in mm/s², with those at both ends of the chain, until each line can be
-/// crossed.
+/// Lowers the accelerations in mm/s² at the turns between subruns and at both ends of the chain, until each line can be crossed.
 pub fn lower(lines: &[Option<Line>], accelerations: &mut [f64]) {
     let mut settled = false;
     while !settled {
@@ -102,8 +102,9 @@ mod tests {
         let lines = [line(100.0, 250.0); 3];
         lower(&lines, &mut a);
         assert_eq!(a, [0.0, 3000.0, 3000.0, 0.0]);
-        // At 3000 mm/s² to where the speed is 36 ms · 3000/2 below 250 mm/s …: without acceleration at its ends a rise
-        // takes V/A + A/J and goes half of V that long; what is cut off took A/J and went −A³/(3 J²).
+        // A rise that begins with the acceleration A is one that begins at the speed −A²/(2 J) without acceleration, with its
+        // first part cut off, which takes A/J and has the length −A³/(3 J²). The rise takes V/A + A/(2 J) and has the length V/2
+        // (V/A + A/J) − A³/(24 J²).
         let (v, a, j) = (250.0, 3000.0, 5e4);
         let rise = v / a + 0.5 * a / j;
         let way = 0.5 * v * (v / a + a / j) - (a * a / j) * (a / j) / 24.0;

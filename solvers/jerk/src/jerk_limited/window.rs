@@ -12,29 +12,30 @@ use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use crate::path_problem::Limits;
 
-/// Greatest use of a limit that counts as kept: rounding, and the error of peaks between samples.
+/// A limit counts as kept up to this use: it allows for rounding and for the error of the peaks estimated between samples.
 pub const HELD: f64 = 1.0 + 2e-7;
-/// Limits are tightened by the excess plus a margin: this part of the excess, and at least this part of the limit.
+/// Limits are tightened by the excess plus a margin: this fraction of the excess, and at least this fraction of the limit.
 /// Greater margins would make kinks beside intervals that are not tightened.
 const MARGIN: [f64; 2] = [0.1, 1e-6];
-/// The margin of an interval grows by this factor each time, as a peak may follow slowly.
+/// The margin of an interval grows by this factor each time it is tightened again, because a peak may react slowly.
 const RISE: f64 = 4.0;
-/// Rounds of tightening.
+/// Greatest number of rounds of solving and tightening.
 const ROUNDS: usize = 10;
-/// Iterations start from this multiple of the first plan, which may be on a limit.
+/// The iterations start from this multiple of the first plan's w, because the first plan may be on a limit.
 const INSIDE: f64 = 0.8;
-/// Parts of the way back to the first plan that are tried in order to be inside tightened limits …
+/// Fractions of the way from the last plan back to the first plan or to standstill. The least one that leads inside the tightened
+/// limits, and all greater ones, give starts.
 const BACK: [f64; 13] = [3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
-/// … and the factor by which the start is farther back, so that it is not on a limit.
+/// A start is farther back by this factor, so that it is not on a limit.
 const FURTHER: f64 = 1.5;
-/// The first barrier there, as a part of the way back.
+/// The first barrier of such a start, as a multiple of its fraction of the way back.
 const BARRIER: f64 = 0.1;
-/// Parts of the way from a rough plan to the first plan that are tried, and the first barrier there.
+/// Fractions of the way from a rough plan to the first plan that are tried as starts, and the first barrier there.
 const NEAR: [f64; 3] = [0.05, 0.15, 0.4];
 const NEAR_BARRIER: f64 = 0.1;
-/// Parts of the way back to the former plan that are tried where the new plan breaks a limit.
+/// Fractions of the way from a new plan that breaks a limit back to the first plan or to standstill, tried in this order.
 const RETREATS: [f64; 11] = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.15, 0.4, 0.7, 0.9];
-/// A retreat that costs at most this multiple of the tolerance is as good as the plan.
+/// A retreat counts as converged if it costs at most this multiple of the tolerance, as a fraction of the time.
 const CHEAP: f64 = 10.0;
 
 /// The constraints on a range of intervals, and the check between their collocation points.
@@ -48,18 +49,19 @@ pub struct Window {
 pub struct WindowReport {
     /// Whether the optimum was reached, to the tolerance.
     pub converged: bool,
-    /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.
+    /// Estimate of the time above the least time on the grid, in s, from the complementarity gap.
     pub excess: f64,
     pub iterations: usize,
 }
 
 impl Window {
-    /// Without intervals.
+    /// A window without intervals, for these limits of the axes.
     pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
         Self { rows: Constraints::new(limits), check: IntersampleCheck::new(limits) }
     }
 
-    /// Improves the valid plan x in place, from a rough plan if one is known. The limits at given ends have been dropped.
+    /// Improves the valid plan x in place, with starts near the rough plan if there is one. The caller has dropped the limits at
+    /// given ends.
     pub fn improve(
         &mut self,
         ends: [WindowEnd; 2],
@@ -103,7 +105,7 @@ impl Window {
                 verdict.converged = !stopped;
                 break;
             }
-            // A fallback: as far towards this plan as the limits allow.
+            // A fallback: the spline between the first plan x and this plan that is nearest to this plan and keeps the limits.
             if let Some((z, time)) = self.retreat(&ends, x, &y) {
                 if time < best {
                     best = time;
@@ -121,8 +123,8 @@ impl Window {
         verdict
     }
 
-    /// The optimum at the collocation points, roughly, from a valid plan; None where it is not found. The acceleration has rows
-    /// only if it comes near to its limits without.
+    /// A rough optimum under the limits at the collocation points, from the valid plan x; None if it is not found. The
+    /// acceleration gets rows only if the plan without these rows comes near to a limit of acceleration.
     pub fn rough(
         &mut self,
         ends: [WindowEnd; 2],
@@ -150,7 +152,8 @@ impl Window {
         }
     }
 
-    /// Solves from the first start that leads to a plan; `spent` counts the iterations of all.
+    /// Solves from each start in turn until one leads to a plan, and returns that plan. Adds the iterations of all starts to
+    /// `spent`.
     fn attempt(
         &self,
         ends: [WindowEnd; 2],
@@ -169,8 +172,8 @@ impl Window {
         None
     }
 
-    /// Starts inside the tightened limits, on the ways back from the last plan y, the nearest to y first; the last of all is the
-    /// start of the first round, far from y.
+    /// Starts inside the tightened limits, between the last plan y and the targets of `ways_back`, the nearest to y first. The
+    /// last one is the start of the first round, far from y.
     fn starts<'e>(
         &self,
         ends: &[WindowEnd; 2],
@@ -193,7 +196,8 @@ impl Window {
         starts
     }
 
-    /// The spline nearest to y on a way back that holds all limits, and its time in s.
+    /// The spline nearest to y, among the `RETREATS` from y, that keeps all limits, and its time in s. None if there is none or
+    /// if y misses a given end.
     fn retreat(&self, ends: &[WindowEnd; 2], x: &[f64], y: &[f64]) -> Option<(Vec<f64>, f64)> {
         if !ends.iter().zip([0, x.len() - 2]).all(|(kind, at)| kind.is_met(x[at], x[at + 1])) {
             return None;
@@ -205,13 +209,13 @@ impl Window {
         Some((z, time))
     }
 
-    /// Whether x uses no limit of the machine by more than `most`.
+    /// Whether the use of each machine limit by x, also between the collocation points, is at most `most`.
     pub fn holds(&self, x: &[f64], most: f64) -> bool {
         self.check.utilisation(&self.rows, x).as_flattened().iter().all(|&used| used <= most)
     }
 
-    /// Tightens the limits of intervals that exceed them between the collocation points, and counts how often; false if one
-    /// does.
+    /// Tightens the limits on each interval where their use (`all`) exceeds them, and counts in `times` how often. Returns
+    /// whether no interval exceeds them.
     fn tighten(&mut self, all: &[[f64; 3]], times: &mut [i32]) -> bool {
         let mut holds = true;
         for (n, (times, used)) in times.iter_mut().zip(all).enumerate() {
@@ -234,7 +238,7 @@ impl Window {
     }
 }
 
-/// Time on the ramps at ends at rest, in s.
+/// The time on the ramps of ends at rest, in s.
 pub fn ramps(ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
     let time = |end: usize, w: f64| match ends[end] {
         WindowEnd::Rest { ramp, .. } => ramp.way() / w.sqrt(),
@@ -243,15 +247,15 @@ pub fn ramps(ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
     time(0, x[0]) + time(1, x[x.len() - 2])
 }
 
-/// Targets of the ways back from a plan: the first plan x, and standstill where both ends rest. On the way to x the
-/// jerk may rise, as it is a product of two numbers that both change; on the way to standstill every use falls.
+/// The splines towards which a plan is moved back: the first plan x, and standstill (w = 0) if both ends rest. On the way to x
+/// the jerk may rise, because it is a product of two factors that both change; on the way to standstill every use falls.
 fn ways_back(ends: &[WindowEnd; 2], x: Vec<f64>) -> Vec<Vec<f64>> {
     let rests = ends.iter().all(|kind| matches!(kind, WindowEnd::Rest { .. }));
     let standstill = rests.then(|| vec![0.0; x.len()]);
     std::iter::once(x).chain(standstill).collect()
 }
 
-/// A plan strictly within all limits, from one that keeps them.
+/// A plan strictly inside all limits, from a plan that keeps them.
 fn inside(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| INSIDE * x).collect()
 }
@@ -264,8 +268,8 @@ mod tests {
     use crate::path_problem::{self, End, Problem};
     use feedplan_geometry::watch::Watch;
 
-    /// The time of a winding path in s, within this acceleration in mm/s², and whether the acceleration has rows at the end;
-    /// by a rough plan that says what it finds, or this.
+    /// Plans a winding path with this acceleration limit in mm/s². Returns its time in s, and whether the acceleration has rows
+    /// at the end. `says` replaces the `accelerates` of the rough plan.
     fn planned(acceleration: f64, says: Option<bool>) -> (f64, bool) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };

@@ -5,7 +5,7 @@ use super::rest_ramp::Ramp;
 /// The known values at an end of a window.
 #[derive(Clone, Copy, Debug)]
 pub enum WindowEnd {
-    /// The path begins or ends at rest, with a ramp, and w at most `greatest` at its end.
+    /// The path begins or ends at rest with a ramp; w at the end of the ramp is at most `greatest`.
     Rest { ramp: Ramp, greatest: f64 },
     /// w and w' are given.
     Fixed { w: f64, slope: f64 },
@@ -14,7 +14,7 @@ pub enum WindowEnd {
 }
 
 impl WindowEnd {
-    /// The ramp at this end.
+    /// The ramp at this end; of length 0 if the path is not at rest there.
     pub fn ramp(&self) -> Ramp {
         match *self {
             Self::Rest { ramp, .. } => ramp,

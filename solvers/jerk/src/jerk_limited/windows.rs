@@ -1,12 +1,12 @@
 //! Paths of any length: overlapping windows, solved in parallel and joined to one plan.
 //!
-//! The ends of a window are states of the first plan inside all limits; ends on another window's optimum would lie on
-//! its limits and leave almost no interior to start from. The effect of an end decays with the travel time from
-//! it: two windows agree to 1e-8 within two or three stop times inside their overlap, and are blended there. Where no
-//! blend keeps the limits, both windows are solved as one. Only a few windows at a time are in memory.
+//! At its ends a window has states (w, w') of the first plan, which is inside all limits; states of another window's optimum
+//! would lie on its limits and leave almost no interior to start from. The effect of an end decays with the travel time from it:
+//! two windows agree to 1e-8 within two or three stop times inside their overlap, and are blended there. If no blend keeps the
+//! limits, both windows are solved as one. Only a few windows at a time are in memory.
 //!
-//! All windows are planned twice: roughly on a coarse grid, which shows where the grid needs short intervals, and on that
-//! grid.
+//! All windows are planned twice: roughly on a coarse grid, which shows where the grid needs short intervals, and then on the
+//! grid with these short intervals.
 
 use std::mem::take;
 use std::ops::Range;
@@ -31,24 +31,26 @@ use super::working_space::InteriorPoint;
 use crate::path_problem::{Effort, Fault, Geometry, Limits, Problem};
 use feedplan_geometry::watch::Watch;
 
-/// Windows reach this many stop times and intervals beyond their cuts: the time of the first plan on the way there (the optimum
-/// takes a third of it or more) over the time to stop from the greatest speed that the envelope allows on that way.
+/// A window reaches this many stop times and intervals beyond its cuts. The number of stop times is the travel time of the first
+/// plan beyond the cut (the optimum takes a third of it or more), divided by the time to stop from the greatest speed that the
+/// envelope allows there.
 const REACH: (f64, usize) = (11.0, 80);
-/// They end where the first plan uses its limits least, of this many stations from there on: beside an end on a limit
-/// there is almost no interior.
+/// Of this many stations from there outwards, a window ends at the one where the first plan uses its limits least: beside an end
+/// on a limit there is almost no interior.
 const EASE: usize = 20;
-/// Least travel time from cut to cut, in the same stop times.
+/// Least travel time from cut to cut, in stop times.
 const LONG: f64 = 36.0;
-/// No part of an interval is shorter than this part of the path: arc lengths have no digits for less.
+/// Least length of the parts into which an interval is split, as a fraction of the path's length: rounding of the arc lengths
+/// spoils shorter ones.
 const SHORTEST: f64 = rest_ramp::SHORTEST / 16.0;
-/// The share of the rough plans in the work.
+/// The fraction of the progress that the rough plans take.
 const ROUGH: f64 = 0.3;
-/// Windows that are solved before their plans are joined, for each thread.
+/// Windows per thread that are solved before their plans are joined.
 const BATCH: usize = 8;
-/// Windows are blended over that part of their overlap where they agree best and the blend keeps the limits, of this many
-/// parts, else of fewer.
+/// An overlap is divided into this many parts. Two windows are blended over the part where they agree best among those whose
+/// blend keeps the limits; if there is none, the next number of parts is tried.
 const BLENDS: [usize; 4] = [8, 4, 2, 1];
-/// Greatest use of a limit by a blend: a little more than that of a window.
+/// Greatest use of a limit by a blend: a little more than that allowed to a window.
 const BLENDED: f64 = 1.0 + 5e-7;
 
 /// The plan of least time.
@@ -61,20 +63,20 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
 /// A path planned roughly, on a coarse grid.
 pub struct Rough {
     start: Start,
-    /// Empty where no first plan was found.
+    /// Empty if no first plan was found.
     sections: Vec<Section>,
     pub losses: Losses,
 }
 
 impl Rough {
-    /// For the plan of a problem with this effort.
+    /// Plans a problem roughly; `effort` is the effort of the final plan.
     pub fn new<G: Geometry<M>, const M: usize>(
         problem: &Problem<G, M>,
         effort: &Effort,
     ) -> Result<Self, Fault> {
         let coarse = Effort {
             resolution: effort.resolution / f64::from(COARSE),
-            // A window has more intervals on the grid that follows.
+            // A window has more intervals on the final grid.
             window: effort.window / 2,
             watch: effort.watch.part(ROUGH),
             ..*effort
@@ -92,12 +94,12 @@ impl Rough {
         !self.sections.is_empty()
     }
 
-    /// The price of an interval on this path alone, in s.
+    /// The price of an interval in s (see `refinement`) if this path is planned alone.
     pub fn price(&self) -> f64 {
         refinement::price(std::iter::once(&self.losses))
     }
 
-    /// The plan of least time on a grid for a price of an interval, in s.
+    /// The plan of least time on the grid that results from this price of an interval, in s.
     pub fn plan<G: Geometry<M>, const M: usize>(
         self,
         problem: &Problem<G, M>,
@@ -120,7 +122,7 @@ impl Rough {
         run.plan(&sections)
     }
 
-    /// In how many parts each interval of the coarse grid is to be split.
+    /// The number of parts into which each interval of the coarse grid is to be split.
     fn parts(&self, price: f64, effort: &Effort) -> Vec<u32> {
         let stations = &self.start.grid.stations;
         let mut parts = self.losses.parts(price);
@@ -138,16 +140,16 @@ impl Rough {
     }
 }
 
-/// Some neighbouring intervals that are solved as one window.
+/// A range of intervals that are solved as one window.
 struct Section {
-    /// With the overlaps.
+    /// All intervals, including the overlaps with other sections.
     range: Range<usize>,
     core: Range<usize>,
     rough: Option<RoughPlan>,
 }
 
 impl Section {
-    /// Without a core.
+    /// A section with an empty core, for which no lower bound is computed.
     fn alone(range: Range<usize>) -> Self {
         Self { core: range.start..range.start, range, rough: None }
     }
@@ -172,7 +174,7 @@ impl Counts {
 /// Working space for one window.
 struct Space {
     window: Window,
-    /// Its limits as they are, for the lower bound.
+    /// The window's limits before any tightening, for the lower bound.
     loose: Constraints,
     exact: InteriorPoint<Exact>,
     relaxed: InteriorPoint<Relaxed>,
@@ -193,11 +195,12 @@ struct Run<'a, G, const M: usize> {
     prepared: &'a Prepared<'a, G, M>,
     effort: &'a Effort<'a>,
     stations: &'a [f64],
-    /// Working spaces of windows that are done: the system takes long to give some MB.
+    /// Working spaces that no thread uses at present, kept because the allocation of some MB takes long.
     idle: Mutex<Vec<Space>>,
 }
 
-/// Some intervals: the time of the first plan in s, and the greatest speed that the envelope allows in mm/s.
+/// The travel over a range of intervals: its time in s by the first plan, and the greatest speed in mm/s that the envelope
+/// allows.
 #[derive(Default)]
 struct Drive {
     time: f64,
@@ -209,7 +212,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         Self { prepared, effort, stations: &prepared.grid.stations, idle: Mutex::default() }
     }
 
-    /// The plan of all sections.
+    /// Solves all sections and joins them to one plan.
     fn plan(&self, sections: &[Section]) -> Result<Plan, Fault> {
         let mut x = self.prepared.x.clone();
         let mut parts = vec![];
@@ -242,7 +245,8 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
                 match joined {
                     Some(loss) => counts.excess += loss,
                     None => {
-                        // The window starts again from the first plan, where the last one ends.
+                        // The window is solved again from the station where the last one ends: there both have the state of the
+                        // first plan.
                         let rest = Section::alone(before.end..range.end);
                         let (y, verdict, _) = self.solve(&rest);
                         counts.add(&verdict, rest.range.len());
@@ -272,7 +276,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         })
     }
 
-    /// Adds rough plans where they are found.
+    /// Computes the rough plan of each section; it stays None if none is found or the time is over.
     fn roughly(&self, sections: &mut [Section], resolution: f64) {
         let watch = self.watch(sections);
         let effort = interior_point::Effort { tolerance: refinement::tolerance(resolution), ..self.solver() };
@@ -291,7 +295,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         });
     }
 
-    /// The losses by the rough plans; 0 where there are none.
+    /// The losses of all intervals, moved out of the rough plans; 0 in sections without a rough plan.
     fn losses(&self, sections: &mut [Section], resolution: f64) -> Losses {
         let (mut each, mut time) = (vec![0.0; self.stations.len() - 1], 0.0);
         for Section { range, core, rough } in sections {
@@ -305,7 +309,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         Losses { each, unit: time / (resolution * resolution) }
     }
 
-    /// Takes sections of a coarse grid whose intervals were split into these numbers of parts.
+    /// Converts sections of the coarse grid to the fine grid, where coarse interval n was split into `parts[n]` parts.
     fn refine(&self, sections: &mut [Section], parts: &[u32]) {
         let mut starts = vec![0];
         starts.extend(parts.iter().scan(0, |end, &parts| {
@@ -323,12 +327,12 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         }
     }
 
-    /// Sections that are solved before their plans are joined.
+    /// The number of sections that are solved before their plans are joined.
     fn batch(&self) -> usize {
         BATCH * rayon::current_num_threads()
     }
 
-    /// Counts intervals of sections, overlaps included.
+    /// The progress of solving all sections, counted in intervals, overlaps included.
     fn watch(&self, sections: &[Section]) -> Watch<'_> {
         let intervals = sections.iter().map(|section| section.range.len()).sum();
         self.effort.watch.part(1.0 - PREPARING).each(intervals)
@@ -339,14 +343,14 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         self.stations[n + 1] - self.stations[n]
     }
 
-    /// The path in sections, without rough plans.
+    /// Divides the path into sections, without rough plans.
     fn sections(&self) -> Vec<Section> {
         let cuts = self.cuts();
         let section = |(range, core): (_, &[usize])| Section { range, core: core[0]..core[1], rough: None };
         self.windows(&cuts).into_iter().zip(cuts.windows(2)).map(section).collect()
     }
 
-    /// The windows, each with its overlaps.
+    /// The ranges of the windows between these cuts, including their overlaps.
     fn windows(&self, cuts: &[usize]) -> Vec<Range<usize>> {
         let reach = |from: usize, to: usize| {
             let step = |n: usize| if to > from { n + 1 } else { n - 1 };
@@ -395,14 +399,14 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         cuts
     }
 
-    /// The drive that goes on over interval n.
+    /// The travel `drive`, extended by interval n.
     fn onward(&self, drive: &Drive, n: usize) -> Drive {
         let x = &self.prepared.x;
         let time = drive.time + duration(x, n, self.length(n));
         Drive { time, speed: drive.speed.max(self.prepared.speeds[n]) }
     }
 
-    /// The time of a drive in stop times.
+    /// The time of a travel, in stop times.
     fn stops(&self, drive: &Drive) -> f64 {
         drive.time / self.prepared.slopes.stop_time(drive.speed)
     }
@@ -428,12 +432,12 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         }
     }
 
-    /// Whether the window of these intervals ends where the path does.
+    /// Whether the start and the end of a window are those of the path.
     fn at_ends(&self, range: &Range<usize>) -> [bool; 2] {
         [range.start == 0, range.end + 1 == self.stations.len()]
     }
 
-    /// The ends of a window: states of x, and those of the path where it ends there.
+    /// The ends of a window: the ends of the path (`of_path`) where the window ends with the path, else the states of x.
     fn ends(&self, range: &Range<usize>, of_path: [WindowEnd; 2], x: &[f64]) -> [WindowEnd; 2] {
         let at_ends = self.at_ends(range);
         [0, 1].map(|end| {
@@ -446,7 +450,8 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         })
     }
 
-    /// Solves a window between states of the first plan; with the lower bound of its core.
+    /// Solves a window between states of the first plan. Returns its plan, the report, and the lower bound of its core, if one is
+    /// wanted.
     fn solve(&self, section: &Section) -> (Vec<f64>, WindowReport, Option<Part>) {
         self.in_space(|space| self.solve_in(space, section))
     }
@@ -466,7 +471,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         }
         window.rows.drop_at_ends(&ends);
         let verdict = window.improve(ends, &mut y, rough.as_ref(), &effort, exact);
-        // The multipliers are those of the same rows.
+        // The lower bound starts from the multipliers of the plan, so it needs the same rows.
         loose.accelerates = window.rows.accelerates;
         let part = (proves && !self.effort.expired()).then(|| {
             let planned =
@@ -477,8 +482,9 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         (y, verdict, part)
     }
 
-    /// Continues x, planned up to the station `reached`, by the plan y from the station `start` on. Returns by how many
-    /// seconds the overlap takes longer than with the quicker of both at each interval; None if no blend keeps the limits.
+    /// Continues x, planned up to the station `reached`, by the plan y from the station `start` on. Returns the time in s by
+    /// which the overlap takes longer than the sum of the lesser times of both plans on each interval; None if no blend keeps the
+    /// limits.
     fn join(&self, x: &mut [f64], reached: usize, start: usize, y: &[f64]) -> Option<f64> {
         let step = |n: usize| self.length(n);
         let least: f64 =
@@ -490,10 +496,11 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         Some(time - least)
     }
 
-    /// The spline that leads from x to y, and its stations; empty where both are the same.
+    /// A spline that leads from x to y within their overlap, and its stations; empty if y can follow x directly, without a blend.
+    /// None if no blend keeps the limits.
     fn blend(&self, x: &[f64], reached: usize, start: usize, y: &[f64]) -> Option<(Range<usize>, Vec<f64>)> {
         let y_from = |station: usize| &y[2 * (station - start)..];
-        // Where one plan was not improved, it is still the first plan, in which the other one ends.
+        // A plan that was not improved is still the first plan, and the other plan has the state of the first plan at its end.
         let same = |&station: &usize| x[2 * station..2 * station + 2] == y_from(station)[..2];
         if let Some(station) = [start, reached].into_iter().find(|station| start == reached || same(station))
         {
@@ -501,7 +508,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         }
         let apart = |n: usize| (y_from(n)[0] / x[2 * n] - 1.0).abs();
         BLENDS.into_iter().filter(|&parts| reached - start >= parts).find_map(|parts| {
-            // Each part overlaps the next by half.
+            // The candidates are these parts and those half-way between two of them.
             let size = (reached - start) / parts;
             let worst = |from: usize| (from..=from + size).map(apart).fold(0.0, f64::max);
             let starts = (0..2 * parts - 1).map(|i| start + i * size / 2);
@@ -511,7 +518,8 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
         })
     }
 
-    /// The spline that leads from x to y between two stations; None if it does not keep the limits. y begins at the first one.
+    /// The spline that leads from x to y between two stations; None if it does not keep the limits. y begins at the first of
+    /// them.
     fn blend_on(&self, stations: Range<usize>, x: &[f64], y: &[f64]) -> Option<(Range<usize>, Vec<f64>)> {
         let s = |station: usize| self.stations[station] - self.stations[stations.start];
         let length = s(stations.end);

@@ -17,16 +17,16 @@ use super::window_end::WindowEnd;
 /// Slacks and multipliers, by the rows of each block (`RowLayout`).
 #[derive(Default)]
 pub struct State {
-    /// Slacks from `attempt` to `assemble`; after that 1/slack.
+    /// Slacks after `attempt`; 1/slack after `assemble`.
     pub slack: Vec<Lanes>,
     pub dual: Vec<Lanes>,
-    /// −ds dλ of the predictor, limited in size; after the corrector dλ.
+    /// −ds dλ of the predictor, limited in size; dλ after the corrector.
     pub step: Vec<Lanes>,
 }
 
 /// Working space, reused from window to window.
 pub struct InteriorPoint<X> {
-    /// What instructions the processor has.
+    /// The SIMD instruction set of the processor.
     pub(super) level: Level,
     pub(super) model: X,
     pub(super) band: Band,
@@ -36,14 +36,14 @@ pub struct InteriorPoint<X> {
     pub(super) rhs: Columns,
     pub(super) step: Columns,
     pub(super) trial: Columns,
-    /// Pulls by the centring with λ s = 1, and by the predictor's products.
+    /// Right-hand sides of the centring with μ = 1 and of the predictor's products.
     pub(super) pulls: [Terms; 2],
-    /// The rows of one block: small enough for the nearest cache.
+    /// Work array for the rows of one block: small enough for the first-level cache.
     pub(super) scratch: Vec<Lanes>,
     pub(super) ends: [Option<EndRow>; 2],
 }
 
-/// The row that limits w at the end of a ramp.
+/// The row w ≤ `greatest` at the end of a ramp.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EndRow {
     pub station: usize,
@@ -75,7 +75,7 @@ impl<X: Model> Default for InteriorPoint<X> {
 }
 
 impl<X: Model> InteriorPoint<X> {
-    /// Takes the spline x, with room for all numbers on its stations.
+    /// Copies the spline x into the working space and sizes all arrays for the window's intervals.
     pub(super) fn take(&mut self, rows: &Constraints, x: &[f64]) {
         let (count, blocks, layout) = (rows.count(), rows.blocks.len(), rows.layout());
         let state = &mut self.state;
@@ -98,7 +98,7 @@ impl<X: Model> InteriorPoint<X> {
         self.x.take(x);
     }
 
-    /// Slacks of x, or of the trial. Returns Σ ln s, or None if a limit is broken.
+    /// Computes the slacks of x, or of the trial. Returns Σ ln s, or None if a limit is broken.
     pub(super) fn slacks(&mut self, rows: &Constraints, trial: bool) -> Option<f64> {
         dispatch!(self.level, simd => self.slacks_on(simd, rows, trial))
     }
@@ -125,7 +125,7 @@ impl<X: Model> InteriorPoint<X> {
                 product.take(all.values());
             }
         }
-        // A NaN is refused as well.
+        // A NaN counts as broken too.
         if least.least() <= 0.0 || sum.sum().is_nan() {
             return None;
         }
@@ -140,7 +140,7 @@ impl<X: Model> InteriorPoint<X> {
         Some(logarithm)
     }
 
-    /// The time of x, or of the trial, with its ramps, in s; infinite where w is not positive.
+    /// The time of x, or of the trial, with its ramps, in s; infinite if w is not positive.
     pub(super) fn time(&self, rows: &Constraints, ends: [WindowEnd; 2], trial: bool) -> f64 {
         let x = if trial { &self.trial } else { &self.x };
         let mut time = dispatch!(self.level, simd => self.model.time(simd, rows, x, trial));

@@ -1,4 +1,5 @@
-//! Sections of constant jerk as phases: of the S-curve, of lines, and of ramps at a place where the path turns back.
+//! Appends sections of constant jerk to a profile as phases: of the S-curve, of lines, and of ramps at a place where the path
+//! turns back.
 
 use super::{JerkProfile, Movement, State};
 use crate::arc_length_path::ArcLengthPath;
@@ -17,7 +18,7 @@ struct Span {
 }
 
 impl Span {
-    /// The length by its speed, acceleration, jerk and duration.
+    /// The length in mm that follows from its speed, acceleration, jerk and duration.
     fn length(&self) -> f64 {
         State { s: 0.0, ..self.ends[0] }.after(self.duration, self.jerk).s
     }
@@ -52,7 +53,7 @@ impl JerkProfile {
         self.push_spans(path, &spans);
     }
 
-    /// Appends sections of constant jerk along a whole subrun, to an end.
+    /// Appends sections of constant jerk along a whole subrun, up to the state `end`.
     pub fn push_sections<const M: usize>(
         &mut self,
         path: &ArcLengthPath<M>,
@@ -73,10 +74,11 @@ impl JerkProfile {
         self.push_spans(path, &spans);
     }
 
-    /// Lowers the acceleration at a rest where the path turns back from that of the ramp there.
+    /// Lowers the acceleration at the rest where the path turns back from that of the ramp there to `acceleration`, in mm/s².
     ///
-    /// Over thirds of the ramp's time the acceleration is, from the rest on and in parts of the change d, d less, 5/6 d
-    /// more, 1/3 d less, and that of the ramp: time, length and speed stay. The jerk is at most 5.5 d over the time.
+    /// With the change d, the acceleration is linear over each third of the ramp's time: at the rest it is lower than that of the
+    /// ramp by d, after one third higher by 5/6 d, after two thirds lower by 1/3 d, and at the end that of the ramp. Time, length
+    /// and end speed stay the same. The jerk is at most 5.5 d divided by the time.
     pub fn turn_with<const M: usize>(&mut self, path: &ArcLengthPath<M>, end: usize, acceleration: f64) {
         let change = self.end_acceleration(end) - acceleration;
         let own = &mut self.phases;
@@ -107,9 +109,10 @@ impl JerkProfile {
         *own = Phases::joined(if end == 0 { vec![ramp, rest] } else { vec![rest, ramp] });
     }
 
-    /// Appends sections that are cut at the knots. Arc lengths far along a path have too few digits for sections of
-    /// some nanometres. So the sections of a part follow one another from both of its ends by their own lengths, and
-    /// the longest section takes the rounding. The duration of each is corrected for the length between its parameters.
+    /// Appends sections that are cut at the knots. Arc lengths far along a path have too great rounding errors for sections of
+    /// some nanometres. The sections of a part are therefore placed one after another by their own lengths, from both ends of the
+    /// part, and the longest section absorbs the rounding. The duration of each is corrected for the length between its
+    /// parameters.
     fn push_spans<const M: usize>(&mut self, path: &ArcLengthPath<M>, spans: &[Span]) {
         for spans in spans.chunk_by(|a, b| a.part == b.part) {
             path.problem.watch.check_at(spans[0].part);
@@ -127,8 +130,8 @@ impl JerkProfile {
             for (i, span) in spans.iter().enumerate() {
                 let (u, length) = ([u[i], u[i + 1]], span.length());
                 let moved = path.length_between(part, u[0], u[1]) - length;
-                // The faster end moves: next to rest a small part of the length takes much of the time. Where the path turns
-                // back, the speed follows from the acceleration and the time.
+                // The difference in length is passed at the speed of the faster end: next to rest a small length takes much time.
+                // Where the path turns back, the duration stays, because the speed follows from the acceleration and the time.
                 let fastest = span.ends[0].v.max(span.ends[1].v);
                 let keeps = fastest == 0.0 || span.ends.iter().any(State::turns);
                 let duration = span.duration + if keeps { 0.0 } else { moved / fastest };

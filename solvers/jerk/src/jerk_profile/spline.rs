@@ -1,5 +1,5 @@
-//! The spline w(s) = v² of the jerk-limited planner as phases: one for each interval between two stations, and one for each
-//! ramp from or to rest.
+//! Appends the spline w(s) = v² of the jerk-limited planner to a profile as phases: one for each interval between two stations,
+//! and one for each ramp from or to rest.
 
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::phase_law::PhaseLaw;
@@ -10,23 +10,24 @@ use crate::jerk_limited::profile::Profile;
 use crate::jerk_limited::rest_ramp::Ramp;
 use crate::path_problem::Geometry;
 
-/// The error that moves states falls by this part of each phase's length, which is too little to show in the phase.
+/// Each phase absorbs an error of this fraction of its length, which is too little to show in the phase; the rest moves the
+/// states.
 const ABSORBED: f64 = 1e-10;
-/// The time of a phase is accurate to this part, unless its halves have been halved this often, next to rest.
+/// The time of a phase has this relative accuracy, unless its parts have been halved `DEPTH` times, which happens next to rest.
 const QUADRATURE: f64 = 1e-12;
 const DEPTH: u32 = 12;
-/// A cubic becomes a phase of constant jerk where the rounding of v² would show in its jerk by more than this part of
-/// the limit, and its jerk changes by no more than this many roundings.
+/// A cubic becomes a phase of constant jerk if the rounding of v² would change its jerk by more than this fraction of the limit,
+/// and if its jerk changes along the phase by no more than `NOISE` times this rounding.
 const SHOWN: f64 = 1e-7;
 const NOISE: f64 = 8.0;
 
 impl JerkProfile {
     /// Appends a profile of the jerk-limited planner on a part of a subrun.
     ///
-    /// Arc lengths far along a path, and parameters next to rest, have too few digits for short phases: what rounding
-    /// changes in their lengths shows some hundred times as much in w''. So the lengths of phases are measured between
-    /// the rounded parameters, and each state is moved along its profile to the end of its phase. These moves add up
-    /// from both ends of the profile; the longest phase, in which they show least, takes their difference.
+    /// Arc lengths far along a path, and parameters next to rest, have too great rounding errors for short phases: an error of a
+    /// phase's length shows some hundred times as much in w''. The lengths of phases are therefore measured between the rounded
+    /// parameters, and each state is moved along the profile to the end of its phase. These moves add up from both ends of the
+    /// profile; the longest phase, in which they show least, absorbs their difference.
     pub fn push_profile<const M: usize>(
         &mut self,
         path: &ArcLengthPath<M>,
@@ -64,7 +65,7 @@ impl JerkProfile {
     }
 }
 
-/// A way on one part: its parameters, and the length between them in mm.
+/// A range of one part: its parameters, and the length between them in mm.
 struct Way {
     part: usize,
     u: [f64; 2],
@@ -77,7 +78,7 @@ impl Way {
         Self { part, u, length: path.length_between(part, u[0], u[1]) }
     }
 
-    /// The way of the ramp at an end of a profile, if it has one and that lies within one part.
+    /// The range of the ramp at an end of a profile, if there is a ramp and it lies within one part.
     fn of_ramp<const M: usize>(path: &ArcLengthPath<M>, profile: &Profile, end: usize) -> Option<Self> {
         let (s, ends) = (&profile.s, profile.ends);
         let ways = [[ends[0], s[0]], [s[s.len() - 1], ends[1]]];
@@ -86,7 +87,7 @@ impl Way {
     }
 }
 
-/// The ways between neighbouring stations; the knots between them are stations.
+/// The ranges between neighbouring stations; all knots between them are stations.
 fn ways_between<const M: usize>(path: &ArcLengthPath<M>, s: &[f64]) -> Vec<Way> {
     let (knots, mut part) = (path.knots(), path.part(s[0]));
     let mut ways: Vec<Way> = Vec::with_capacity(s.len() - 1);
@@ -107,8 +108,8 @@ fn ways_between<const M: usize>(path: &ArcLengthPath<M>, s: &[f64]) -> Vec<Way> 
 
 /// The motion on the ramp at an end of a profile, if it has one: from rest to the state there, or from the state to rest.
 ///
-/// The state takes the acceleration of the ramp, which differs by rounding from that of the profile: that one belongs to the
-/// length before rounding.
+/// The acceleration of the state is set to that of the ramp. It differs by rounding from that of the profile, which belongs to
+/// the length before rounding.
 fn movement_on_ramp(profile: &Profile, end: usize, way: Option<&Way>, state: &mut State) -> Option<Movement> {
     let ramp = profile.ramp(end);
     if ramp.length <= 0.0 {
@@ -130,12 +131,12 @@ fn movement_on_ramp(profile: &Profile, end: usize, way: Option<&Way>, state: &mu
     Some(Movement { law: PhaseLaw::PathJerk, value: jerk, ends, duration })
 }
 
-/// The states at the stations, moved to the positions that the ways between them give, from both ends of the profile;
-/// the longest way, between whose ends the moves meet; and the error of its length.
+/// Returns the states at the stations, moved to the positions that follow from the lengths of `ways`, from both ends of the
+/// profile; the index of the longest range, within which the moves from both ends meet; and the error of its length, in mm.
 fn moved_states(profile: &Profile, ways: &[Way], ramp_ways: &[Option<Way>; 2]) -> (Vec<State>, usize, f64) {
     let (s, last) = (&profile.s, ways.len());
     let meeting = (0..last).fold(0, |most, n| if ways[n].length > ways[most].length { n } else { most });
-    // The quadrature error of long phases must not move the states in turns that are shorter than it.
+    // The quadrature error of long phases must not move the states in turns that are shorter than this error.
     let added = |miss: f64, way: &Way, length: f64| {
         let miss = miss + (way.length - length);
         miss - miss.clamp(-ABSORBED * way.length, ABSORBED * way.length)
@@ -163,11 +164,13 @@ fn moved_states(profile: &Profile, ways: &[Way], ramp_ways: &[Option<Way>; 2]) -
     ((0..=last).map(state).collect(), meeting, off.abs())
 }
 
-/// The movement between two states at the distance h on a part, where h has the error `off`.
+/// The movement between two states at the distance h on a part, where h has the error `off`, both in mm.
 ///
-/// v² as a cubic is known by its values at both ends. Their rounding ε v² and the error e of h change the jerk by 3 v
-/// (ε v² + 2 |a| e)/h². That is more than the limit on a phase of a nanometre. There the accelerations at both ends give
-/// a constant jerk: over so short a length it changes only by rounding.
+/// The cubic v² is given by its values at both ends. Their rounding ε v² and the error e of h change the jerk by 3 v (ε v² + 2
+/// |a| e)/h²: more than the limit on a phase of a nanometre. Such a phase gets a constant jerk from the accelerations at both
+/// ends: over so short a length the jerk changes only by rounding.
+/// |a| e)/h², which is more than the limit on a phase of a nanometre. Such a phase gets a constant jerk from the accelerations at
+/// both ends: over so short a length the jerk changes only by rounding.
 fn movement_between<const M: usize>(
     path: &ArcLengthPath<M>,
     jerk_limits: &[f64; M],
@@ -211,7 +214,7 @@ fn cubic_time(h: f64, [from, to]: &[State; 2]) -> f64 {
     h * halved_time(&|t| 1.0 / speed(t), [0.0, 1.0], 0)
 }
 
-/// The integral by Gauss's rule of eight points, halved until both halves together equal the whole to `QUADRATURE`.
+/// The integral by Gauss's rule of eight points, with halved ranges until both halves together equal the whole to `QUADRATURE`.
 fn halved_time(f: &impl Fn(f64) -> f64, [a, b]: [f64; 2], depth: u32) -> f64 {
     let panel = |a: f64, b: f64| -> f64 {
         let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));

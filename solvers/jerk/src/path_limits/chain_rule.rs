@@ -1,4 +1,4 @@
-//! Derivatives by arc length from those by the parameter, over numbers or intervals (Cheatham 2007, 5.13–5.16).
+//! Computes derivatives by arc length from those by the parameter, for numbers or intervals (Cheatham 2007, 5.13–5.16).
 //!
 //! Symbols: ' = d/du, S arc length [mm] of the tool's path. A coordinate n/d has the derivative G/d², where G = n'd −
 //! nd', so that S' = √Q/d² with Q = Σ G² over the tool's coordinates. For an axis with X in place of G

@@ -1,4 +1,4 @@
-//! Bounds on |q_S|, |q_SS| and |q_SSS| of each axis over a segment of path in Bernstein form, sampled or proven.
+//! Computes bounds on |q_S|, |q_SS| and |q_SSS| of each axis over a segment of path in Bernstein form, sampled or proven.
 //!
 //! `sampled` is the method of the thesis (Cheatham 2007, 5.3) and no bound: the derivatives may be greater between its
 //! samples, which is how the thesis's own jerk exceeds the limit by up to 40 %. `bounded` encloses the polynomials of
@@ -10,13 +10,13 @@ use feedplan_geometry::interval::Interval;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_planner::problem::{greater, Both};
 
-/// Most coefficients: N of a rational segment of degree 9 has degree 46.
+/// Greatest number of coefficients: N of a rational segment of degree 9 has degree 46.
 const MOST: usize = 48;
-/// A segment is halved at most this often; the bounds are then as wide as they are.
+/// A segment is halved at most this often; bounds that are still wide after that stay wide.
 const MAX_DEPTH: u32 = 12;
-/// Bounds below this part of 1, 1/length and 1/length² need not be close.
+/// Bounds below this fraction of 1, 1/length and 1/length² (for q_S, q_SS and q_SSS) need not be close.
 const FLAT: f64 = 0.1;
-/// The error of the coefficients of N, over the terms that they are sums of; other coefficients have less.
+/// The error of the coefficients of N, divided by the terms that they are sums of; other coefficients have less.
 const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
 
 type Function = Polynomial<MOST>;
@@ -32,15 +32,15 @@ pub struct Curve<'a, const M: usize> {
     pub weight: &'a [f64],
 }
 
-/// Bounds on the derivatives of the joints by arc length over a segment; q_S and q_SS have one for positive values and
-/// one for the size of negative values.
+/// Bounds on the derivatives of the joints by arc length over a segment; q_S and q_SS have one bound for positive values and one
+/// for the absolute value of negative values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape<const M: usize> {
     /// q_S, in 1 or degrees/mm.
     pub first: Both<M>,
-    /// q_SS, per mm more.
+    /// q_SS, in 1/mm or degrees/mm².
     pub second: Both<M>,
-    /// |q_SSS|, per mm² more.
+    /// |q_SSS|, in 1/mm² or degrees/mm³.
     pub third: [f64; M],
     /// Curvature of the tool's path, in 1/mm.
     pub curvature: f64,
@@ -56,13 +56,13 @@ pub fn sampled<const M: usize>(curve: &Curve<M>, samples: usize) -> Shape<M> {
     shape
 }
 
-/// Proven bounds, greater than the greatest derivatives by a part of about `accuracy` unless the path nearly has a
-/// cusp; infinite where it has a cusp.
+/// Proven bounds that exceed the greatest derivatives by a fraction of about `accuracy`, or by more if the path nearly has a
+/// cusp; infinite if it has a cusp.
 pub fn bounded<const M: usize>(curve: &Curve<M>, accuracy: f64) -> Shape<M> {
     bounded_until(curve, accuracy, |_| false)
 }
 
-/// The same, or looser bounds on parts of the segment where those are good `enough`.
+/// `bounded`, but with looser bounds on those parts of the segment where they are good `enough`.
 pub fn bounded_until<const M: usize>(
     curve: &Curve<M>,
     accuracy: f64,
@@ -83,7 +83,7 @@ impl<const M: usize> Shape<M> {
         Self { first: [[0.0; M]; 2], second: [[0.0; M]; 2], third: [0.0; M], curvature: 0.0 }
     }
 
-    /// The sizes of given derivatives at one point, with curvature 0.
+    /// The absolute values of given derivatives at one point, with curvature 0.
     pub fn of(first: &[f64; M], second: &[f64; M], third: &[f64; M]) -> Self {
         let [first, second] = [first, second].map(|q| {
             let (mut high, mut low) = ([0.0; M], [0.0; M]);
@@ -95,7 +95,7 @@ impl<const M: usize> Shape<M> {
         Self { first, second, third: third.map(f64::abs), curvature: 0.0 }
     }
 
-    /// Bounds over both segments.
+    /// Bounds over this segment and the other one.
     pub fn with(mut self, other: &Self) -> Self {
         self.include(other);
         self
@@ -112,7 +112,8 @@ impl<const M: usize> Shape<M> {
         self.curvature = self.curvature.max(other.curvature);
     }
 
-    /// Whether it exceeds another by no more than a part; `scale` is 1/length, beside which a curvature may be small.
+    /// Whether these bounds exceed `other` by no more than the fraction `accuracy`. `scale` is 1/length: curvatures that are
+    /// small relative to it need not be close.
     fn close(&self, other: &Self, accuracy: f64, scale: f64) -> bool {
         let near = |a: f64, b: f64, unit: f64| a <= b + accuracy * (b + FLAT * unit);
         let [first, second] = [&self.first, &self.second].map(greater);
@@ -126,7 +127,7 @@ impl<const M: usize> Shape<M> {
     }
 }
 
-/// The sizes of positive and of negative values in a range.
+/// The greatest absolute values of the positive and of the negative values in a range.
 fn sizes(range: Interval) -> [f64; 2] {
     [range.hi, -range.lo].map(|size| if size > 0.0 { size } else { 0.0 })
 }
@@ -237,8 +238,8 @@ impl<const M: usize> Part<M> {
         }
     }
 
-    /// Includes the middle of this part in `seen`, and bounds on the part in `bound`: those of both halves where `is_met` does
-    /// not accept those of the whole part, beside what was seen.
+    /// Includes the derivatives at the middle of this part in `seen`, and bounds on the part in `bound`: those of the whole part
+    /// if `is_met` accepts them in view of `seen`, else those of both halves.
     fn enclose(
         &self,
         is_met: &impl Fn(&Shape<M>, &Shape<M>) -> bool,
@@ -258,7 +259,7 @@ impl<const M: usize> Part<M> {
     }
 }
 
-/// G of a coordinate, and the sizes of the terms that it is the sum of.
+/// G of a coordinate, and the absolute values of the terms that it is the sum of.
 #[derive(Clone, Copy)]
 struct Velocity {
     g: Function,
@@ -290,7 +291,7 @@ fn velocities<const K: usize>(control: &[[f64; K]], weight: &[f64], d: Option<&F
             None => {
                 let size = |i: usize| control[i][k].abs().max(control[0][k].abs());
                 let most = (0..control.len()).map(size).fold(0.0, f64::max);
-                // Moving rounds by less than a unit in the last place of the greatest coordinate.
+                // Moving a coordinate has a rounding error of less than a unit in the last place of the greatest coordinate.
                 let g = n.derivative();
                 let margin = 2.0 * n.degree() as f64 * most * f64::EPSILON / ROUNDINGS;
                 let terms = g.magnitude().combine(1.0, &Function::constant(margin).elevate(g.degree()), 1.0);

@@ -1,16 +1,16 @@
 //! The backward recursion (Cheatham 2007, 4.3.2): from the standstill of the forward recursion back to its start, it
 //! lowers the speeds at the ends of segments until every segment joins its ends.
 //!
-//! It first follows the forward recursion as if no profile were established: every speed is as high as the one after it
-//! allows, and at most that of the forward recursion. Seen backward, rises have no dead spot, so that this only fails
-//! at the present speed of the motion. Then it joins the established profile, as early on the path as possible.
+//! It first follows the forward recursion as if no profile were established: every speed is as high as the one after it allows,
+//! and at most that of the forward recursion. Seen backward, rises have no dead spot, so that this only fails at the present
+//! speed of the motion. In that case it joins the established profile, as early on the path as possible.
 
 use super::buffer::Buffer;
 use super::dead_spot::Fall;
 use super::segment::Segment;
 
-/// Lowers `speeds`, the forward recursion's, until all segments join their ends; if that fails, from the `established`
-/// ones on. False if those are kept.
+/// Sets `speeds` to those of the forward recursion, lowered until every segment joins its ends. If that fails at the start, they
+/// begin with `established` speeds. Returns false if the whole established profile is to be kept.
 pub fn recursion(
     buffer: &Buffer,
     established: impl Fn(usize) -> f64,
@@ -25,8 +25,10 @@ pub fn recursion(
     fresh::first_segment(buffer.segment(0), speeds[1], forward[0]) || connect(buffer, established, speeds)
 }
 
-/// Leaves the established profile where it first joins the new one, or where it is first below and the new one falls to
-/// it.
+/// Joins the new speeds to the established profile. It begins at the first segment where the new speed at the start is not lower
+/// than the established one, or that leads from the established speed to a new speed at its end that is not lower than the
+/// established one. From there it goes back until the established speed is within reach. False if there is no such segment, or if
+/// a step back fails.
 fn connect(buffer: &Buffer, established: impl Fn(usize) -> f64, speeds: &mut [f64]) -> bool {
     let last = speeds.len() - 1;
     let meets = |&i: &usize| {
@@ -59,7 +61,7 @@ fn connect(buffer: &Buffer, established: impl Fn(usize) -> f64, speeds: &mut [f6
 pub mod fresh {
     use super::Segment;
 
-    /// The speed at the start of a segment with a speed at its end.
+    /// The speed at the start of a segment with the speed `end` at its end.
     pub fn step(segment: &Segment, end: f64, forward: f64) -> f64 {
         converged(segment, end, forward).unwrap_or_else(|| nonconverged(segment, end))
     }
@@ -88,24 +90,24 @@ pub mod established {
     #[derive(Clone, Copy, Debug)]
     pub struct Situation<'a> {
         pub segment: &'a Segment,
-        /// The new speed at its end.
+        /// The new speed at the segment's end.
         pub end: f64,
-        /// The established speed at its start.
+        /// The established speed at the segment's start.
         pub established: f64,
-        /// The speed limit at its start.
+        /// The speed limit at the segment's start.
         pub limit: f64,
     }
 
-    /// The speed at its start.
+    /// The speed at the segment's start.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub enum Step {
         /// The established speed, as at all segments before.
         Converged,
-        /// A higher speed.
+        /// A speed higher than the established one.
         Kept(f64),
     }
 
-    /// None where all speeds within reach are lower or break the limit.
+    /// The speed at the segment's start; None if all speeds within reach are lower than the established one or break the limit.
     pub fn step(at: &Situation) -> Option<Step> {
         converged_increasing(at)
             .or_else(|| converged_decreasing(at))

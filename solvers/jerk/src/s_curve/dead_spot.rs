@@ -1,19 +1,19 @@
-//! The speeds that a fall from a speed V [mm/s] can reach within a length [mm]: one region, or two with a dead spot
+//! Computes the speeds that a fall from a speed V [mm/s] can reach within a length [mm]: one region, or two with a dead spot
 //! between them (Cheatham 2007, 4.3.4).
 //!
 //! A fall by ΔV has the length D = (V − ΔV/2) T(ΔV), concave in ΔV: small falls are short, the longest fall ends at a
 //! third of V (with perfect S-curves), and a fall to standstill is shorter than that one. For lengths between that of
 //! standstill and the longest, speeds in the middle cannot be reached.
 //!
-//! The thesis counts usable A_max. As 4.15 has at most two positive roots (Descartes: −A³ + 2VJ A − ΔS J² changes sign
-//! twice), the third end is the acceleration limit; from there falls of constant acceleration go on to standstill.
+//! The thesis counts up to three usable A_max. As 4.15 has at most two positive roots (Descartes: −A³ + 2VJ A − ΔS J² changes
+//! sign twice), the third end is the acceleration limit, from which falls with constant acceleration continue to standstill.
 
 use super::transition::{retreat, Limits};
 
-/// Most steps of Newton's method on a concave function, from the feasible side. It converges by itself, except beside
-/// the longest fall, where both roots meet and every step only halves the error.
+/// Greatest number of Newton steps on a concave function, from the feasible side. Few are needed, except near the longest fall,
+/// where both roots meet and every step only halves the error.
 const STEPS: usize = 48;
-/// A step below this part of the root is rounding.
+/// A step below this fraction of the root is only rounding.
 const CONVERGED: f64 = 4.0 * f64::EPSILON;
 
 /// The speeds that a fall from V can reach.
@@ -21,7 +21,7 @@ const CONVERGED: f64 = 4.0 * f64::EPSILON;
 pub struct Reach {
     /// The upper region is [upper, V].
     pub upper: f64,
-    /// The lower region is [0, lower]; None where there is one region.
+    /// The lower region is [0, lower]; None if there is only one region.
     pub lower: Option<f64>,
     /// Number of A_max that end the regions.
     pub usable: Usable,
@@ -60,7 +60,7 @@ impl Fall {
         }
     }
 
-    /// One region: from V down to where A_1 ends it, or to standstill.
+    /// One region: from V down to where A_1 ends it, or to standstill. None if there are two regions.
     pub fn one_usable(&self) -> Option<Reach> {
         let one = |upper| Some(Reach { upper, lower: None, usable: Usable::One });
         if self.distance(self.longest()) <= self.length {
@@ -72,12 +72,14 @@ impl Fall {
         }
     }
 
-    /// Two regions of perfect S-curves: up to A_1, and from A_2 to the A_max that ends at standstill.
+    /// Two regions of perfect S-curves: from V down to where A_1 ends it, and from where A_2 begins it down to standstill. None
+    /// if A is reached.
     pub fn two_usable(&self) -> Option<Reach> {
         (self.start <= self.limits.full_change()).then(|| self.two_regions(Usable::Two))
     }
 
-    /// Two regions, the lower one between A_2 and A_3, the acceleration limit, and on with constant acceleration.
+    /// Two regions; the lower one consists of perfect S-curves between A_2 and A_3, the acceleration limit, and of falls with
+    /// constant acceleration from there down to standstill.
     pub fn three_usable(&self) -> Reach {
         self.two_regions(Usable::Three)
     }
@@ -125,7 +127,8 @@ impl Fall {
         retreat(speed, self.start, self.start, |end| self.limits.joins(self.start, end, self.length))
     }
 
-    /// The smaller root A_1 of 4.15, p (2 V J − p²) = ΔS J², as ΔV; tangents of the concave left side stay below it.
+    /// The smaller root A_1 of 4.15, p (2 V J − p²) = ΔS J², as ΔV. The left side is concave, so that Newton steps stay below the
+    /// root.
     fn perfect_change(&self) -> f64 {
         let jerk = self.limits.jerk;
         let (linear, constant) = (2.0 * self.start * jerk, self.length * jerk * jerk);
@@ -143,7 +146,7 @@ impl Fall {
 
     /// The highest speed of the lower region; standstill must be within reach.
     fn end_of_dead_spot(&self) -> f64 {
-        // Starting at standstill, tangents of the concave D stay above the root.
+        // D is concave, so that Newton steps from standstill stay above the root.
         let mut change = self.start;
         for _ in 0..STEPS {
             let step = (self.distance(change) - self.length) / self.slope(change);

@@ -1,8 +1,8 @@
-//! The forward recursion (Cheatham 2007, 4.3.1): speeds at the ends of segments that rise on the first segment and then
+//! The forward recursion (Cheatham 2007, 4.3.1): computes speeds at the ends of segments that rise on the first segment and then
 //! fall as fast as possible to standstill.
 //!
-//! It looks at as many segments as it takes to stop. Where the fall is too slow for a limit ahead, the speed jumps down
-//! to the limit, which the backward recursion must mend.
+//! It looks at as many segments as it takes to stop. Where the fall is too slow for a limit ahead, the speed jumps down to the
+//! limit, and the backward recursion must remove this jump.
 
 use super::buffer::Buffer;
 use super::dead_spot::Fall;
@@ -12,9 +12,9 @@ use super::segment::Segment;
 #[derive(Clone, Copy, Debug)]
 pub struct Situation<'a> {
     pub segment: &'a Segment,
-    /// The speed at its start.
+    /// The speed at the segment's start.
     pub start: f64,
-    /// The speed limit at its end; None at the end of the buffer, where the motion must stand.
+    /// The speed limit at the segment's end; None at the end of the buffer, where the motion must stand.
     pub allowable: Option<f64>,
 }
 
@@ -23,7 +23,7 @@ impl Situation<'_> {
         Fall { limits: self.segment.limits, start: self.start, length: self.segment.length }
     }
 
-    /// The speed limit at its end.
+    /// The speed limit at the segment's end; 0 at the end of the buffer.
     fn limit(&self) -> f64 {
         self.allowable.unwrap_or(0.0)
     }
@@ -38,7 +38,8 @@ pub enum Step {
     Jump(f64),
 }
 
-/// Fills `speeds` with those at the ends of segments, from the first start to standstill; true if no limit is missed.
+/// Fills `speeds` with the speed at the start of the first segment and those at the ends of segments, up to standstill. True if
+/// there is no jump.
 pub fn recursion(buffer: &Buffer, start: f64, speeds: &mut Vec<f64>) -> bool {
     speeds.clear();
     speeds.push(start);
@@ -63,7 +64,7 @@ pub fn recursion(buffer: &Buffer, start: f64, speeds: &mut Vec<f64>) -> bool {
     sound
 }
 
-/// The acceleration stage: as fast as possible at the end of the segment (4.3.1.1).
+/// The acceleration stage: the highest possible speed at the end of the segment (4.3.1.1).
 pub mod acceleration {
     use super::{Situation, Step};
 
@@ -82,7 +83,7 @@ pub mod acceleration {
         (highest <= at.limit()).then_some(Step::Joined(highest))
     }
 
-    /// b) The limit ends the rise, not the length.
+    /// b) The limit ends the rise before the length does.
     pub fn limited(at: &Situation) -> Option<Step> {
         let limit = at.limit();
         (limit >= at.start && at.segment.limits.highest(at.start, at.segment.length) > limit)
@@ -115,7 +116,7 @@ pub mod acceleration {
     }
 }
 
-/// The deceleration stage: as slow as possible at the end of the segment (4.3.1.2).
+/// The deceleration stage: the lowest possible speed at the end of the segment (4.3.1.2).
 pub mod deceleration {
     use super::{Situation, Step};
 

@@ -1,4 +1,4 @@
-//! The two-pass profiler on a path of the package: subruns cut into segments with limits along the path, and their
+//! Runs the two-pass profiler on a path of the package: cuts subruns into segments with limits along the path, and plans their
 //! profile.
 //!
 //! Neighbouring straight pieces of one direction are one segment. A curved piece is halved where the limits of its
@@ -20,20 +20,20 @@ use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, Fault, Problem};
 
-/// Bounds on derivatives exceed them by about this part.
+/// Bounds on derivatives exceed them by about this fraction.
 const ACCURACY: f64 = 0.05;
 /// Samples of a segment where no bound is proven.
 const SAMPLES: usize = 33;
-/// A junction limits the speed where it is passed within this part of its cap.
+/// A junction counts as limiting the speed if it is passed at this fraction of its cap or faster.
 const HELD: f64 = 0.998;
 
-/// A jump of the curvature that lowers the limits of jerk by at most this part does so on all of the parts beside it;
-/// around other jumps the path is cut.
+/// A jump of the curvature that lowers the limits of jerk by at most this fraction does so on the whole of the parts beside it;
+/// around greater jumps the path is cut.
 const LITTLE: f64 = 0.05;
 
-/// A part is halved up to `DEPTH` times where, by `LOOKED` samples, one half may be faster than the whole by more than
-/// the part `WORTH`. Next to a tight turn the bounds of one half may allow far more than those of the whole, by more
-/// than the part `WELL_WORTH`; there it is halved up to `MOST_DEPTH` times.
+/// A part is halved up to `DEPTH` times where, by `LOOKED` samples, one half may be faster than the whole by more than the
+/// fraction `WORTH`. Next to a tight turn the bounds of one half may allow far more than those of the whole, by more than the
+/// fraction `WELL_WORTH`; there it is halved up to `MOST_DEPTH` times.
 const WORTH: f64 = 0.05;
 const LOOKED: usize = 9;
 const DEPTH: u32 = 5;
@@ -43,16 +43,16 @@ const MOST_DEPTH: u32 = 40;
 /// Parameters of cutting a subrun into segments.
 #[derive(Clone, Copy, Debug)]
 pub struct Cutting {
-    /// The reference length of `path_limits`, in lengths from rest to rest that just reach the greatest speed; from 1
-    /// on a line takes all of its speed. Short reference lengths favour the acceleration.
+    /// The reference length of `path_limits`, in units of the length from rest to rest that just reaches the greatest speed. With
+    /// 1 or more, a line uses its full speed. Short reference lengths favour the acceleration.
     pub lengths: f64,
-    /// Parts are joined where that lowers the speed of each by at most this part.
+    /// Parts are joined if that lowers the speed of each by at most this fraction.
     pub alike: f64,
 }
 
-/// The profile of a path, each subrun by the quickest of the cuttings, with this look-ahead in segments. The
-/// jerk-limited planner plans, with this effort, the subruns that have a segment without speed or with hardly any, next
-/// to a cusp, and those that begin or end in motion.
+/// The profile of a path, with the fastest of the cuttings for each subrun and this look-ahead in segments. The jerk-limited
+/// planner plans, with this effort, the subruns that begin or end in motion and those that have a segment next to a cusp with no
+/// speed or hardly any.
 pub fn plan<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -69,7 +69,7 @@ pub fn plan<const M: usize>(
     })
 }
 
-/// The segments of each subrun that `plan` uses; none where the subrun is not for profilers of segments.
+/// The segments of each subrun that `plan` uses; empty for a subrun that the jerk-limited planner plans.
 pub fn cut<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -87,8 +87,8 @@ pub fn cut<const M: usize>(
     subruns(problem).iter().map(segments).collect()
 }
 
-/// The profile of given sections, for subrun i those from `offsets[i]` to `offsets[i + 1]`; if none, the jerk-limited
-/// one.
+/// The profile of given sections: subrun i has those from `offsets[i]` to `offsets[i + 1]`. A subrun without sections gets the
+/// jerk-limited profile.
 pub fn of_sections<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -119,7 +119,7 @@ fn along<const M: usize>(path: &ArcLengthPath<M>, limits: &Limits<M>, sections: 
         while next + 1 < sections.len() && sections[next + 1].position <= cap.s {
             next += 1;
         }
-        // Around the junction the speed is at most its cap.
+        // Around the junction the speed is at most the junction's cap.
         if jumps && sections[next].speed >= HELD * cap.speed {
             phases.kinks.push(path.parts[path.part(cap.s)].piece as u32);
         }
@@ -132,7 +132,8 @@ struct Planned {
     sections: Vec<Section>,
 }
 
-/// A subrun from rest to rest by the quickest of the cuttings; None where a segment has no speed, or hardly any.
+/// A subrun from rest to rest with the fastest of the cuttings; None if a segment has no speed or hardly any, or if an end is in
+/// motion.
 fn quickest<const M: usize>(
     problem: &Problem<M>,
     path: &ArcLengthPath<M>,
@@ -169,9 +170,9 @@ struct Cut<const M: usize> {
     /// The speed cap by feed and chord error, in mm/s.
     cap: f64,
     length: f64,
-    /// The part by which the limits of jerk are lower, near a jump of the curvature.
+    /// The fraction by which the limits of jerk are lower, near a jump of the curvature.
     share: f64,
-    /// The speed limit where it meets the next part, in mm/s.
+    /// The speed limit where this part meets the next one, in mm/s.
     junction: f64,
 }
 
@@ -180,7 +181,7 @@ struct Cut<const M: usize> {
 struct Around {
     /// The greatest speed, in mm/s.
     speed: f64,
-    /// The part by which the limits of jerk are lower.
+    /// The fraction by which the limits of jerk are lower.
     share: f64,
 }
 
@@ -210,7 +211,7 @@ impl<'a, const M: usize> Parts<'a, M> {
             let ends = [path.knots()[part], path.knots()[part + 1]];
             let after = junctions.get(part).map_or(free, |junction| junction.cap);
             parts.between(part, ends, [before, after]);
-            // Parts around a junction are slow there already.
+            // Parts that were cut around a junction already have its speed cap.
             if let Some(last) = parts.cuts.last_mut().filter(|_| after.share <= LITTLE) {
                 last.junction = last.junction.min(after.speed);
             }
@@ -219,8 +220,9 @@ impl<'a, const M: usize> Parts<'a, M> {
         parts
     }
 
-    /// Appends the part between two junctions, with their limits around those that lower the limits of jerk by much. At
-    /// a junction that limits the speed, a third difference spans no more than that speed travels.
+    /// Appends the part between two junctions. Around a junction that lowers the limits of jerk by more than `LITTLE`, a range of
+    /// its own has the limits of the junction; where the junction limits the speed, half a third difference spans no more than
+    /// that speed travels.
     fn between(&mut self, part: usize, [from, to]: [f64; 2], junctions: [SpeedCap; 2]) {
         let time = HALF * self.problem.period;
         let reach =
@@ -246,7 +248,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         }
     }
 
-    /// Appends the range between two lengths on a part.
+    /// Appends the range between two arc lengths on a part, halved where that is worth it.
     fn append(&mut self, part: usize, ends: [f64; 2], around: &Around) {
         let path = self.path;
         match path.direction(part) {
@@ -267,7 +269,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         }
     }
 
-    /// Appends a range, or its halves where they are much faster.
+    /// Appends a range, or its halves if one of these may be much faster.
     fn halve(
         &mut self,
         part: usize,
@@ -291,7 +293,8 @@ impl<'a, const M: usize> Parts<'a, M> {
         }
     }
 
-    /// Whether, by bounds, one half may be far faster than the whole, as far as the axes reach such speeds.
+    /// Whether the bounds allow a far greater speed on one half than on the whole range, and the axes can reach such a speed
+    /// there.
     fn is_well_worth(
         &self,
         whole: &(Shape<M>, f64),
@@ -306,7 +309,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         most(left).speed.max(most(right).speed).min(reached) > (1.0 + WELL_WORTH) * slow.speed
     }
 
-    /// Whether, by samples, one half may be faster than the whole, as far as the axes reach such speeds.
+    /// Whether samples allow a greater speed on one half than on the whole range, and the axes can reach such a speed there.
     fn is_worth(&self, part: usize, [from, to]: [f64; 2], around: &Around) -> bool {
         let axes = self.axes.with_jerk_less(around.share);
         let looked: [Allowable; LOOKED] = std::array::from_fn(|i| {
@@ -327,7 +330,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         left.max(right).min(limits.highest(slow, 0.5 * (to - from))) > (1.0 + WORTH) * slow
     }
 
-    /// The segments by a cutting; None where one has no speed, or one at which the axes creep.
+    /// The segments of a cutting; None if one has no speed, or only one at which the axes creep.
     fn joined(&self, cutting: &Cutting, watch: Watch) -> Option<Vec<Segment>> {
         let make = |cut: &Cut<M>| -> Option<Segment> {
             let axes = self.axes.with_jerk_less(cut.share);
@@ -349,7 +352,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         for (i, cut) in self.cuts.iter().enumerate() {
             watch.each(self.cuts.len()).count(i);
             let own = make(cut)?;
-            // Join it with the segment before, where that costs no part much speed.
+            // Join it with the segment before, if that costs no part much speed.
             let joins =
                 |last: &Cut<M>| last.junction == f64::INFINITY && (last.share - cut.share).abs() <= LITTLE;
             let joined = out.last().filter(|last| joins(&last.1)).and_then(|(_, last, highest)| {
@@ -373,8 +376,8 @@ impl<'a, const M: usize> Parts<'a, M> {
     }
 }
 
-/// Bounds on the derivatives between two lengths of a part, and the speed cap by feed and chord error: proven where the
-/// axes are those of the tool.
+/// Bounds on the derivatives between two arc lengths of a part, and the speed cap by feed and chord error. They are proven if the
+/// axes are those of the tool, else estimated from samples.
 fn shape<const M: usize>(
     problem: &Problem<M>,
     path: &ArcLengthPath<M>,
@@ -395,7 +398,7 @@ fn shape<const M: usize>(
     let points: Vec<PathPoint<M>> = (0..SAMPLES).map(|i| path.at(part, length(i))).collect();
     let most = |of: &dyn Fn(&PathPoint<M>) -> f64| {
         let mut greatest: f64 = points.iter().map(of).fold(0.0, f64::max);
-        // A peak between samples exceeds them by at most an eighth of the second difference.
+        // A peak between samples exceeds them by about an eighth of the second difference; the whole difference is added.
         for three in points.windows(3) {
             let bend = (of(&three[0]) - 2.0 * of(&three[1]) + of(&three[2])).abs();
             greatest = greatest.max(of(&three[1]) + bend);

@@ -4,16 +4,17 @@
 //! A segment is crossed by a rise, a constant speed and a fall, each where needed, at the highest speed inside it that
 //! leaves room for both changes. The thesis's one S-curve per segment is the case without a peak.
 //!
-//! A rise that begins with an acceleration a is one without, cut short: it would have begun a/J earlier, at a speed
-//! lower by a²/(2 J). From rest, that speed is below 0, and the part before the cut goes −a³/(3 J²). A fall is the same
-//! backwards in time.
+//! A rise that begins with an acceleration a is a rise that begins without acceleration, with its first part cut off: it would
+//! have begun a/J earlier, at a speed lower by a²/(2 J). From rest, that speed is below 0, and the part that is cut off has the
+//! length −a³/(3 J²). A fall is treated in the same way, backwards in time.
 
 use super::segment::{Segment, SegmentEnd};
 use super::transition::{retreat, Limits};
 
-/// Most steps of Newton's method on a convex function from above; far fewer are used.
+/// Greatest number of Newton steps on a convex function, from above; far fewer are needed.
 const STEPS: usize = 60;
-/// A constant speed over less than this part of the length is rounding of the changes before and after.
+/// A section of constant speed over less than this fraction of the segment's length is only rounding of the changes before and
+/// after it.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +47,7 @@ pub struct Section {
 }
 
 impl Section {
-    /// Position, speed and acceleration `t` seconds after its start (4.1–4.3).
+    /// Position, speed and acceleration `t` seconds after the section's start (4.1–4.3).
     pub fn state(&self, t: f64) -> [f64; 3] {
         let Self { position, speed, acceleration, jerk, .. } = *self;
         [
@@ -111,8 +112,8 @@ fn peak(segment: &Segment, ends: [SegmentEnd; 2]) -> f64 {
     let ([from, to], length) = (ends.map(|end| end.before_cut(limits.jerk)), segment.uncut_length(ends));
     let (low, high) = (from.min(to), from.max(to));
     let needed = |peak: f64| limits.distance(from, peak) + limits.distance(peak, to);
-    // The peak is at most what each change alone can reach within the length; with an acceleration at an end, at most
-    // what the greatest acceleration can.
+    // The peak is at most what each change alone can reach within the length; if an end has an acceleration and `low` is below 0,
+    // at most what the greatest acceleration can reach.
     let reached = if low < 0.0 {
         (high.max(0.0).powi(2) + 2.0 * limits.acceleration * segment.length).sqrt()
     } else {
@@ -147,7 +148,7 @@ fn peak(segment: &Segment, ends: [SegmentEnd; 2]) -> f64 {
     retreat((high + q * q).clamp(least, most), least, most, |peak| needed(peak) <= length)
 }
 
-/// The durations of a change of speed: of each section with jerk, and of the constant acceleration between them.
+/// The durations in s of a change of speed: of each of its two sections with jerk, and of the constant acceleration between them.
 struct Ramp {
     bend: f64,
     hold: f64,
@@ -180,14 +181,14 @@ impl Cursor<'_> {
         let section = Section { kind, time, duration, position, speed, acceleration, jerk };
         let [position, speed, acceleration] = section.end();
         self.start = SegmentStart { time: time + duration, position };
-        // A change of speed ends with exactly no acceleration.
+        // A change of speed ends with an acceleration of exactly 0.
         let ends = matches!(kind, SectionKind::ConvexRise | SectionKind::ConcaveFall);
         self.speed = speed;
         self.acceleration = if ends { 0.0 } else { acceleration };
         self.out.push(section);
     }
 
-    /// Sets the speed after the sections so far, without their rounding.
+    /// Replaces the speed after the sections so far by its exact value, without their rounding errors.
     fn set_speed(&mut self, speed: f64) {
         self.speed = speed;
     }

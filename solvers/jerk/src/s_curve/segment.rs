@@ -6,11 +6,12 @@ use feedplan_planner::problem::Fault;
 /// Range of lengths and limits, in which no product of three of them over- or underflows.
 const LEAST: f64 = 1e-12;
 const GREATEST: f64 = 1e15;
-/// At an end with an acceleration below the limit, what is left of the bend takes at least this part of the time of what
-/// is cut off, and at least this part of the length: shorter sections are rounding.
+/// At an end with an acceleration below the limit, the remaining part of the section with jerk takes at least the fraction `LEFT`
+/// of the time of the part that is cut off (see `section`), and at least the fraction `DIGITS` of the length: shorter sections
+/// would be only rounding.
 const LEFT: f64 = 1e-5;
 const DIGITS: f64 = 1e3 * f64::EPSILON;
-/// An acceleration below the limit by no more than this part is the limit.
+/// An acceleration below the limit by no more than this fraction counts as the limit.
 const AT_LIMIT: f64 = 1e-9;
 
 /// A segment of path. Both speeds are limits: `allowable` by the machine (`path_limits`), `desired` by the program.
@@ -32,7 +33,7 @@ pub struct Segment {
 pub struct SegmentEnd {
     /// In mm/s.
     pub speed: f64,
-    /// The size of the acceleration, in mm/s²: a segment begins speeding up and ends slowing down.
+    /// The absolute value of the acceleration, in mm/s²: a segment begins speeding up and ends slowing down.
     pub acceleration: f64,
 }
 
@@ -41,17 +42,17 @@ impl SegmentEnd {
         Self { speed, acceleration: 0.0 }
     }
 
-    /// What the acceleration has changed the speed by since it was 0, in mm/s.
+    /// The change of speed since the acceleration was 0, in mm/s.
     fn gained(&self, jerk: f64) -> f64 {
         0.5 * self.acceleration * self.acceleration / jerk
     }
 
-    /// The speed when the acceleration was 0, in mm/s: below 0 before a rest.
+    /// The speed when the acceleration was 0, in mm/s: below 0 if the end is at rest.
     pub fn before_cut(&self, jerk: f64) -> f64 {
         self.speed - self.gained(jerk)
     }
 
-    /// How far the motion has gone since then, in mm.
+    /// The length travelled since the acceleration was 0, in mm.
     fn cut_length(&self, jerk: f64) -> f64 {
         let time = self.acceleration / jerk;
         time * (self.speed - 2.0 / 3.0 * self.gained(jerk))
@@ -59,14 +60,14 @@ impl SegmentEnd {
 }
 
 impl Segment {
-    /// The length with what ends with an acceleration cut off, in mm.
+    /// The length of the segment plus the parts that are cut off at ends with an acceleration, in mm.
     pub fn uncut_length(&self, ends: [SegmentEnd; 2]) -> f64 {
         let [from, to] = ends.map(|end| end.cut_length(self.limits.jerk));
         self.length + from + to
     }
 
-    /// The time at an end that is left of the bend to or from its acceleration, in s, from the time of the whole bend; 0
-    /// where the acceleration is the limit.
+    /// The time in s that remains of the section with jerk at an end with an acceleration; `bend` is the time of the whole
+    /// section. 0 if the acceleration is the limit.
     pub fn bend_left(&self, end: SegmentEnd, bend: f64) -> f64 {
         let cut = end.acceleration / self.limits.jerk;
         if bend - cut > AT_LIMIT * cut {
@@ -76,7 +77,7 @@ impl Segment {
         }
     }
 
-    /// The least peak of the speed between two ends, in mm/s.
+    /// The least peak of the speed between two ends, in mm/s; infinite if an acceleration is above the limit.
     pub fn least_peak(&self, ends: [SegmentEnd; 2]) -> f64 {
         let Limits { acceleration, jerk } = self.limits;
         let [from, to] = ends.map(|end| {
@@ -92,7 +93,7 @@ impl Segment {
         from.max(to)
     }
 
-    /// Whether it can be crossed between two ends.
+    /// Whether the segment can be crossed between two ends.
     pub fn can_cross(&self, ends: [SegmentEnd; 2]) -> bool {
         let peak = self.least_peak(ends);
         let [from, to] = ends.map(|end| end.before_cut(self.limits.jerk));
@@ -112,7 +113,7 @@ impl Segment {
         self.speed().min(next.speed()).min(self.junction)
     }
 
-    /// Whether a speed can change to the other within its length, in either direction.
+    /// Whether a speed can change to the other within the segment's length, in either direction.
     #[inline]
     pub fn joins(&self, from: f64, to: f64) -> bool {
         self.limits.joins(from, to, self.length)

@@ -4,7 +4,7 @@
 //! acceleration rises to A_max = √(J ΔV) and falls at once, T = 2 A_max/J (4.9). Beyond, A is held between, and T =
 //! ΔV/A + A/J. The length in mm is (V₀ + V₁) T/2 either way; 4.14 and 4.15 are the case without constant acceleration.
 
-/// Most steps of `retreat`: they double, from one unit in the last place up to the whole number.
+/// Greatest number of steps of `retreat`: they double, from one unit in the last place up to the number itself.
 const RETREATS: usize = 60;
 /// Steps of Newton's method on a cubic, starting at most half above its root: five reach rounding.
 const CUBIC_STEPS: usize = 6;
@@ -95,7 +95,8 @@ fn cubic_root(a: f64, b: f64) -> f64 {
     p
 }
 
-/// The first speed that fits, from `speed` towards `safe`: a computed root has roundings of numbers of this size.
+/// The first speed that `fits`, searched from `speed` towards `safe`: a computed root has rounding errors of numbers of this
+/// `size`.
 pub fn retreat(speed: f64, safe: f64, size: f64, fits: impl Fn(f64) -> bool) -> f64 {
     let (mut speed, mut step) = (speed, f64::EPSILON * size);
     for _ in 0..RETREATS {
