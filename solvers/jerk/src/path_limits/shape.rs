@@ -150,11 +150,21 @@ impl Rounded {
         Self { function: if right { other } else { left }, ..*self }
     }
 
+    /// Contains the values on the whole part.
     fn range(&self) -> Interval {
         let (low, high) = self.function.range();
-        // The coefficients have a few roundings of numbers of this size.
-        let margin = 4.0 * f64::EPSILON * self.error + f64::MIN_POSITIVE;
-        Interval { lo: low - margin, hi: high + margin }
+        self.around(low, high)
+    }
+
+    /// Contains the value in the middle of the part.
+    fn middle(&self) -> Interval {
+        let value = self.function.value(0.5);
+        self.around(value, value)
+    }
+
+    fn around(&self, low: f64, high: f64) -> Interval {
+        let error = self.error + f64::MIN_POSITIVE;
+        Interval { lo: low - error, hi: high + error }
     }
 }
 
@@ -248,7 +258,8 @@ impl<const M: usize> Part<M> {
         bound: &mut Shape<M>,
     ) {
         let all = self.map(Rounded::range);
-        seen.include(&self.at(0.5));
+        // With their errors: where these are much of a bound, shorter parts make it no closer.
+        seen.include(&self.map(Rounded::middle));
         if depth == MAX_DEPTH || is_met(&all, seen) {
             bound.include(&all);
             return;
@@ -331,6 +342,19 @@ mod tests {
         assert!(shape.curvature < 1e-3 && shape.third[0] < 1e-3, "{shape:?}");
         let uniform = bounded(&plain(&[[1e3, 2.0], [1003.0, 6.0]]), 0.01);
         assert!((uniform.first[0][0] - 0.6).abs() < 1e-12 && uniform.curvature < 1e-12);
+    }
+
+    #[test]
+    fn a_bend_that_rounding_hides_is_within_its_bound() {
+        // The steps of the control polygon have the cross product 2⁶⁰ − (2⁶⁰ − 1) = 1, which is 0 in numbers of 53 bits.
+        let large = 2f64.powi(30);
+        let (from, to) = ([large, large - 1.0], [large + 1.0, large]);
+        assert_eq!(from[0] * to[1] - from[1] * to[0], 0.0);
+        let bend = [[0.0, 0.0], from, [from[0] + to[0], from[1] + to[1]]];
+        // |C' × C''|/|C'|³ at the start.
+        let curvature = 4.0 / (2.0 * from[0].hypot(from[1])).powi(3);
+        let bound = bounded(&plain(&bend), 0.1).curvature;
+        assert!(bound >= curvature && bound < 1e-12 / large, "{bound} for {curvature}");
     }
 
     #[test]
