@@ -6,7 +6,7 @@
 
 `plan` plans a program on a machine, `compare` plans it by several methods, `check` audits setpoints in files;
 `Client` does the same on a service. Units are millimetres, degrees and seconds. Wrong input raises a
-`FeedplanError`, one sentence with the remedy.
+`FeedplanError`, whose message is one sentence with the remedy.
 """
 
 from importlib import import_module
@@ -78,8 +78,9 @@ __all__ = [
 ]
 
 
-# The modules of the names, and their names there if they differ. Each is imported when a name of it is first
-# used: `import feedplan` takes no time, and Ctrl-C during the imports of a command ends in a sentence.
+# The modules of the public names, and the names there if they differ. A module is imported when one of its
+# names is first used: so `import feedplan` is fast, and Ctrl-C during the imports of a command ends with a
+# sentence.
 _PLACES = {
     "__version__": "feedplan._solvers",
     "Audit": "feedplan.audit",

@@ -1,5 +1,5 @@
-"""The command `feedplan`, and `python -m feedplan`: imports the command line, and ends as that does where
-Ctrl-C interrupts the imports."""
+"""The command `feedplan`, and `python -m feedplan`: imports and runs the command line; Ctrl-C during the
+imports also ends with a sentence."""
 
 import sys
 

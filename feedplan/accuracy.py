@@ -1,4 +1,4 @@
-"""Warnings about the accuracy of a plan: how much of the asked accuracy it reaches, and how much is
+"""Warnings about the accuracy of a plan: how much of the requested accuracy it reaches, how much is
 proven."""
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def shortfalls(
     """At most one sentence: the plan was stopped by its time limit [s]; or it does not reach the `accuracy`;
     or (if `to_prove`) it reaches the accuracy, but its lower bound does not prove that.
 
-    `lower_bound` [s] is a bound of the profile's time, from which the part `left_to_grids` that finer grids
-    may gain has been subtracted.
+    `lower_bound` [s] is a lower bound of the time; `left_to_grids` is the share of it that was subtracted
+    because finer grids may reduce the time.
     """
     slower = profile.time / lower_bound - 1.0 if lower_bound > 0 else math.inf
     most = f"the plan may be up to {percent(slower)} slower than the optimum"

@@ -23,7 +23,7 @@ _LONGEST = 60
 
 
 def shown(value: object) -> str:
-    """Any value as one short line."""
+    """A text for any value, on one short line."""
     try:
         text = " ".join(_SHOWN.repr(value).split())
     except ValueError:  # Python prints no integer of more than 4300 digits
@@ -32,7 +32,7 @@ def shown(value: object) -> str:
 
 
 def refuse(what: str, value: object, remedy: str) -> InputError:
-    """The error of a value that cannot be used: `the feed is -1: give a positive feed [mm/s]`."""
+    """The error for a value that cannot be used: `the feed is -1: give a positive feed [mm/s]`."""
     return InputError(f"{what} is {shown(value)}: give {remedy}")
 
 
@@ -53,7 +53,7 @@ def is_text(value: object) -> bool:
 
 
 def printable(text: str) -> str:
-    """The text with a replacement character for each byte of a file's name that is not UTF-8."""
+    """The text with a replacement character for each byte of a file name that is not UTF-8."""
     return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
@@ -96,7 +96,7 @@ def whole(value: object, what: str, remedy: str, least: int = 1, most: float = m
 
 
 def flag(value: object, what: str) -> bool:
-    """True or False, also numpy's; raises InputError for anything else."""
+    """True or False, also NumPy's; raises InputError for anything else."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     raise refuse(what, value, "True or False")

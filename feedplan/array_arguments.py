@@ -1,4 +1,4 @@
-"""Checks arrays of users, of curves and of places and times along them: type, shape and range."""
+"""Checks users' arrays of control points, places and times: type, shape and range."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_AXES = 9
 
 
 def point_array(control_points: ArrayLike, weights: ArrayLike | None) -> tuple[Floats, Floats | None]:
-    """Control points (n, axes), of one axis also (n,), and their weights."""
+    """Control points as (n, axes), where (n,) counts as one axis, and their weights."""
     control = floats(control_points, "control points")
     if control.ndim == 1:
         control = control[:, None]
@@ -33,7 +33,7 @@ def point_array(control_points: ArrayLike, weights: ArrayLike | None) -> tuple[F
 
 
 def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], Floats]:
-    """Pieces and parameters of places (m,)."""
+    """Pieces and parameters of places, both as arrays (m,)."""
     pieces, at = whole_numbers(piece, "pieces"), floats(u, "parameters")
     refuse_where(pieces < 0, lambda i: f"place {i} is on piece {pieces[i]}: pieces are counted from 0")
     if at.ndim > 1 or len({len(pieces), len(at)} - {1}) > 1:
@@ -46,7 +46,7 @@ def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], Floats]:
 
 
 def whole_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
-    """An array (n,) of whole numbers of any type; one number is an array of one."""
+    """An array (n,) of whole numbers of any type; a single number gives an array of one."""
     try:
         given = np.atleast_1d(np.asarray(values))
     except ValueError:  # lists of different lengths
@@ -59,11 +59,11 @@ def whole_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> Floats:
-    """A C-contiguous array of numbers, of `dimensions` dimensions if that is given."""
+    """A C-contiguous array of numbers, with `dimensions` dimensions if given."""
     try:
         given = np.asarray(values)
-        # Objects may be numbers, such as fractions. NumPy alone would accept texts and truth values too.
-        # Masked values of an array are not numbers.
+        # Objects may be numbers, such as fractions, so they are checked one by one; NumPy would also accept
+        # texts and truth values. Masked values are not numbers.
         if (
             given.dtype.kind not in "iufO"
             or (given.dtype.kind == "O" and not all(map(is_number, given.flat)))
@@ -79,23 +79,23 @@ def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> Float
 
 
 def within(given: ArrayLike, name: str, end: float, unit: str) -> Floats:
-    """A number or numbers (n,) from 0 to `end`, each a time or a length as `name` says."""
+    """A number or numbers (n,) from 0 to `end`; `name` says what they are. Raises InputError for others."""
     try:
         values = floats(given, name).reshape(np.shape(given))
     except InputError:
         raise InputError(f"the {name} is {shown(given)}: give a number or a list of numbers") from None
     if values.ndim > 1:
         raise InputError(f"the {name}s have {values.ndim} dimensions: give a number or a list of numbers")
-    # The end of a plan or path may differ by the rounding of its sum.
+    # The end of a plan or path is a sum, which may differ by rounding.
     outside = ~((values >= 0.0) & (values <= end * (1.0 + 1e-12)))
     if outside.any():
         worst = float(values[outside].flat[0])
-        # So many digits that a value just beyond the end differs from it.
+        # Enough digits to distinguish a value just beyond the end from the end.
         raise InputError(f"the {name} is {worst:.13g} {unit}: give one from 0 to {end:.13g} {unit}")
     return values
 
 
 def refuse_where(bad: Flags, sentence: Callable[[int], str]) -> None:
-    """Raises the sentence for the first index that is bad."""
+    """Raises InputError with the sentence for the first index where `bad` is true."""
     if bad.any():
         raise InputError(sentence(int(bad.argmax())))

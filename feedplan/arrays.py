@@ -1,4 +1,4 @@
-"""Arrays in records: types of real numbers, whole numbers and truth values, and what makes them read-only.
+"""Arrays in records: types for real numbers, whole numbers and truth values; making them read-only.
 
 Docstrings give shapes and units.
 """
@@ -16,7 +16,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 
 
 def lock_arrays(record: object) -> None:
-    """Makes the arrays of a record read-only: whoever writes into one gets an error of NumPy."""
+    """Makes the arrays of a record read-only: writing into them raises NumPy's error."""
     for name, value in vars(record).items():
         if isinstance(value, np.ndarray) and value.flags.writeable:
             view = value.view()

@@ -1,7 +1,7 @@
-"""Checks setpoints in files: their columns against each other, against plan.json, and by the audit.
+"""Checks setpoints in files: that their columns are consistent, that they match plan.json, and the audit.
 
-The folder of a plan is complete: plan.json holds the machine, and describes the setpoints that belong to the
-plan. Other setpoints need only a machine.
+The folder of a plan suffices: plan.json contains the machine, and describes the setpoints of the plan. For
+other setpoints a machine must be given.
 """
 
 from __future__ import annotations
@@ -39,14 +39,15 @@ def check(
     jerk: bool = False,
     progress: Progress | None = None,
 ) -> Audit:
-    """Audits setpoints from files alone: `place` is a file of setpoints or the folder of a plan.
+    """Audits setpoints from files: `place` is a file of setpoints or the folder of a plan.
 
-    If plan.json is in the folder of the setpoints, they must be those of that plan. `machine`, a machine or
-    the name or file of one, replaces the machine of the plan. `resolution` [mm] is the last digit of rounded
+    If plan.json is in the folder of the setpoints, they must be those of that plan. `machine` (a Machine, or
+    its name or file) replaces the machine of the plan. `resolution` [mm] is the last digit of rounded
     positions. Jerk is judged if the plan's method limits it or `jerk` is true. Events of the program must be
-    in order and within the time, and the tool at rest at those that stop it. `progress(stage, done)` is
-    called with `read`, then `audit`, and the part of the stage that is done; an exception from it ends the
-    check. Raises InputError for files that cannot be read, contradict each other or were changed.
+    in order and within the time of the setpoints, and the tool must be at rest at events that stop it.
+    `progress(stage, done)` is called with `read`, then `audit`, and the finished share of the stage; an
+    exception from it ends the check. Raises InputError for files that cannot be read, contradict each other
+    or were changed.
     """
     resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
     jerk = flag(jerk, "jerk")
@@ -79,15 +80,15 @@ def check(
         audit = audit_knots(points, known, **how)
     else:
         audit = audit_setpoints(points, known, period=period, **how)
-    if audit.ok:  # events are not checked against setpoints that fail
+    if audit.ok:  # events are only checked against good setpoints
         require_events(points.file, points.events, points, resolution, ROUNDING * period)
     return audit
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """The data of plan.json about its setpoints and knots: number, last time [s] and period or longest step
-    [s] of each kind of `rows` that it has; hashes of the `events` for each kind."""
+    """The data of plan.json about its setpoints and knots. For each kind of rows in the plan: `rows` are
+    their number, last time [s], and period or longest step [s]; `events` are the hashes of the events."""
 
     file: FilePath
     machine: Machine
@@ -129,7 +130,7 @@ def _read(file: FilePath) -> _Plan:
     if KNOTS in summary:
         knots = _Entries(file, entries.take(KNOTS, dict), "knots ")
         rows[KNOTS] = knots.take("count", int), time, knots.number("step", positive)
-    # The setpoints wait less than one period in each run and in the pause before the first.
+    # Setpoints add a pause of less than one period to each run, and to the pause before the first run.
     if not time * (1.0 - ROUNDING) <= duration <= time + (entries.take("runs", int) + 1) * period:
         raise InputError(
             f"{file}: the time is {time:.9g} s, its setpoints take {duration:.9g} s: "
@@ -182,7 +183,7 @@ class _Entries:
         return value
 
     def number(self, name: str, within: Callable[[float], bool] = not_negative) -> float:
-        """A number for which `within` is true."""
+        """An entry that is a number for which `within` is true. Raises InputError for others."""
         value: Any = self._table.get(name)
         if not (is_number(value) and within(value)):
             raise InputError(f"{self._file}: {self._place}{name} is {shown(value)}: plan again")
@@ -203,7 +204,7 @@ def _require_same(plan: _Plan, points: SetpointFile) -> None:
         if own != planned:
             raise _other(points, plan, what, f"{own}{unit}", f"{planned}{unit}")
     last = float(points.t[-1])
-    # The audit reports a time that is not finite, with its row.
+    # The audit reports a time that is not finite, and its row.
     if math.isfinite(last) and abs(last - duration) > ROUNDING * max(duration, period):
         raise _other(points, plan, "last time", f"{last:.9g} s", f"{duration:.9g} s")
     if points.events.sha256() != plan.events[points.rows]:

@@ -1,6 +1,6 @@
-"""Plans one program by several methods: time, proven gap, computing time, worst use of every limit.
+"""Plans one program by several methods; compares time, proven gap, computing time, worst use of limits.
 
-Methods may follow different paths within the tolerance; a lower bound holds for its own path alone.
+Methods may follow different paths within the tolerance; a lower bound holds only for its own path.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from feedplan.program.source import Source
 from feedplan.progress import Progress
 from feedplan.today import Today
 
-# The names of the limits of machine and program in an audit.
+# The names of the machine's and the program's limits in an audit.
 LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
 
-# Time limit of each method unless the user gives one [s]; solvers on meshes could need hours.
+# Time limit of each method if the user gives none [s]; solvers on meshes may take hours.
 TIME_LIMIT = 10.0
 
 # Begin and end of each stage in the progress of one method (0 to 1).
@@ -41,9 +41,9 @@ STAGES = {"fit": (0.0, 0.2), "plan": (0.2, 0.6), "audit": (0.6, 1.0)}
 
 @dataclass(frozen=True)
 class Row:
-    """One method: its plan and audit, or a sentence that tells why it has no plan.
+    """The result of one method: its plan and audit, or a sentence why it has no plan.
 
-    `lower_bound` [s] is the greatest one that any method has proven on this method's path.
+    `lower_bound` [s] is the greatest lower bound that any method has proven on this method's path.
     """
 
     method: MethodName
@@ -58,14 +58,14 @@ class Row:
 
     @property
     def saved(self) -> float | None:
-        """The controller's time of today less the plan's [s]; None without a controller."""
+        """The time of today's controller minus the plan's time [s]; None without a controller."""
         return self.plan.today.saved if self.plan and self.plan.today else None
 
     @property
     def gap(self) -> float | None:
-        """(time − lower_bound) / time, an upper limit of the part of the time that could be saved.
+        """(time − lower_bound) / time, an upper bound of the share of the time that could be saved.
 
-        None without a plan, and if limits are broken: such a plan may be faster than the bound.
+        None without a plan, or if the plan breaks limits: it may then be faster than the bound.
         """
         if self.plan is None or not self.plan.audit().ok:
             return None
@@ -106,10 +106,10 @@ def compare(
 ) -> tuple[Row, ...]:
     """Plans one program by each of the methods (None: all) and audits every plan.
 
-    `source`, `machine` and `options` are as for `feedplan.plan`; each method gets those of the options that
-    it takes. `time_limit` [s] is the limit of each method (None: no limit). The row of a method that finds no
-    plan, or whose package is missing, has an error. `progress(method, done)` is called with the part of a
-    method that is done. Raises the errors of `feedplan.plan` about program, machine and options.
+    `source`, `machine` and `options` are those of `feedplan.plan`; each method gets only the options that it
+    takes. `time_limit` [s] is the limit of each method (None: no limit). The row of a method that finds no
+    plan, or whose package is missing, has an error. `progress(method, done)` is called with the finished
+    share of a method. Raises the errors of `feedplan.plan` about program, machine and options.
     """
     chosen = (
         all_methods() if methods is None else list_of_names(methods, "methods", "a list of methods' names")
@@ -158,7 +158,7 @@ def _show(progress: Progress | None, method: str, stage: str, done: float) -> No
 
 
 def _greatest_bound(row: Row, rows: Sequence[Row]) -> float:
-    """The greatest lower bound of all plans that holds for the plan of a row; 0 without one."""
+    """The greatest lower bound of all `rows` that holds for the plan of a row; 0 if there is none."""
     bounds = (
         other.lower_bound for other in rows if row.plan and other.plan and _bounds(other.plan, row.plan)
     )
@@ -166,8 +166,8 @@ def _greatest_bound(row: Row, rows: Sequence[Row]) -> float:
 
 
 def _bounds(other: Plan, made: Plan) -> bool:
-    """Whether the lower bound of `other` holds for `made`: both follow the same path, and `made` keeps the
-    limits of jerk if `other` does."""
+    """Whether the lower bound of `other` holds for `made`: both follow the same path, and `made` keeps jerk
+    limits if `other` does."""
     same_path = np.array_equal(made.path.curve.control_points, other.path.curve.control_points)
     same_stops = np.array_equal(made.problem.junction_speed, other.problem.junction_speed)
     return same_path and same_stops and limits_jerk(made.method) >= limits_jerk(other.method)

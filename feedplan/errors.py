@@ -1,4 +1,4 @@
-"""The errors feedplan raises: one sentence with the place, the value, the limit and the remedy."""
+"""The errors that feedplan raises: one sentence with the place, the value, the limit and the remedy."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from typing import ClassVar, Literal
 
 ErrorKind = Literal["program", "machine", "package", "infeasible", "solver", "input"]
 
-# Longest sentence, and longest word in it if it is too long: the middle of long words, such as paths, is left
-# out first, then the middle of the sentence.
+# The greatest lengths of a sentence, and of a word in a sentence that is too long: the middle of long words,
+# such as paths, is left out first, then the middle of the sentence.
 LONGEST, LONGEST_WORD = 300, 60
 
 
 class FeedplanError(Exception):
-    """Base of every error that feedplan raises on purpose; its text, one line, is meant for the user.
+    """Base class of every error that feedplan raises on purpose; its text is one line for the user.
 
-    `line` is the source line of the program that it is about, from 1, or None. `kind` names the class in the
-    outcomes of jobs and in the problems of the service.
+    `line` is the source line of the program that the error is about, from 1, or None. `kind` is the name of
+    the class in the outcomes of jobs and in the problems of the service.
     """
 
     kind: ClassVar[ErrorKind] = "input"
@@ -34,13 +34,13 @@ def at_line(line: int) -> str:
 
 
 def _shortened(text: str, most: int) -> str:
-    """The text; if it has more than `most` characters, its start and a longer part of its end."""
+    """The text; if it is longer than `most` characters, only its start and a longer part of its end."""
     start = (most - 3) // 3
     return text if len(text) <= most else f"{text[:start]}...{text[start + 3 - most :]}"
 
 
 def unreadable(what: object, error: Exception, remedy: str) -> str:
-    """The sentence on a file that cannot be read: `part.ngc cannot be read (no such file): give …`."""
+    """The sentence for a file that cannot be read: `part.ngc cannot be read (no such file): give …`."""
     return f"{what} cannot be read ({getattr(error, 'strerror', None) or error}): give {remedy}"
 
 
@@ -49,7 +49,7 @@ class InputError(FeedplanError):
 
 
 class ProgramError(InputError):
-    """A part program cannot be understood; `line` is None where the whole file is meant."""
+    """A part program cannot be understood; `line` is None if the error is about the whole file."""
 
     kind = "program"
 
@@ -78,6 +78,6 @@ class SolverError(FeedplanError):
 
 
 class MissingPackageError(FeedplanError):
-    """An optional package is not installed; the text carries the command that installs it."""
+    """An optional package is not installed; the text has the command that installs it."""
 
     kind = "package"

@@ -1,9 +1,9 @@
-"""Where events of a program are on the path that is followed, and when a profile takes the tool there.
+"""Finds where a program's events are on the followed path, and when a profile reaches these places.
 
-An event belongs to the end of the move before it. Where the program stops there, that is the end of a
-run, and events follow each other there, each dwell taking its time. Elsewhere it is where the path goes
-from one move to the next or, where one piece follows both as at a rounded corner or along fitted points,
-the place of it that is nearest to the programmed point.
+An event belongs to the end of the move before it. If the program stops there, this is the end of a run, and
+the events there follow each other, each dwell taking its time. Otherwise the place is where the path changes
+from one move to the next. Where one piece follows both moves, as at a rounded corner or along fitted points,
+it is the place of the piece that is nearest to the programmed point.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from feedplan.geometry.path import Path
 from feedplan.program.actions import actions
 from feedplan.program.program import Program
 
-# Places of a piece that are tried, and steps from the nearest of them to the nearest place.
+# Number of places tried on a piece, and of Gauss-Newton steps from the nearest of them to the nearest place.
 _TRIED, _STEPS = 9, 8
-# A step shorter than this part of a piece ends the search.
+# A step shorter than this share of a piece ends the search.
 _FOUND = 1e-9
 # Number of pairs of a programmed point and a piece that are searched at once.
 _AT_ONCE = 100_000
@@ -33,14 +33,14 @@ class PlannedEvents:
         self._placed: list[PlacedEvents] = []
 
     def __call__(self, motion: Sampler) -> PlacedEvents:
-        """By the runs of the path, found once; `motion` reads the plan's motion, whatever its period is."""
+        """The events by the runs of the path, computed once; `motion` samples the plan, at any period."""
         if not self._placed:
             self._placed.append(place_events(self._program, self._path, motion))
         return self._placed[0]
 
 
 def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
-    """The events of a program on the path that follows it, by a reader of the motion planned for it."""
+    """The events of a program on the path that follows it; `motion` samples the planned motion."""
     events = program.events
     starts, _, times = motion.runs.T
     moves, of_move = np.unique(events.move, return_inverse=True)
@@ -51,12 +51,12 @@ def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
     reached = motion.along(piece[passing].astype(np.uint32), u[passing])[0]
     after[passing] = reached - starts[run[passing]]
     done = actions(events)
-    # Dwells belong to stops; those before an event of the same stop have passed.
+    # Dwells are at stops; an event comes after the dwells before it at the same stop.
     waits = np.where(done.kind == "dwell", done.value, 0.0)
     passed = np.cumsum(waits) - waits
     passed -= passed[np.searchsorted(events.move, moves)][of_move]
     run, after = run[of_move], after[of_move] + passed
-    # Nearest places may go back by a little where the path is close to itself: no event comes before another.
+    # Nearest places may be slightly out of order where the path is close to itself: no event is moved back.
     time = np.concatenate(([0.0], starts))[run + 1] + after
     is_latest = time == np.maximum.accumulate(time)
     source = np.maximum.accumulate(np.where(is_latest, np.arange(len(time)), 0))
@@ -68,16 +68,16 @@ def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
 
 
 def _places(program: Program, path: Path, moves: Integers) -> tuple[Integers, Integers, Floats]:
-    """Run, piece and parameter where the path has followed the first `moves` (k,) moves, sorted.
+    """Run, piece and parameter (k,) at which the path has followed the first `moves` (k,), sorted.
 
-    The piece is −1 where that is a stop, at the end of the run, or at the start of the path for run −1.
+    The piece is −1 at a stop, which is the end of the run, or the start of the path for run −1.
     """
     first, last = path.move[:, 0], path.move[:, 1]
-    # The pieces from `low` on follow later moves too, those from `high` on later moves alone.
+    # Pieces from `low` on also follow later moves; pieces from `high` on only follow later moves.
     low = np.searchsorted(last, moves - 1, side="right")
     high = np.searchsorted(first, moves - 1, side="right")
     shared = (low < high) & (moves > 0)
-    # Where no piece is shared, the place is the end of the piece before.
+    # Where no piece follows moves on both sides, the place is the end of the piece before.
     run = np.searchsorted(path.runs[1:], np.maximum(low - 1, 0), side="right")
     ends = ~shared & ((moves == 0) | (low == path.runs[1:][np.minimum(run, len(path.runs) - 2)]))
     piece = np.where(ends, -1, low - 1)
@@ -91,7 +91,7 @@ def _places(program: Program, path: Path, moves: Integers) -> tuple[Integers, In
 
 
 def nearest(path: Path, points: Floats, low: Integers, high: Integers) -> tuple[Integers, Floats]:
-    """The nearest places to points (k, axes), each on the pieces from `low` up to `high` (k,)."""
+    """The places nearest to points (k, axes), each on the pieces from `low` to before `high` (k,)."""
     piece, u = np.empty(len(points), np.int64), np.empty(len(points))
     offsets = np.concatenate(([0], np.cumsum(high - low)))
     start = 0
@@ -113,7 +113,7 @@ def _nearest_of(path: Path, points: Floats, low: Integers, count: Integers) -> t
     away = np.linalg.norm(places - np.repeat(points[owner], _TRIED, axis=0), axis=1).reshape(-1, _TRIED)
     nearest = away.argmin(axis=1)
     away = away.min(axis=1)
-    # The first of each owner's pieces that are nearest.
+    # For each point, the first of its pieces with the least distance.
     least = np.minimum.reduceat(away, begins)
     leading = np.flatnonzero(away == least[owner])
     best = leading[np.searchsorted(owner[leading], np.arange(len(points)))]

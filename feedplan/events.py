@@ -1,4 +1,4 @@
-"""Events: actions of a machine that are not moves, with their time and line of the program."""
+"""Events: actions of a machine that are not moves, with their time and source line."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Event(NamedTuple):
     text: str
 
 
-# Of the columns of events but the text.
+# Types of the columns of events, except the text.
 _DTYPES = (np.float64, np.int32, np.str_, np.float64, np.float64, np.bool_)
 
 
@@ -37,11 +37,11 @@ _DTYPES = (np.float64, np.int32, np.str_, np.float64, np.float64, np.bool_)
 class TimedEvents:
     """Events in the order of time, one row each.
 
-    `time` (m,) [s], by the clock of the plan or of the setpoints that the events belong to; `line` (m,)
-    source line; `kind`, `channel` and `value` (m,) as in `feedplan.program.actions`, NaN if there is none;
-    `stops` (m,) is true if the tool stops for the event; `text` (m,) the word of the program, such as `M62
-    P3`, or the text of a message or comment. The value of a dwell is its duration [s], which begins at
-    `time`.
+    `time` (m,) [s] is measured by the clock of the plan or of the setpoints that the events belong to; `line`
+    (m,) is the source line; `kind`, `channel` and `value` (m,) are as in `feedplan.program.actions`, NaN if
+    there is none; `stops` (m,) is true if the tool stops for the event; `text` (m,) is the word of the
+    program, such as `M62 P3`, or the text of a message or comment. The value of a dwell is its duration [s],
+    which begins at `time`.
     """
 
     time: Floats
@@ -54,7 +54,7 @@ class TimedEvents:
 
     @classmethod
     def of(cls, rows: Iterable[Event]) -> TimedEvents:
-        """From rows."""
+        """Makes events from rows."""
         *columns, text = list(zip(*rows, strict=True)) or [()] * len(Event._fields)
         arrays: list[Any] = [np.array(column, own) for column, own in zip(columns, _DTYPES, strict=True)]
         return cls(*[*arrays, tuple(text)])
@@ -83,7 +83,7 @@ class TimedEvents:
         return {kind: found[kind] for kind in KINDS if kind in found}
 
     def sha256(self) -> str:
-        """A hash of all columns, to the last digit."""
+        """A hash of all columns, with all digits of the numbers."""
         digest = hashlib.sha256()
         for numbers in (self.time, self.line, self.channel, self.value, self.stops):
             values = numbers.astype("<f8")
@@ -94,9 +94,9 @@ class TimedEvents:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlacedEvents:
-    """The events of a plan by the runs between its stops: `run` (m,) of each event, −1 before the first run,
-    and its time `after` (m,) the start of that run [s]; `starts` (runs,) [s] of the runs by the plan's own
-    clock. The times of `events` are not set."""
+    """The events of a plan, relative to the runs between its stops: `run` (m,) of each event, −1 before the
+    first run, and its time `after` (m,) the start of that run [s]; `starts` (runs,) [s] of the runs on the
+    plan's own clock. The times of `events` are not set."""
 
     events: TimedEvents
     run: Integers
@@ -104,13 +104,13 @@ class PlacedEvents:
     starts: Floats
 
     def on(self, starts: Floats) -> TimedEvents:
-        """The events by a clock on which the runs start at these times (runs,) [s]."""
+        """The events on a clock on which the runs start at the times `starts` (runs,) [s]."""
         time = np.concatenate(([0.0], starts))[self.run + 1] + self.after
-        # By rounding a run may start before the end of the run before it.
+        # Because of rounding a run may start before the end of the run before it.
         return replace(self.events, time=np.maximum.accumulate(time))
 
     def timed(self) -> TimedEvents:
-        """The events by the plan's own clock."""
+        """The events on the plan's own clock."""
         return self.on(self.starts)
 
 

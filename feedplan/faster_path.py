@@ -1,9 +1,9 @@
-"""A faster path within the tolerance: fitted anew to the speed of a plan, and kept where it is faster.
+"""Finds a faster path within the tolerance: it is fitted to the speed of a plan, and used where it is faster.
 
-A path that is fitted without knowing the speed spreads each bend evenly. Fitted to the speed of a plan it
-bends where the tool is slow and is smooth where it is fast; later fits go on from the best path along the
-gradient of its least time (`refit`). Between two stops that both paths have, the tool is at rest at the same
-places, so each of these sections can follow the path on which it takes less time.
+A path that is fitted without knowing the speed distributes each bend evenly. A path that is fitted to the
+speed of a plan bends where the tool is slow and is smooth where it is fast. Later fits start from the best
+path and take a step along the gradient of its least time (`refit`). At stops that both paths have, the tool
+rests at the same places, so each section between two of them can follow the path on which it takes less time.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from feedplan.path_gradient import path_gradient
 from feedplan.profile import SpeedProfile, joined_runs
 from feedplan.refit import FitLimits, along_gradient, at_speed_of, promise
 
-# The most rounds: later ones hardly gain.
+# The greatest number of rounds: later ones save hardly any time.
 MAX_ROUNDS = 3
-# A path is fitted anew only if some run takes longer, by more than this part, than it would at the feed and
-# at the greatest speeds of the axes.
+# A path is fitted again only if some run takes longer, by more than this share, than it would at the feed and
+# the axes' greatest speeds.
 _WORTH_TRYING = 1e-3
-# Times of a section that differ by less than this part count as equal (rounding).
+# Times of a section that differ by less than this share count as equal (rounding).
 _ROUNDING = 1e-9
-# A step along the gradient is planned only if it promises to save this part of the time.
+# A step along the gradient is planned only if its predicted saving exceeds this share of the time.
 _PROMISING = 1e-5
-# Where a step does not gain, the next one is shorter by this factor.
+# Where a step does not save time, the next step is shorter by this factor.
 _SHORTER = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A path, the problem along it and a profile of it."""
+    """A path, the problem along it and a speed profile for it."""
 
     path: Path
     problem: Problem
@@ -55,11 +55,12 @@ class Followed:
 
 @dataclass(frozen=True)
 class Gain:
-    """What paths fitted to the speed gained.
+    """The time saved by paths that are fitted to the speed.
 
-    `times` [s]: along the path as fitted, and after each round; `promised` [s]: what each step along the
-    gradient promised to save, and what one more promises; `sections` between the stops that both paths of
-    the last round have, and in how many of them the new one was `faster`."""
+    `times` [s]: along the first path, and after each round; `promised` [s]: the predicted saving of each step
+    along the gradient, and of one more step; `sections`: number of sections between the stops that both paths
+    of the last round have; `faster`: number of sections in which the new path was faster.
+    """
 
     times: tuple[float, ...]
     promised: tuple[float, ...]
@@ -72,7 +73,7 @@ class Gain:
         return self.times[0] - self.times[-1]
 
     def to_json(self) -> dict[str, Any]:
-        """The numbers by name, as plan.json has them."""
+        """The numbers by name, as in plan.json."""
         return {**asdict(self), "gained": self.gained}
 
 
@@ -84,19 +85,19 @@ def faster(
     join: Callable[[Path], Problem],
     rounds: int,
 ) -> tuple[Followed, Gain]:
-    """The first plan, each section on the path on which it takes least time.
+    """The first plan, with each section on the path on which it takes least time.
 
-    The first of the `rounds` fits a path to the speed of the first plan, each later one goes a step along the
-    gradient from the best; where the axes are not those of the path, it fits to the speed of the best. `fit`
-    makes a path for a motion and `follow` plans it; `join` states the problem along a path.
+    The first of the `rounds` fits a path to the speed of the first plan; each later round goes a step along
+    the gradient from the best path, or, where the joints are not the path's axes, fits to the speed of the
+    best plan. `fit` makes a path for a motion, `follow` plans it, and `join` makes the problem along a path.
     """
     best, times, promised = first, [first.time], list[float]()
     sections, count, stopped = _Sections(first.path, first.path), 0, first.profile.stopped
-    # The length of the next step, by move.
+    # The length of the next step for each move.
     step = np.ones(int(first.path.move.max()) + 1)
     # Where no plan is found along a new path, the best one so far is kept.
     with suppress(InfeasibleError, SolverError):
-        # The turn after the last round only computes what one more step promises.
+        # After the last round, one more turn only computes the predicted saving of one more step.
         for turn in range(rounds + (rounds > 1)):
             if stopped or not (_excess(best) > _WORTH_TRYING).any():
                 break
@@ -131,7 +132,7 @@ def faster(
 def _stepped(
     best: Followed, limits: FitLimits, step: Floats, fit: Callable[[Motion], Path]
 ) -> tuple[Path, float]:
-    """The path a step along the gradient from the best, and what it promises to save [s]."""
+    """The path after a step along the gradient from the best path, and its predicted saving [s]."""
     along, gradient = best.problem.path, path_gradient(best.problem, best.profile, limits.jerk)
     length = step[along.move[gradient.piece, 0]]
     path = fit(along_gradient(along, gradient, limits, length))
@@ -139,7 +140,8 @@ def _stepped(
 
 
 class _Sections:
-    """What lies between the stops that two paths of one program have: offsets of runs in both, last moves."""
+    """The sections between the stops that two paths of one program both have: `runs` are their offsets in the
+    runs of both paths, `last` is the last move of each section."""
 
     def __init__(self, first: Path, other: Path) -> None:
         ends = [_stops(path) for path in (first, other)]
@@ -162,7 +164,7 @@ def _last_moves(path: Path) -> Integers:
 
 
 def _stops(path: Path) -> Integers:
-    """The moves at whose end the tool stops, but for the last; stops within a move do not count."""
+    """The moves at whose ends the tool stops, except the last move; stops within a move are ignored."""
     last, after = _last_moves(path)[:-1], path.move[path.runs[1:-1], 0]
     return np.asarray(last[after > last])
 
@@ -172,7 +174,7 @@ def _sums(values: Floats, offsets: Integers) -> Floats:
 
 
 def _excess(followed: Followed) -> Floats:
-    """By how much each run takes longer than at the feed and the axes' greatest speeds, as a part."""
+    """(time of each run) / (its time at the feed and the axes' greatest speeds) − 1."""
     problem, path = followed.problem, followed.problem.path
     control, offsets = path.curve.control_points, path.curve.offsets
     way = np.abs(control[offsets[1:] - 1] - control[offsets[:-1]])
@@ -189,7 +191,7 @@ def _joined(
     better: Flags,
     join: Callable[[Path], Problem],
 ) -> Followed:
-    """Each section as one of two plans has it."""
+    """The plan that takes each section from one of two plans: from `other` where it is `better`."""
     both = (first, other)
     changes = np.flatnonzero(np.diff(better)) + 1
     taken = [
@@ -210,17 +212,17 @@ def _joined(
             bounds = np.concatenate([each.profile.run_bounds[runs] for each, runs in taken])
             excess = max(each.profile.excess for each, _ in taken)
             return Followed(path, problem, joined_runs(moved, excess=excess, run_bounds=bounds))
-    # Feeds or joints make other pieces of both paths together.
+    # Feeds or joints divide the joined path into other pieces: the faster plan is used as a whole.
     return min(both, key=lambda each: each.time)
 
 
 def _pieces(path: Path, runs: slice) -> slice:
-    """The pieces of some runs."""
+    """The range of the pieces of a range of runs."""
     return slice(int(path.runs[runs.start]), int(path.runs[runs.stop]))
 
 
 def _joined_path(taken: list[tuple[Path, slice]], first: Path, other: Path) -> Path:
-    """Runs of two paths one after the other."""
+    """A path from runs of two paths, in order."""
     pieces = [(path, _pieces(path, runs)) for path, runs in taken]
 
     def columns(rows: list[tuple[Path, slice]], *names: str) -> dict[str, Any]:

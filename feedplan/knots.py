@@ -1,4 +1,4 @@
-"""Knots of a plan: its states at equal steps between stops, and at every stop exactly."""
+"""Knots of a plan: its states at equal time steps between stops, and exactly at every stop."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
 from feedplan.setpoints import MAX_SETPOINTS, SetpointChunk, chunks
 
-# Least number of steps of a run: with two the knot between its ends has the speed.
+# Least number of steps of a run: with two steps, the knot between its ends can have a speed.
 LEAST_STEPS = 2
 
 
 class Knots:
-    """The states by the plan's own clock, computed as they are read.
+    """The states on the plan's own clock, computed when they are read.
 
-    A run is divided into equal steps, none longer than `step` [s] and two at least, and a pause is a step of
-    its own: the last of `count` knots is at the plan's time, `duration` [s]. At a stop velocity, acceleration
-    and jerk are 0.
-    Raises InputError for a step that cannot be used, or one that makes more than `most` knots.
+    A run is divided into equal steps, none longer than `step` [s] and at least two; a pause is one step. The
+    last of the `count` knots is at the plan's time, `duration` [s]. At a stop velocity, acceleration and jerk
+    are 0. Raises InputError for a step that cannot be used, or that makes more than `most` knots.
     """
 
     def __init__(
@@ -34,7 +33,7 @@ class Knots:
         self._origin = problem.joint_origin
         self._ends_at_rest = problem.end_speed == 0.0
         begins, _, times = self._sampler.runs.T
-        # Pauses and runs in turn; one of no time has no step.
+        # Pauses and runs in turn; a pause or run of duration 0 has no step.
         self._begin, self._time = np.zeros((2, 2 * len(times) + 1))
         self._begin[1::2], self._begin[2::2] = begins, begins + times
         self._time[0::2] = np.append(problem.path.start_dwell, problem.path.dwell)
@@ -61,12 +60,12 @@ class Knots:
 
     def _chunk(self, start: int, stop: int) -> SetpointChunk:
         index = np.arange(start, stop)
-        # A knot ends a step of this part; the very first one begins the first.
+        # The part whose step ends at the knot; the very first knot belongs to the first part.
         part = np.searchsorted(self._ends, np.maximum(index, 1), side="left")
         left, steps = self._ends[part] - index, self._steps[part]
         begin, time = self._begin[part], self._time[part]
         t = begin + time * ((steps - left) / steps)
-        # Through a pause the place is that in which it begins.
+        # During a pause the position is that at its beginning.
         pausing = part % 2 == 0
         states = self._sampler.at(np.where(pausing, begin, t))
         _, position, velocity, acceleration, jerk, line, piece, u, *_ = states

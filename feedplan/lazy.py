@@ -1,7 +1,7 @@
 """`functools.cached_property` without its lock.
 
 Before Python 3.12 all objects of a class share that lock, which is held while a value is computed: objects
-wait for each other, and a process that is forked at that time waits for ever. Without the lock two threads
+wait for each other, and a process that is forked at that time waits forever. Without the lock, two threads
 may compute a value twice.
 """
 
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 class cached_property(Generic[T]):  # noqa: N801
-    """A value computed by a method when it is first asked for, kept in the object."""
+    """A value that a method computes when it is first read; it is kept in the object."""
 
     def __init__(self, make: Callable[[Any], T]) -> None:
         self._make = make

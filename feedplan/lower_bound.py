@@ -7,7 +7,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 
-# A profile keeps the limits only up to rounding, so it may be faster than the exact optimum by this part of
+# A profile keeps the limits only up to rounding, so it may be faster than the exact optimum by this share of
 # its time.
 ROUNDING = 1e-9
 
@@ -16,9 +16,9 @@ def lower_bound(problem: Problem, profile: SpeedProfile, progress: Listener | No
     """A proven lower bound of the time in motion along the problem's path, without dwells [s].
 
     No profile that keeps the limits of velocity, acceleration, feed, chord error and junction speed is
-    faster; limits of jerk are not used. The bound follows from the path and the limits alone: `profile`, of
-    any method, only decides where the path is divided. A bound above the profile's time shows that the
-    profile breaks a limit. Method and sources are in the kernel (`solvers/README.md`).
+    faster; jerk limits are not used. The bound follows from the path and the limits alone: `profile`, of any
+    method, only decides where the path is divided. A bound above the profile's time shows that the profile
+    breaks a limit. Method and sources are in the kernel (`solvers/README.md`).
     """
     bound: float = native_bound(problem, profile, progress)
     time = profile.time

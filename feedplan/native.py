@@ -23,7 +23,7 @@ Native = TypeVar("Native", bound=HasFields)
 class OfNative(Generic[Native]):
     """A frozen dataclass, some of whose fields are views of the memory of `native`.
 
-    The native object is made with the record and checks these fields once; kernels take the native object.
+    The native object is made with the record and checks these fields once; kernels take this object.
     """
 
     native: Native
@@ -50,7 +50,7 @@ class OfNative(Generic[Native]):
 
     def _hold(self, native: Native) -> None:
         vars(self).update(native.fields(), native=native)
-        lock_arrays(self)  # those that are not the native object's
+        lock_arrays(self)  # arrays that are not the native object's
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]

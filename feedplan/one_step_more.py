@@ -1,4 +1,4 @@
-"""The time that one step more of each limit saves: the plan is made again with that limit alone raised."""
+"""Computes the time saved by raising each limit by one step: plans again with only that limit raised."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from feedplan.machine.machine import Machine
 from feedplan.planners import options_of
 from feedplan.planning import Plan, plan
 
-# Factor on a limit, and factor on the tolerance.
+# The factor of a limit, and that of the tolerance.
 MORE, TOLERANCE_MORE = 1.2, 2.0
-# Limits that are active for a smaller part of the time are left out.
+# Limits that are active for a smaller share of the time are left out.
 ACTIVE_PART = 0.01
 
 
 @dataclass(frozen=True)
 class Step:
-    """With `limit` times `factor` the plan takes `time` [s], which saves `saved` [s]."""
+    """With `limit` multiplied by `factor` the plan takes `time` [s], which saves `saved` [s]."""
 
     limit: str
     factor: float

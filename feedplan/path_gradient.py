@@ -1,14 +1,15 @@
-"""How the least time along a path changes with the second and third derivatives of the path.
+"""Computes the derivative of a path's least time with respect to the path's second and third derivatives.
 
 Along C(u) with p = u̇² the acceleration and the jerk of an axis are
 
     C'' p + C' p'/2    and    √p (C''' p + 3/2 C'' p' + 1/2 C' p'').
 
-The least time ∫ p^(−1/2) du changes with them by the multipliers of their limits. These are the multipliers
-of a quadratic program in the change of p: the time to second order, the limits to first order about the plan,
-p a quadratic spline, or a linear one without limits of jerk. Where no axis is near its greatest acceleration
-or jerk p stays, since the shape of the path does not matter there. Terms with C' are left out: with them, as
-pulls on C'', steps gained less on five of seven polylines and the same on two.
+The least time ∫ p^(−1/2) du depends on C'' and C''' through these limits, and its derivative follows from
+their Lagrange multipliers. The multipliers are those of a quadratic program in the change of p, with the time
+to second order and the limits to first order about the plan; p is a quadratic spline, or a linear one without
+jerk limits. Where no axis is near its greatest acceleration or jerk, p is kept, because the shape of the path
+does not matter there. Terms with C' are left out: with them, steps saved less time on five of seven polylines
+and the same on two.
 """
 
 from __future__ import annotations
@@ -23,26 +24,27 @@ from feedplan.constraints.problem import Problem, feed_square
 from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
 
-# Cells of the spline in each piece, and the places in a cell at which limits hold.
+# Number of cells of the spline in each piece, and the places in a cell at which limits hold.
 _CELLS, _PLACES = 3, (0.05, 0.95)
-# A limit of which an axis uses a smaller share than this has no row in the quadratic program.
+# A limit that is used by less than this share has no row in the quadratic program.
 _NEAR = 0.5
-# p is kept where all axes use a smaller share of acceleration and jerk than the first number, and where a
-# speed uses a greater share of its limit than the second.
+# p is kept where all uses of acceleration and jerk limits are below _IDLE, and where the use of a speed limit
+# exceeds _AT_SPEED.
 _IDLE, _AT_SPEED = 0.9, 0.999
-# The greatest multiplier, in parts of the time that a place takes: where p cannot change, the multipliers are
-# not determined, and this bounds them.
+# Upper bound of a multiplier, in units of the time at its place: where p cannot change, multipliers are not
+# determined.
 _DEAREST = 3.0
-# p is also kept next to rest, where it is less than this part of the greatest p of the run.
+# p is also kept near rest, where it is less than this share of the greatest p of the run.
 _REST = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
 class PathGradient:
-    """Places (m,) in `piece` at `u`, each for `width` of the parameter [mm].
+    """Places (m,) on pieces `piece` at `u`, each for a `width` of the parameter [mm].
 
-    There `p` [mm²/s²], the derivatives `second` and `third` (m, axes) of the path, and by how much the least
-    time grows with each of them per length of the parameter: `by_second` [s], `by_third` [s mm].
+    At each place: `p` [mm²/s²], the derivatives `second` and `third` (m, axes) of the path, and the
+    derivatives of the least time with respect to them per length of the parameter, `by_second` [s] and
+    `by_third` [s mm].
     """
 
     piece: Integers
@@ -56,9 +58,10 @@ class PathGradient:
 
 
 def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Floats) -> PathGradient:
-    """The gradient at a plan whose axes are those of its path.
+    """The gradient for a plan whose joints are the axes of its path.
 
-    `max_jerk` (axes,) [mm/s³] is infinite where the plan has no limit of jerk."""
+    `max_jerk` (axes,) [mm/s³] is infinite where the plan has no jerk limit.
+    """
     path = problem.path
     size = path.width / _CELLS
     piece = np.repeat(np.arange(len(path)), _CELLS * len(_PLACES))
@@ -114,7 +117,8 @@ def path_gradient(problem: Problem, profile: SpeedProfile, max_jerk: Floats) -> 
 
 @dataclass(frozen=True, eq=False)
 class _Spline:
-    """The coefficients that count at each place (m, degree + 1), their basis functions and derivatives."""
+    """For each place (m, degree + 1): `column` are the indices of the spline's coefficients that are not
+    multiplied by 0 there, `value` their basis functions, `slope` and `bend` the derivatives of these."""
 
     column: Integers
     value: Floats
@@ -123,7 +127,8 @@ class _Spline:
 
     @classmethod
     def of(cls, runs: Integers, size: Floats, piece: Integers, part: Floats, degree: int) -> _Spline:
-        """A spline for each run, over cells of `size` (pieces,), at parts of the cells of each piece."""
+        """A spline for each run, with cells of `size` (pieces,), at fractions `part` of the cells of each
+        piece."""
         cell = _CELLS * piece + np.tile(part.astype(np.int64), len(size))
         run = np.searchsorted(runs, piece, side="right") - 1
         column = (cell + degree * run)[:, None] + np.arange(degree + 1)
@@ -131,7 +136,7 @@ class _Spline:
         if degree == 1:
             rise = np.stack([-1.0 / h, 1.0 / h], axis=1)
             return cls(column, np.stack([1.0 - x, x], axis=1), rise, np.zeros_like(rise))
-        # Cells beside, of no size beyond the ends of a run.
+        # The neighbouring cells; beyond the ends of a run their size is 0.
         sizes = np.repeat(size, _CELLS)
         before, after = np.roll(sizes, 1), np.roll(sizes, -1)
         before[_CELLS * runs[:-1]] = 0.0
@@ -150,10 +155,10 @@ class _Spline:
 
 
 class _Program:
-    """Minimise the time to second order in the change of p under linear limits."""
+    """Minimises the time, to second order in the change of p, under linear limits."""
 
     def __init__(self, spline: _Spline, p: Floats, width: Floats, free: Flags, known: Flags) -> None:
-        """Coefficients are free that count at a `free` place and at no `known` one."""
+        """A coefficient is free if it counts at a `free` place and at no `known` place."""
         self._column = spline.column
         count = int(spline.column.max()) + 1
         self._unit = np.zeros(count)
@@ -170,7 +175,7 @@ class _Program:
         moving = np.flatnonzero(~known)
         time = width[moving] / np.sqrt(p[moving])
         self._time = float(time.sum())
-        # In parts of the time, and of the greatest p near each coefficient.
+        # In units of the total time, and of the greatest p near each coefficient.
         matrix = self._matrix(moving, spline.value[moving])
         self._cost = matrix.T @ (-0.5 * time / p[moving]) / self._time
         self._curvature = matrix.T @ matrix.multiply((0.75 * time / p[moving] ** 2 / self._time)[:, None])
@@ -185,11 +190,11 @@ class _Program:
         return sparse.coo_matrix(entries, shape=(len(at), self._free)).tocsr()
 
     def limit(self, at: Integers, values: Floats, most: Floats) -> None:
-        """Σ values · change of the coefficients at a place is at most `most`."""
+        """Adds the limit Σ values · (change of the coefficients) ≤ `most` at each place `at`."""
         self._limits.append((self._matrix(at, values), most, self._most[at]))
 
     def multipliers(self) -> list[Floats]:
-        """Those of the limits, a list for each call of `limit` [s]."""
+        """The multipliers of the limits [s], one array for each call of `limit`."""
         import clarabel
         from scipy import sparse
 
@@ -199,7 +204,7 @@ class _Program:
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
         rows = sum(counts)
-        # By how much each limit gives way.
+        # Slack variables, by which limits may be exceeded at a cost that bounds the multipliers.
         way, none = sparse.identity(rows), sparse.csr_matrix((rows, rows))
         limits = sparse.vstack([matrix for matrix, _, _ in self._limits])
         found = clarabel.DefaultSolver(

@@ -1,4 +1,4 @@
-"""Writes the files of a plan (plan.json, setpoints, report) and of a comparison, whole or not at all."""
+"""Writes the files of a plan (plan.json, setpoints, report) and of a comparison, completely or not at all."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ PROGRAM_FILE = "program.ngc"
 DRAWING_FILE = "drawing.bin"
 COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 10_000
-# Parts of the progress: of the setpoints for the lengths of the path; of the writing for the setpoints, if
-# the audit was made before.
+# Shares of progress: LENGTHS is the part of reading setpoints for the lengths of the path; SAMPLED is the
+# part of writing for the setpoints, if the audit was made before.
 LENGTHS, SAMPLED = 0.05, 0.75
 
 
@@ -55,11 +55,11 @@ def write_plan(
     `program`, from `feedplan.planned_program`, is written as program.ngc. `one_step_more`, from
     `feedplan.one_step_more.one_step_more`, is added to plan.json and the report. `step` [s] is the longest
     step of a pvt table, which needs it. With `drawing` the data of the service's page is written as
-    drawing.bin. `progress` is called with a stage and the part of it that is done (0 to 1).
+    drawing.bin. `progress` is called with a stage and the finished share of it (0 to 1).
 
-    All files are written to a temporary folder and renamed at the end, so `folder` never holds half a plan;
-    other files in it stay. Raises InputError if the folder or the file system refuses, or if the plan's own
-    program would be written over.
+    All files are written to a temporary folder and renamed at the end, so `folder` never contains a part of a
+    plan; other files in it stay. Raises InputError if the files cannot be written, or if the plan's own
+    program would be overwritten.
     """
     from feedplan.report.container import contained
     from feedplan.report.figures import SetpointFigures, chart_data
@@ -86,7 +86,7 @@ def write_plan(
     steps = _steps(one_step_more)
     knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)
     share = of_stage(progress, "write")
-    # Setpoints are computed once: in the stage of the audit, if it has not been made.
+    # Setpoints are computed once: in the stage of the audit if it has not been made, else in that of writing.
     reading, begun = (
         (part(share, 0.0, SAMPLED), SAMPLED) if plan.audited else (of_stage(progress, "audit"), 0.0)
     )
@@ -125,7 +125,7 @@ def write_plan(
                     with output.writer(stage / output.FILE, header, knots.count) as add:
                         for chunk in knots.chunks(_ROWS_AT_ONCE):
                             add(chunk)
-        # Numbers of curves and entities are no lines of their file.
+        # For path files and drawings, the numbers of curves and entities are no lines of a file.
         has_lines = plan.program is not None and plan.program.reading is not None
         data = chart_data(plan.problem, account, figures, audit, over_length)
         data["has_lines"] = has_lines
@@ -148,7 +148,7 @@ def write_plan(
 
 
 def _along_path(plan: Plan, progress: Listener) -> dict[str, Any]:
-    """The account of a plan, which is kept in it, then the curves over length. It needs no setpoints."""
+    """Makes the account of a plan, which keeps it, then the curves over length; it needs no setpoints."""
     from feedplan.report.figures import over_length
 
     plan.make_account(part(progress, 0.0, 0.5))
@@ -159,7 +159,7 @@ def _along_path(plan: Plan, progress: Listener) -> dict[str, Any]:
 def _passing_on(sinks: Sequence[Sink]) -> Iterator[Sink]:
     """Passes chunks to the sinks on a second thread, while the next chunk is computed and audited.
 
-    Two chunks are in memory at most. What a sink raises is raised by the next call or at the end.
+    At most two chunks are in memory. An exception of a sink is raised by the next call or at the end.
     """
     last: Future[None] | None = None
 
@@ -180,13 +180,13 @@ def _passing_on(sinks: Sequence[Sink]) -> Iterator[Sink]:
 
 
 def files_of_plan(folder: FilePath) -> list[FilePath]:
-    """The files in a folder that belong to the plan in it: setpoints, and its program."""
+    """The files in a folder that belong to its plan: setpoints, and the program."""
     program = folder / PROGRAM_FILE
     return [*files_in(folder), *([program] if program.exists() else [])]
 
 
 def _knots(plan: Plan, names: list[str], step: float | None) -> Knots | None:
-    """The knots for these formats; None if no format needs knots."""
+    """The knots for these formats; None if none needs them. Raises InputError if the step does not fit."""
     if step is None and names:
         raise InputError(f"{names[0]} has no step: give its longest one [s], --step on the command line")
     if step is None:
@@ -201,8 +201,8 @@ def write_comparison(
 ) -> tuple[FilePath, ...]:
     """Writes a comparison's numbers (`summary`) and its page; returns the files.
 
-    Both appear whole or not at all. Raises InputError if the folder or the file system refuses, or if the
-    program would be written over.
+    Both are written completely or not at all. Raises InputError if they cannot be written, or if the program
+    would be overwritten.
     """
     from feedplan.comparison import LIMITS
     from feedplan.report.comparison import FILE as PAGE_FILE

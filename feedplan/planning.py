@@ -1,4 +1,5 @@
-"""From a part program to a plan: read, build the path, state the problem, plan, and hand out setpoints."""
+"""Makes a plan from a part program: reads it, builds the path, builds the problem, plans the profile, and
+provides setpoints."""
 
 from __future__ import annotations
 
@@ -50,9 +51,10 @@ from feedplan.today import Today, beside_plan
 from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
 
-# How far the stage `plan` is when the profile is there, if it does not come with its bound.
+# Share of the stage `plan` that is finished when the profile is known, if the method has no lower bound of
+# its own.
 PLANNING = 0.6
-# How far an audit is when the times of the setpoints are laid out.
+# Share of the audit that is finished when the times of the setpoints are known.
 LAID_OUT = 0.02
 
 
@@ -60,11 +62,11 @@ LAID_OUT = 0.02
 class Plan:
     """A planned program.
 
-    `profile` is the speed along `problem.path`; `lower_bound` [s] is proven: no feasible profile of this path
-    is faster, though one of another path within the tolerance may be (a method with a bound of its own, as
-    jerk-limited, may prove its on a grid and say so); `compute` is the computing time of each stage [s];
-    `options` those that the plan was made with; `today` what a controller takes for the same program, where
-    one was named; `gain` what a path fitted to the speed gained, where one was asked for.
+    `profile` is the speed along `problem.path`. `lower_bound` [s] is proven: no feasible profile of this path
+    is faster, but one of another path within the tolerance may be (the lower bound of a method such as
+    jerk-limited may hold only on its grid). `compute` is the computing time of each stage [s]; `options` are
+    those of the plan; `today` is the time of a controller for the same program, if one was named; `gain` is
+    the time saved by a path that is fitted to the speed, if it was requested.
     """
 
     program: Program | None
@@ -96,7 +98,7 @@ class Plan:
         return card(self.figures(), self.trajectory)
 
     def figures(self) -> dict[str, str]:
-        """The key figures by name, in words: what a notebook shows, with the audit if it was made."""
+        """The key figures by name, as text, for notebooks; with the audit if it was made."""
         verdict = self._verdict[0] if self._verdict else None
         judged = "not made yet" if verdict is None else "every limit holds" if verdict.ok else "failed"
         return {
@@ -117,17 +119,17 @@ class Plan:
 
     @property
     def time(self) -> float:
-        """Time of the whole program, dwells included [s]."""
+        """Time of the whole program, including dwells [s]."""
         return self.profile.time + self.path.pauses
 
     @property
     def gap(self) -> float:
-        """How far the time can be from the optimum at most: (time − lower_bound) / time."""
+        """(time − lower_bound) / time, an upper bound of the relative distance from the optimum."""
         return (self.time - self.lower_bound) / self.time if self.time > 0 else 0.0
 
     @property
     def _distance(self) -> str:
-        """The gap in words. Beyond rounding, only a plan that breaks limits is faster than the bound."""
+        """The gap as text. A plan that is faster than the bound by more than rounding breaks limits."""
         return f"gap {100 * self.gap:.3g} %" if self.gap > -1e-9 else "this one breaks limits"
 
     def setpoints(
@@ -136,12 +138,12 @@ class Plan:
         interpolator: Interpolator | None = None,
         progress: Listener | None = None,
     ) -> Setpoints:
-        """Setpoints at the servo period [s] (the machine's unless given), computed as they are read.
+        """Setpoints at the servo period [s] (by default the machine's), computed when they are read.
 
-        Where the curvature of the path jumps, third differences keep the limits of jerk at the machine's
-        period: over a shorter one a step of the acceleration is a greater jerk. `progress` is called
-        with the part of the laying out of their times that is done. Raises InputError for a period or an
-        interpolator that cannot be used.
+        Where the curvature of the path jumps, third differences keep the jerk limits at the machine's period:
+        over a shorter period the same step of the acceleration is a greater jerk. `progress` is called with
+        the finished share of computing their times. Raises InputError for a period or an interpolator that
+        cannot be used.
         """
         callback(progress, "the part done")
         return Setpoints(
@@ -155,9 +157,9 @@ class Plan:
         )
 
     def knots(self, step: float) -> Knots:
-        """States at equal steps between stops, none longer than `step` [s], by the plan's own clock.
+        """States at equal time steps between stops, none longer than `step` [s], on the plan's own clock.
 
-        Raises InputError for a step that cannot be used, or one that makes more than `max_setpoints` knots.
+        Raises InputError for a step that cannot be used, or that makes more than `max_setpoints` knots.
         """
         return Knots(self.problem, self.profile, step, self.max_setpoints)
 
@@ -167,11 +169,11 @@ class Plan:
 
     @cached_property
     def events(self) -> TimedEvents:
-        """What the program does besides moving, in its order, by the plan's own clock.
+        """The events of the program (all actions except moves) in order, on the plan's own clock.
 
-        Spindle, coolant, tools, dwells, stops, outputs, messages and comments: `feedplan.program.actions` has
-        the table, with which of them stop the tool. What does not happens as the path passes the end of the
-        move before it.
+        These are spindle, coolant, tools, dwells, stops, outputs, messages and comments; the table in
+        `feedplan.program.actions` also says which of them stop the tool. The others happen when the path
+        passes the end of the move before them.
         """
         return TimedEvents.none() if self._placed is None else self._placed.timed()
 
@@ -186,11 +188,11 @@ class Plan:
 
     @property
     def account(self) -> Account:
-        """What the time and the way are made of: limits, slow lines, stops, feed and rapid motion."""
+        """The account of time and distance: limits, slow lines, stops, feed and rapid motion."""
         return self.make_account()
 
     def make_account(self, progress: Listener | None = None) -> Account:
-        """The `account`, computed once; `progress` is called with the part done."""
+        """The `account`, computed once; `progress` is called with the finished share."""
         callback(progress, "the part done")
         if not self._account:
             jerk = planners.limits_jerk(self.method)
@@ -198,7 +200,7 @@ class Plan:
         return self._account[0]
 
     def operations(self, tool_change: float = 0.0) -> tuple[OperationTime, ...]:
-        """The time of each tool and operation of the program; a tool change counts `tool_change` [s].
+        """The time of each tool and operation of the program; a tool change takes `tool_change` [s].
 
         Raises InputError for the plan of a path, and for a time that is negative or not a number.
         """
@@ -208,15 +210,16 @@ class Plan:
         return operation_times(self.problem, self.profile, self.program, seconds)
 
     def at(self, t: ArrayLike) -> State:
-        """Position, velocity, acceleration, jerk and source line at one time or at times (n,) [s]; exact.
+        """Exact position, velocity, acceleration, jerk and source line at one time or at times (n,) [s].
 
-        See `Trajectory.at`."""
+        See `Trajectory.at`.
+        """
         return self.trajectory.at(t)
 
     def audit(self, progress: Progress | None = None) -> Audit:
-        """The independent check of profile, geometry and setpoints; computed once.
+        """The independent check of profile, path and setpoints; computed once.
 
-        `progress("audit", done)` is called as it goes on.
+        `progress("audit", done)` is called with the finished share.
         """
         callback(progress)
         if not self._verdict:
@@ -229,10 +232,10 @@ class Plan:
         return bool(self._verdict)
 
     def pass_setpoints(self, sinks: Sequence[Sink], progress: Listener | None = None) -> Audit:
-        """Computes the setpoints once, for all `sinks` and, where it has not been made, for the audit.
+        """Computes the setpoints once, for all `sinks` and, if it has not been made, for the audit.
 
-        They come in chunks of `feedplan.audit.CHUNK`. `progress` is called with the part done. Returns
-        the audit.
+        The setpoints are passed in chunks of `feedplan.audit.CHUNK`. `progress` is called with the finished
+        share. Returns the audit.
         """
         points, rest = self.setpoints(progress=part(progress, 0.0, LAID_OUT)), part(progress, LAID_OUT, 1.0)
         passed = points.teed(sinks)
@@ -259,9 +262,9 @@ class Plan:
         return self._verdict[0]
 
     def summary(self) -> dict[str, Any]:
-        """What `plan.json` holds: plain numbers and strings.
+        """The content of `plan.json`: plain numbers and strings.
 
-        `setpoints` are those of the machine's period. Hashes tell whether a text was changed.
+        `setpoints` are those of the machine's period. The hashes show whether a text was changed.
         """
         program, verdict = self.program, self.audit()
         points = self.setpoints()
@@ -327,35 +330,38 @@ def plan(
     elsewhere: Elsewhere | None = None,
     **options: Any,
 ) -> Plan:
-    """The plan of a part program on a machine, time-optimal unless another method is asked for.
+    """Plans a part program on a machine: time-optimal, unless another method is chosen.
 
     `source`: a file, the text of a program as str or bytes, a stream (see `read_program`), a Program or a
-    Path. `machine`: a Machine, or the name or file of one. `method`: one of `methods()`.
-    `tolerance` [mm] is the greatest distance from the programmed path where the program lets the tool leave
-    it (default: the program's own, else 0.01; a Path has its own); how the path follows the program within it
-    is the method's choice. With `path` "as-fitted" the path depends on the program and the tolerance alone,
-    and arcs and bends keep their size. With "fastest" it is planned a second time, along a smooth path that
-    is fitted to the speed of the first plan: it bends where the tool is slow, and cuts corners, arcs and
-    bends as far as the tolerance allows. Of each section between two stops the faster of both paths is
-    followed, and `Plan.gain` says what that gained. Of `path_rounds` (1 to 3) each after the first fits it
-    again, a step along the gradient of its time. Such a path depends on machine, feeds and method;
-    neighbouring passes may differ by up to twice the tolerance. Methods that follow the lines themselves
-    know one path only, and warn where "fastest" is asked for. `feed` [mm/s] replaces the programmed feeds
-    (it is refused where a Path has none), `feed_override` multiplies them. `reading` are keywords of
-    `read_program`, such as a tool table, for a source that is read here. `period` [s] replaces the machine's
-    servo period; `start_speed` and `end_speed` [mm/s] hold at the ends. `interpolator` makes the setpoints:
-    "sarfraz" or "newton".
-    `controller`: what `Plan.today` compares with, the machine file's unless given: "linuxcnc", "grbl",
-    "grblhal", "klipper" or "marlin", or a table as in a machine file.
-    A plan of more than `max_setpoints` gives none, and is not audited, before it is asked for so many or a
-    longer period.
-    `progress(stage, done)` is called some times a second as the work goes on, with `read`, `fit`, then
-    `plan`, and the part of that stage that is done, which never falls; what it raises ends the work and is
-    raised here.
-    `elsewhere`, a `feedplan.jobs.cluster_runs.ClusterRuns`, plans the runs between stops on the workers of a
-    cluster, with jerk-limited alone; the plan is the same bit for bit.
+    Path. `machine`: a Machine, or its name or file. `method`: one of `methods()`.
 
-    What some methods take besides, by keyword, with what holds where it is not given:
+    `tolerance` [mm] is the greatest distance from the programmed path where the program allows the tool to
+    leave it (default: the program's own, else 0.01; a Path has its own); the method decides how the path
+    follows the program within it. With `path` "as-fitted" the path depends only on the program and the
+    tolerance, and arcs and bends keep their size. With "fastest" the program is planned a second time, along
+    a smooth path that is fitted to the speed of the first plan: it bends where the tool is slow, and cuts
+    corners, arcs and bends as far as the tolerance allows. Each section between two stops follows the faster
+    of both paths, and `Plan.gain` is the time saved. Each of the `path_rounds` (1 to 3) after the first fits
+    the path again, by a step along the gradient of its time. Such a path depends on machine, feeds and
+    method; neighbouring passes may differ by up to twice the tolerance. Methods that follow the programmed
+    lines have only one path, and warn if "fastest" is given.
+
+    `feed` [mm/s] replaces the programmed feeds (it is refused for a Path without feeds), `feed_override`
+    multiplies them. `reading` are keywords of `read_program`, such as a tool table, for a source that is read
+    here. `period` [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the
+    ends. `interpolator` makes the setpoints: "sarfraz" or "newton".
+
+    `controller`: the controller that `Plan.today` compares with (default: that of the machine file):
+    "linuxcnc", "grbl", "grblhal", "klipper" or "marlin", or a table as in a machine file. A plan with more
+    than `max_setpoints` setpoints cannot give setpoints or an audit; raise this number or the period.
+
+    `progress(stage, done)` is called several times a second with `read`, `fit`, then `plan`, and the finished
+    share of that stage, which never decreases; an exception from it ends the work and is raised here.
+
+    `elsewhere`, a `feedplan.jobs.cluster_runs.ClusterRuns`, plans the runs between stops on the workers of a
+    cluster, only with jerk-limited; the plan is the same bit for bit.
+
+    Options of some methods, by keyword, with their defaults:
 
         jerk-limited        accuracy=1e-4, time_limit=None
         casadi, clarabel    accuracy=1e-4, cells=None, time_limit=None
@@ -366,14 +372,15 @@ def plan(
                             max_velocity=None, max_acceleration=None
         linuxcnc            depth=50, max_velocity=None, max_acceleration=None
 
-    `accuracy` is relative, of the time: grids are refined to it, or have so many `cells` a piece. After
-    `time_limit` [s] ruckig and jerk-limited return the best plan so far, the others raise. With jerk-limited
-    the limit is for all work from here to the files: reading, fitting, a first plan, audit, setpoints and
-    report are never left out (how long the last three will take is known from some setpoints of the first
-    plan), the rest of the time is for a better plan and its bound. `scheme` "collocation" keeps the limits at
-    the nodes alone and shows how toppra's usual profiles break them. `deviation` [mm] is grbl's setting $11,
-    `square_corner_velocity` [mm/s] Klipper's and `axis_jumps` [mm/s] Marlin's in its place; the others are
-    told in `planners.junction_deviation` and `planners.linuxcnc`.
+    `accuracy` is relative to the time: grids are refined until it is reached, unless `cells` gives the number
+    of cells for each piece. After `time_limit` [s] ruckig and jerk-limited return the best plan so far, the
+    others raise an error. With jerk-limited the limit is for all work from here to the files: reading,
+    fitting, a first plan, audit, setpoints and report are always done (the time of the last three is
+    estimated from some setpoints of the first plan), and the rest of the time is for a better plan and its
+    bound. `scheme` "collocation" keeps the limits only at the nodes and shows how toppra's usual profiles
+    break them. `deviation` [mm] is grbl's setting $11; `square_corner_velocity` [mm/s] (Klipper) or
+    `axis_jumps` [mm/s] (Marlin) replace it; the other options are described in `planners.junction_deviation`
+    and `planners.linuxcnc`.
 
     Raises ProgramError, MachineError, InputError, InfeasibleError, SolverError or MissingPackageError, each a
     sentence with place and remedy.
@@ -384,7 +391,7 @@ def plan(
         _require_parts(elsewhere, method, given.get("time_limit"))
         solve = partial(solve, elsewhere=elsewhere)
     time_limit = given.get("time_limit")
-    # The limit of a method that can tell early what follows its plan is one for all of it.
+    # If a method can reserve time for the work after its plan, the time limit is for all work.
     early = planners.takes(method, planners.RESERVE)
     limit = TimeLimit(time_limit) if time_limit is not None and early else None
     machine = Machine.of(machine)
@@ -444,7 +451,7 @@ def plan(
         report("fit", 1.0)
     share = of_stage(progress, "plan")
     planned = 1.0 if planners.grid_error(method) else PLANNING
-    # Equal parts of the progress for each plan.
+    # Each plan has an equal share of the progress.
     each = planned / (1 + rounds if refits else 1)
     turns = count()
 
@@ -453,7 +460,7 @@ def plan(
         own: dict[str, Any] = {}
         if limit is not None:
             own["time_limit"] = limit.left
-            # How long what follows will take is known from setpoints of a first plan.
+            # The time of the work after the plan is estimated from setpoints of a first plan.
             own["reserve"] = lambda first: limit.keep_for(
                 Setpoints(problem, first, machine.period, interpolator, max_setpoints)
             )
@@ -530,13 +537,13 @@ def plan(
     )
 
 
-# What every method takes.
+# The names of the arguments that every method takes.
 OF_ALL_METHODS: tuple[str, ...] = tuple(plan.__kwdefaults__ or ())
 
 
 def reading_of(source: object, reading: object) -> Reading:
-    """The keywords of `read_program` for a source; raises InputError for anything else, and for any where the
-    source has been read."""
+    """The keywords of `read_program` for a source; raises InputError for anything else, and for any keywords
+    if the source has been read already."""
     given = checked_reading(reading)
     if given and isinstance(source, (Program, Path)):
         kind = type(source).__name__
@@ -545,7 +552,7 @@ def reading_of(source: object, reading: object) -> Reading:
 
 
 def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> None:
-    """Raises InputError where runs are not planned elsewhere."""
+    """Raises InputError if the runs cannot be planned by `elsewhere`."""
     if not callable(getattr(elsewhere, "map", None)) or not callable(getattr(elsewhere, "count", None)):
         raise refuse("elsewhere", elsewhere, "a feedplan.jobs.cluster_runs.ClusterRuns")
     if not planners.takes(method, planners.ELSEWHERE):
@@ -559,14 +566,14 @@ def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> Non
 
 
 def _one_path(method: str, path: str, refits: bool) -> tuple[str, ...]:
-    """A sentence if the fastest path was asked for and the method knows one path only."""
+    """A sentence if the fastest path was requested and the method has only one path."""
     if path != "fastest" or refits:
         return ()
     return (f"the method {method} knows one path only: the path fastest is the path as-fitted",)
 
 
 def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
-    """A sentence for each line on which rounding makes the plan stop."""
+    """A sentence for each line on which the plan stops because of rounding."""
     lines = dict.fromkeys(int(line) for line in problem.path.line[profile.slowed])
     return tuple(
         f"{at_line(line)}rounding hides how the path goes on next to a cusp: the plan stops there, slower "
@@ -576,10 +583,10 @@ def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
 
 
 def curvature_jumps(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
-    """A sentence where jumps of curvature slow a profile of limited jerk: how many, and the slowest place."""
+    """A sentence if jumps of curvature slow a jerk-limited profile: their number, and the slowest place."""
     if not len(profile.kinked):
         return ()
-    # The first arc of each piece: it begins at the jump.
+    # The first phase of each piece begins at the jump.
     arc = np.searchsorted(profile.piece, profile.kinked)
     speed_sq = profile.p0[arc] * speed_square(problem, profile.kinked, np.zeros(len(arc)))
     slowest = int(np.argmin(speed_sq))

@@ -20,23 +20,23 @@ from feedplan.native import OfNative
 from feedplan.progress import Listener, tell
 from feedplan.units import counted
 
-# The `axis` of a phase whose constant belongs to none.
+# The `axis` of a phase whose constant belongs to no axis.
 NO_AXIS = 255
 
 
 class PhaseLaw(IntEnum):
-    """What stays constant on a phase of the profile; `value` holds the constant."""
+    """The quantity that is constant on a phase of the profile; `value` is the constant."""
 
     AXIS_ACCELERATION = 0  # q'_k s + q''_k p = value [mm/s²], signed
     PARAMETER_ACCELERATION = 1  # s = p'/2 = value [mm/s²], so that p is linear in u
-    FEED = 2  # the speed that the feed limits: |C'|² p = value [mm²/s²], by the problem's `feed_share`
+    FEED = 2  # the speed that the feed limits: |C'|² p = value [mm²/s²], with the problem's `feed_share`
     AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
     SPEED_LINE = 4  # |C'|² p is linear in u from end to end [mm²/s²]; value is 0
     PATH_JERK = 5  # the jerk along the path v̈ = value [mm/s³]: v is a quadratic polynomial of time
     SPEED_CUBIC = 6  # v² is a cubic polynomial of the length from end to end, slopes 2a; value is 0
 
 
-# Columns with an entry for each phase, and lists of pieces.
+# Columns with an entry for each phase, and columns that are lists of pieces.
 OF_PHASES = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
 OF_PIECES = ("slowed", "kinked")
 _DTYPES = {
@@ -51,25 +51,30 @@ _DTYPES = {
 class SpeedProfile(OfNative[Profile]):
     """Phases in the order of the path.
 
-    Per phase: `piece` (index into the path), `kind` (PhaseLaw), `axis` (the axis that the phase's constant
-    belongs to, 255 for none), `value` (see PhaseLaw), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
-    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) phase offsets of the path's runs. `slowed` (m,)
-    pieces on which the plan stops because rounding hides the way on, slower than it need be; once a stop.
-    Where the problem has a `tip_speed`, |C'|² of FEED and SPEED_LINE is that; q are the joints.
-    Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
-    axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
-    where q'' p is large. On PARAMETER_ACCELERATION, `axis` is the one whose
-    acceleration limit holds p where s is 0, if it is one.
-    A phase may begin or end with C' = 0, where the tool rests: p is its limit there, or 0 where it has none.
-    On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇ [mm/s²]; 0 on
-    all other kinds. Speed v = |C'| √p and length are those along the path, by the problem's `way_speed` where
-    it has one.
-    `kinked` (m,) pieces at whose start a jump of curvature holds the speed.
-    `stopped`: a time limit ended the planning early. `excess`: how far the planner itself takes the time to
-    be above the least on its grid [s], an estimate and no proof; NaN where it does not say. `run_bounds` (r,)
-    or empty: the time of each run that the planner proves no profile to beat [s], NaN where it proves none.
-    PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
-    All arrays are read-only. Raises InputError where those of the phases differ in length.
+    For each phase: `piece` (index into the path), `kind` (PhaseLaw), `axis` (the axis that the phase's
+    constant belongs to, 255 for none), `value` (see PhaseLaw), `u0`, `u1` (local parameter, u0 < u1), `p0`,
+    `p1` (p at both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) are the offsets of the path's runs in the
+    phases. `slowed` (m,) are pieces on which the plan stops although it need not, because rounding hides how
+    the path continues; each stop is listed once.
+
+    In FEED and SPEED_LINE, |C'|² is the problem's `tip_speed` where it has one; q are the joints. Between the
+    ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k, axis l
+    accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k; this form is accurate where
+    q'' p is large. On PARAMETER_ACCELERATION, `axis` is the axis whose acceleration limit determines p where
+    s is 0, if there is one.
+
+    A phase may begin or end with C' = 0, where the tool rests: p is its limit value there, or 0 if there is
+    none. On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇
+    [mm/s²]; they are 0 on all other kinds. Speed v = |C'| √p and length are measured along the path, by the
+    problem's `way_speed` where it has one. PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T is
+    the duration. SPEED_CUBIC: v0, v1 > 0.
+
+    `kinked` (m,) are pieces at whose start a jump of the curvature limits the speed. `stopped`: a time limit
+    ended the planning early. `excess` [s]: the planner's estimate of time − least time on its grid, not a
+    proof; NaN if it gives none. `run_bounds` (r,) or empty: a lower bound of the time of each run that the
+    planner has proven [s], NaN where it has proven none.
+
+    All arrays are read-only. Raises InputError where arrays of the phases differ in length.
     """
 
     piece: NDArray[np.uint32]
@@ -106,12 +111,12 @@ class SpeedProfile(OfNative[Profile]):
 
     @property
     def time(self) -> float:
-        """Time in motion, dwells not counted [s]."""
+        """Time in motion, without dwells [s]."""
         return float(self.duration.sum())
 
     @property
     def lower_bound(self) -> float:
-        """A time in motion that the planner proves no profile to beat [s]; NaN where it proves none."""
+        """The planner's proven lower bound of the time in motion [s]; NaN where it has proven none."""
         return min(math.fsum(self.run_bounds), self.time) if len(self.run_bounds) else math.nan
 
     @property
@@ -125,10 +130,10 @@ class SpeedProfile(OfNative[Profile]):
         return WeakKeyDictionary()
 
     def sampler(self, problem: Problem, progress: Listener | None = None) -> Sampler:
-        """The native reader of the motion along the problem's path, with setpoints at the problem's period.
+        """The native sampler of the motion along the problem's path, with setpoints at the problem's period.
 
-        It is made once for each problem; `progress` is called with the part that is done. Raises InputError
-        for a profile of another path.
+        It is made once for each problem; `progress` is called with the finished share. Raises InputError for
+        a profile of another path.
         """
         if problem not in self._samplers:
             self._samplers[problem] = Sampler(problem, self, problem.period, progress)
@@ -137,10 +142,10 @@ class SpeedProfile(OfNative[Profile]):
 
 
 def joined_runs(taken: Iterable[tuple[SpeedProfile, slice, int]], **others: Any) -> SpeedProfile:
-    """Runs of profiles one after the other.
+    """A profile from runs of several profiles, in order.
 
-    `taken` are profiles, each with a slice of its runs and what is added to the numbers of its pieces;
-    `others` are the fields of the result that do not follow from these columns.
+    `taken` are profiles, each with a slice of its runs and a number that is added to the indices of its
+    pieces; `others` are the fields of the result that do not follow from these columns.
     """
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in (*OF_PHASES, *OF_PIECES)}
     runs = [np.zeros(1, dtype=np.int64)]

@@ -1,6 +1,6 @@
-"""Progress of a computation: a function that is called with a number that rises from 0 to 1.
+"""Progress of a computation: a callback that gets a number rising from 0 to 1.
 
-An exception from that function ends the computation within about a tenth of a second, in every stage, and is
+An exception from the callback ends the computation within about a tenth of a second, in every stage, and is
 raised to the caller of the computation.
 """
 
@@ -15,7 +15,7 @@ from typing import TypeVar
 
 T = TypeVar("T")
 Listener = Callable[[float], None]
-# The same for a computation in stages, with the name of the stage.
+# A callback for a computation in stages; its first argument is the name of the stage.
 Progress = Callable[[str, float], None]
 
 
@@ -39,9 +39,9 @@ def part(whole: Listener | None, start: float, end: float) -> Listener | None:
 
 @contextmanager
 def beside(work: Callable[[Listener], T]) -> Iterator[Future[T]]:
-    """Does `work` in another thread while the block runs; the block ends after it.
+    """Does `work` in another thread while the block runs; leaving the block waits for `work`.
 
-    `work` gets a listener. An exception in the block ends the work too, where it next tells how far it is.
+    `work` gets a listener. An exception in the block also ends the work, at its next call of the listener.
     """
     unwanted = Event()
 

@@ -1,4 +1,4 @@
-"""Setpoints at the servo period, from a problem and the speed profile that solves it."""
+"""Computes setpoints at the servo period from a problem and its speed profile."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
 
 # The greatest number of setpoints in memory at once: with six axes they take 5 GB.
 MAX_CHUNK = 20_000_000
-# The greatest number of setpoints of a plan unless the user asks for more: a day at 1 kHz.
+# The greatest number of setpoints of a plan, unless the user allows more: a day at 1 kHz.
 MAX_SETPOINTS = 100_000_000
 
 
@@ -34,7 +34,7 @@ class SetpointChunk:
     """Consecutive setpoints: `t` (n,) [s]; `position` [mm], `velocity` [mm/s], `acceleration` [mm/s²] and
     `jerk` [mm/s³], each (n, axes); `line` (n,) source line; `axes` names.
 
-    `piece` (n,) and `u` (n,) say where on the path each is, and are empty where that is not known.
+    `piece` (n,) and `u` (n,) are the places on the path; they are empty if unknown.
     """
 
     t: Floats
@@ -51,7 +51,7 @@ class SetpointChunk:
         return len(self.t)
 
     def part(self, rows: slice, axes: Sequence[str]) -> SetpointChunk:
-        """Some rows of these axes, without their places on the path."""
+        """Some rows with the given axes, without their places on the path."""
         columns = [self.axes.index(name) for name in axes]
         names = ("position", "velocity", "acceleration", "jerk")
         of_axes = {name: np.asarray(getattr(self, name)[rows][:, columns]) for name in names}
@@ -65,8 +65,9 @@ class SetpointChunk:
 
 @dataclass(frozen=True)
 class SamplingStats:
-    """The worst of all setpoints computed so far: `iterations` of the interpolator (0: closed forms only) and
-    `length_error` in parts of a step, the proven error of the length table included."""
+    """The worst of all setpoints computed so far: the number of `iterations` of the interpolator (0: only
+    closed forms) and the `length_error` as a share of a step, including the proven error of the length table.
+    """
 
     iterations: int = 0
     length_error: float = 0.0
@@ -77,25 +78,26 @@ Sink = Callable[[SetpointChunk], None]
 
 
 class Setpoints:
-    """Setpoints every `period` [s] of the joints along a problem's path by its profile, computed as they are
-    read; iterating gives chunks.
+    """Setpoints of the joints at every `period` [s] along a problem's path, by its profile, computed when
+    they are read; iterating gives chunks.
 
     Setpoint 0 is the start of the path. A pause D before the first run takes ceil(D/period) periods there. A
-    run with time T and pause D takes ceil((T + D)/period) periods: each stop is hit exactly and the stream
-    waits less than one period there, so that `duration` [s], the time of the last of `count` setpoints, is a
-    little longer than the plan's time. A path that ends in motion ends at its true time, after a shorter last
-    step. At a stop velocity, acceleration and jerk are 0; at a switching point, where the acceleration jumps,
-    a setpoint has the values of the phase that begins there. `computing` is the time that this took
-    so far, `passing` what those took to whom they were passed on [s].
+    run with time T and pause D takes ceil((T + D)/period) periods: each stop is reached exactly and the
+    stream waits less than one period there, so `duration` [s], the time of the last of `count` setpoints, is
+    a little longer than the plan's time. A path that ends in motion ends at its true time, after a shorter
+    last step. At a stop velocity, acceleration and jerk are 0; at a switch, where the acceleration jumps, a
+    setpoint has the values of the phase that begins there. `computing` [s] is the computing time of the
+    setpoints so far, `passing` [s] the time of the sinks that they were passed to.
 
-    By the `interpolator` sarfraz, where an axis moves at constant acceleration or speed the place follows
-    from its way, in closed form on quadratic pieces; elsewhere from a table of length or time, with Sarfraz's
-    predictor and corrector, and from the length at a time in closed form where the jerk on the path is
-    constant. By newton: steps of speed times period, to third order, and Newton–Raphson. Pieces may have any
-    degree, polynomial or rational. `progress` is called with the part of the laying out that is done;
-    `events` are those of the plan (`feedplan.event_places`).
-    Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
-    setpoints than `max_setpoints`.
+    The `interpolator` "sarfraz" finds the place from the displacement of an axis where that axis moves at
+    constant acceleration or speed, in closed form on quadratic pieces; elsewhere from a table of length or
+    time, with Sarfraz's predictor and corrector. Where the jerk along the path is constant, the length at a
+    time is known in closed form. "newton" takes steps of speed × period, to third order, and Newton–Raphson
+    steps. Pieces may have any degree, polynomial or rational.
+
+    `progress` is called with the finished share of computing the times; `events` are those of the plan
+    (`feedplan.event_places`). Raises InputError for a period or an interpolator that cannot be used, a
+    profile of another path, or more setpoints than `max_setpoints`.
     """
 
     def __init__(
@@ -132,7 +134,7 @@ class Setpoints:
 
     @property
     def count(self) -> int:
-        """Number of setpoints, the start of the path included."""
+        """Number of setpoints, including the start of the path."""
         return self._sampler.count
 
     @property
@@ -142,10 +144,10 @@ class Setpoints:
 
     @property
     def events(self) -> TimedEvents:
-        """What happens besides the motion, by the clock of these setpoints.
+        """The events of the plan, on the clock of these setpoints.
 
         An event at a stop comes before the wait for a whole period: the first setpoint at or after its time
-        rests in the place of the stop, both to rounding.
+        rests at the place of the stop; both hold up to rounding.
         """
         if self._events is None:
             return TimedEvents.none()
@@ -153,7 +155,7 @@ class Setpoints:
 
     @property
     def run_starts(self) -> Floats:
-        """When each run between stops starts (runs,) [s]."""
+        """The start time of each run between stops (runs,) [s]."""
         return self._sampler.runs[:, 1]
 
     def __len__(self) -> int:
@@ -169,20 +171,21 @@ class Setpoints:
         return Setpoints, self._source
 
     def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
-        """The stream in chunks of `size` setpoints, the last one shorter: memory does not grow with it.
+        """The stream in chunks of `size` setpoints, the last one shorter: memory does not grow with the
+        length of the stream.
 
-        The numbers do not depend on the size. Raises InputError for a size out of range.
+        The setpoints do not depend on the size. Raises InputError for a size out of range.
         """
         return chunks(self._passed, self.count, size)
 
     def teed(self, sinks: Sequence[Sink]) -> Setpoints:
-        """The same stream; what is read of it by `chunks` goes to `sinks` too."""
+        """The same stream; chunks that are read by `chunks` are also passed to `sinks`."""
         other = object.__new__(Setpoints)
         vars(other).update(vars(self), _sinks=(*self._sinks, *sinks))
         return other
 
     def around(self, t: float) -> SetpointChunk:
-        """The setpoints next to a time [s]: the last one before it or at it, and the one after."""
+        """The setpoints next to a time [s]: the last one at or before it, and the next one."""
         before = min(max(int(t / self.period), 0), self.count - 1)
         return self._chunk(before, min(before + 2, self.count))
 
@@ -195,7 +198,7 @@ class Setpoints:
         return chunk
 
     def all(self) -> SetpointChunk:
-        """The whole stream at once. Raises InputError where it is too long for that."""
+        """The whole stream at once. Raises InputError if it is too long."""
         if self.count > MAX_CHUNK:
             raise InputError(f"{self.count} setpoints are too many to hold at once: read them by chunks()")
         return self._chunk(0, self.count)
@@ -215,9 +218,10 @@ class Setpoints:
 
 
 def chunks(chunk: Callable[[int, int], SetpointChunk], count: int, size: int) -> Iterator[SetpointChunk]:
-    """`count` rows in chunks of `size`, each made from its first row and the end of it.
+    """`count` rows in chunks of `size`; `chunk` makes each from its first row and the row after its last.
 
-    Raises InputError for a size out of range."""
+    Raises InputError for a size out of range.
+    """
     if not is_whole(size, most=MAX_CHUNK):
         raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
     return (chunk(start, min(start + size, count)) for start in range(0, count, size))

@@ -1,4 +1,4 @@
-"""A time limit for the whole work on a program, and the part of it that is kept for audit and files."""
+"""A time limit for the whole work on a program, and the part of it that is reserved for audit and files."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 from feedplan.arguments import number
 from feedplan.setpoints import Setpoints
 
-# Time of audit, setpoints and report over the time of computing the setpoints once, about.
+# Approximate ratio of the time of audit, setpoints and report to the time of computing the setpoints once.
 FOLLOWING = 8.0
-# The part of the setpoints that is computed to measure that time.
+# The share of the setpoints that is computed to measure this time.
 SAMPLE = 1 / 64
 
 
 @dataclass
 class TimeLimit:
-    """`seconds` from the creation of this object on, by a `clock` [s]; `kept` of them are for the audit, the
-    setpoints and the report, which follow every plan."""
+    """A limit of `seconds` from the creation of this object, measured by a `clock` [s]; `kept` of them are
+    reserved for the audit, the setpoints and the report, which follow every plan."""
 
     seconds: float
     clock: Callable[[], float] = time.perf_counter
@@ -31,12 +31,11 @@ class TimeLimit:
 
     @property
     def left(self) -> float:
-        """The time left for planning, without the time that is kept [s], 0 or more."""
+        """The time left for planning, without the reserved time [s], 0 or more."""
         return max(self.seconds - self.kept - (self.clock() - self.start), 0.0)
 
     def keep_for(self, setpoints: Setpoints) -> float:
-        """Keeps the estimated time of the work that follows a plan with such setpoints, and returns it
-        [s]."""
+        """Reserves the estimated time of the work after a plan with these setpoints, and returns it [s]."""
         begin = self.clock()
         next(setpoints.chunks(max(int(SAMPLE * setpoints.count), 1)))
         self.kept = FOLLOWING / SAMPLE * (self.clock() - begin)

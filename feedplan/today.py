@@ -1,4 +1,4 @@
-"""The time that a controller of today takes for a program, compared with that of a plan."""
+"""Computes the time that a controller takes for a program today, to compare it with that of a plan."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Today:
 
     @property
     def saved(self) -> float:
-        """The controller's time less the plan's [s]."""
+        """The controller's time minus the plan's [s]."""
         return self.time - self.planned
 
     def of_controller(self) -> dict[str, Any]:
@@ -49,10 +49,10 @@ def time_by(
     tolerance: float | None,
     **request: Any,
 ) -> float:
-    """The time of the program, pauses included, by the model of the controller [s].
+    """The time of the program by the model of the controller, including pauses [s].
 
     `tolerance` and `request` (feed, feed_override, start_speed, end_speed) are arguments of `feedplan.plan`,
-    and so are the errors.
+    which also describes the errors.
     """
     method = controller.model.method
     if isinstance(source, Program):
@@ -64,8 +64,8 @@ def time_by(
 def beside_plan(
     controller: Controller, time: float, source: Program | Path, machine: Machine, settings: Mapping[str, Any]
 ) -> tuple[Today | None, tuple[str, ...]]:
-    """The controller's time for a plan of `time` [s] that was made with the same settings; None and a
-    sentence if the model has no plan."""
+    """The controller's time, compared with a plan of `time` [s] that was made with the same settings; or None
+    and a sentence if the model finds no plan."""
     try:
         return Today(controller, time_by(controller, source, machine, **settings), time), ()
     except (InfeasibleError, SolverError) as error:

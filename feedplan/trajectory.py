@@ -1,4 +1,4 @@
-"""A plan as functions of time and of length: exact, from the profile's own phases, not from setpoints."""
+"""A plan as functions of time and of length, computed exactly from its profile's phases, not setpoints."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from feedplan.profile import SpeedProfile
 @dataclass(frozen=True, eq=False)
 class State:
     """The motion at times `t` [s]: `position` [mm, deg], `velocity`, `acceleration` and `jerk` of the axes,
-    and the source `line`. For one time each is one row (axes,) and `line` a number, for (n,) times (n, axes)
-    and (n,)."""
+    and the source `line`. For one time the first four are (axes,) and `line` is a number; for (n,) times they
+    are (n, axes) and (n,)."""
 
     t: Floats
     position: Floats
@@ -30,9 +30,9 @@ class State:
 
 
 class Trajectory:
-    """A profile on its path, by the plan's own clock: pauses are in it, waits for whole periods are not.
+    """A profile on its path, on the plan's own clock: with pauses, but without waits for whole periods.
 
-    Lengths `s` are those of the path from the start, in its `unit` (mm, or that of the joints).
+    Lengths `s` are measured along the path from its start, in its `unit` (mm, or that of the joints).
     """
 
     def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
@@ -54,14 +54,13 @@ class Trajectory:
 
     @property
     def length(self) -> float:
-        """Length of the tool's way [mm]."""
+        """Length of the tool's path [mm]."""
         return self._lengths.total
 
     def at(self, t: ArrayLike) -> State:
         """The state at one time or at times (n,) [s].
 
-        At the moment of a stop the tool rests; where the acceleration jumps, the values after the jump hold.
-        Raises InputError for a time that is not within the plan.
+        At a stop the tool rests; where the acceleration jumps, the values after the jump are given.
         """
         times = within(t, "time", self.duration, "s")
         _, position, velocity, acceleration, jerk, line, piece, *_ = self.sampler.at(np.atleast_1d(times))
@@ -71,15 +70,17 @@ class Trajectory:
         return State(times, position[row], velocity[row], acceleration[row], jerk[row], line[row])
 
     def distance(self, t: ArrayLike) -> Floats:
-        """s(t): the length of the way [mm] at one time or at times (n,) [s]. Raises as `at`."""
+        """s(t): the length along the path [mm] at one time or at times (n,) [s]. Raises as `at`."""
         times = within(t, "time", self.duration, "s")
         piece, u = self.sampler.at(np.atleast_1d(times))[6:8]
         return self._lengths.length(piece, u).reshape(times.shape)
 
     def time(self, s: ArrayLike) -> Floats:
-        """t(s): when the tool is at one length or at lengths (n,) [mm], before the pause at a stop [s].
+        """t(s): the time at which the tool is at one length or at lengths (n,) [mm]; at a stop the time
+        before the pause [s].
 
-        Raises InputError for a length that is not on the path."""
+        Raises InputError for a length that is not on the path.
+        """
         lengths = within(s, "length", self.length, self._problem.unit)
         return self.sampler.along(*self._lengths.locate(np.atleast_1d(lengths)))[0].reshape(lengths.shape)
 
@@ -90,7 +91,7 @@ class Trajectory:
         velocity = self.sampler.along(piece, u)[2]
         speed = np.linalg.norm(velocity, axis=1)
         if self._problem.joints is not None:
-            # The joints' speed by that of the parameter, and so the tool's.
+            # Converts the joints' speed to the tool's: the ratio of their squares is the same for all u̇.
             joints = self._problem.curve.evaluate(piece, u, 1)[1]
             ratio = speed_square(self._problem, piece, u) / (joints**2).sum(axis=1)
             speed = speed * np.sqrt(ratio)

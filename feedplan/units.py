@@ -16,8 +16,7 @@ def mm_per_min(speed: float) -> float:
 
 
 def shared_unit(units: Iterable[str], otherwise: str) -> str:
-    """The common unit; `units` if they differ, as for robots with linear joints; `otherwise` if there are
-    none."""
+    """The common unit; "units" if they differ, as for robots with linear joints; `otherwise` if none."""
     different = set(units)
     return "units" if len(different) > 1 else next(iter(different), otherwise)
 
@@ -28,13 +27,13 @@ def counted(number: int, noun: str) -> str:
 
 
 def finite(value: float) -> float | None:
-    """The number, or None for those that JSON lacks: infinite ones and NaN."""
+    """The number, or None if it is infinite or NaN, which JSON cannot express."""
     return value if math.isfinite(value) else None
 
 
 def duration_text(seconds: float) -> str:
-    """A duration as people read it: `842 µs`, `1.234 s`, `12 min 03.4 s`, `2 h 05 min 10 s`."""
-    # Rounded first, so that no unit shows as many as make the next one.
+    """A duration as readable text: `842 µs`, `1.234 s`, `12 min 03.4 s`, `2 h 05 min 10 s`."""
+    # Rounded before choosing the unit, so that the text never shows, for example, 60.0 s.
     if round(seconds, 6) < 1e-3:
         return f"{seconds * 1e6:.0f} µs"
     if round(seconds, 4) < 1.0:
@@ -50,7 +49,7 @@ def duration_text(seconds: float) -> str:
 
 
 def difference_text(difference: float, of: float, word: str = "") -> str:
-    """`12.0 s, 7.0 %`: the amount of a difference of times [s], and the amount over a time [s].
+    """`12.0 s, 7.0 %`: the absolute value of a difference of times [s], and its share of a time [s].
 
     A `word` such as `less` is added after the seconds.
     """
@@ -60,7 +59,7 @@ def difference_text(difference: float, of: float, word: str = "") -> str:
 
 
 def way_unit(summary: Mapping[str, Any]) -> str:
-    """The unit of distances from the path of a plan: that of its length, or where it only turns of angles."""
+    """The unit of distances from a plan's path: that of its length, or of angles if it only turns."""
     units: Mapping[str, str] = summary["units"]
     return units["angle" if summary["turn"] > 0 and summary["length"] == 0 else "length"]
 
@@ -71,7 +70,7 @@ def tolerance_text(least: float, greatest: float, unit: str = "mm") -> str:
 
 
 def distance_text(distance: float, unit: str = "mm", form: str = ".3g") -> str:
-    """A small distance: `9.39 µm` for millimetres, to a tenth of a nanometre, `0.00939 rad` for others."""
+    """A small distance: `9.39 µm` for mm, to a tenth of a nanometre; `0.00939 rad` for other units."""
     return f"{round(1e3 * distance, 4) + 0.0:{form}} µm" if unit == "mm" else f"{distance:{form}} {unit}"
 
 

@@ -1,4 +1,4 @@
-"""The independent audit: every limit measured again on path, profile and setpoints, by differences alone."""
+"""The independent audit: measures path, profile and setpoints against every limit by differences alone."""
 
 from __future__ import annotations
 
@@ -26,21 +26,22 @@ from feedplan.units import shared_unit
 
 __all__ = ["PASS_MARK", "Audit", "LimitCheck", "audit", "audit_setpoints"]
 
-# Share of the audit's time that path and profile take where setpoints follow, for the progress shown.
+# Share of the audit's progress for path and profile if setpoints are audited after them.
 PLAN_SHARE = 0.25
-# How far it is when the feeds of the blocks are known.
+# Share of progress reached when the feeds of the blocks are known.
 FEED_SHARE = 0.004
-# How far the audit of setpoints from files is before what is recorded of them is compared.
+# Share of progress reached, in the audit of setpoints from files, before recorded velocities, accelerations
+# and jerks are compared with each other.
 RECORDED_SHARE = 0.8
 
-# Setpoints that are computed, audited and written at once: 16 times the 1024 of one native task, so that all
-# processors finish together, and few enough that their memory is used again.
+# Number of setpoints that are computed, audited and written at once: 16 native tasks of 1024 setpoints each,
+# so that all processors finish together, and few enough that their memory is reused.
 CHUNK = 16_384
 
 
 @dataclass(frozen=True)
 class _Limits:
-    """What the native audit needs to know of machine and problem, one number an axis."""
+    """The limits that the native audit takes, one number for each axis."""
 
     max_velocity: list[float]
     max_acceleration: list[float]
@@ -68,17 +69,17 @@ def audit(
 ) -> Audit:
     """Measures a plan against every limit of its problem and machine.
 
-    The `profile` on its path; with a `program` the distance between followed and programmed path; with
-    `setpoints`, which are read chunk by chunk, their differences and their places on the path. Where the
-    joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
-    judged only if the method claims it (`jerk`): then in every third difference of the setpoints, and on the
-    continuous profile as well, whose acceleration may jump only where the curvature of the path does, by no
-    more than 4/3 of what the jerk limit makes in one servo period: more alone would break third differences.
-    `progress` is called with the part done; what it raises ends the audit.
+    It measures the `profile` on its path; with a `program`, the distance between followed and programmed
+    path; with `setpoints`, which are read chunk by chunk, their difference quotients and their distance from
+    the path. Where the joints are not the path's axes, joint limits are measured only by positions from the
+    kinematics. Jerk is judged only if the planner limits it (`jerk`): then in every third difference of the
+    setpoints, and on the continuous profile. There the acceleration may jump only where the curvature of the
+    path jumps, by at most 4/3 × jerk limit × servo period: a greater jump alone would exceed the jerk limit
+    in third differences. `progress` is called with the finished share; an exception from it ends the audit.
 
-    At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a
-    jump is an acceleration over one period, judged like any other by second differences: only the jump
-    that the machine file allows may exceed the limit there. Raises InputError where path, machine,
+    At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints such a
+    jump is an acceleration over one period, which second differences judge like any other; only the jump that
+    the machine file allows may exceed the acceleration limit there. Raises InputError where path, machine,
     program and setpoints do not belong together.
     """
     axes, problem_units, way_unit = problem.axes, problem.units, problem.unit
@@ -137,7 +138,7 @@ def _audit_axes(
     setpoints: Chunks | None,
     report: Listener,
 ) -> Results:
-    """Where the path's axes are the joints."""
+    """Audits a plan whose path axes are the joints."""
     plan_limits = replace(limits, period=float(problem.period))
     end = 1.0 if setpoints is None else PLAN_SHARE
     feed = feed_limits(problem, program, part(report, 0.0, FEED_SHARE))
@@ -146,7 +147,7 @@ def _audit_axes(
     results = [audit_plan(problem, plan_limits, feed, profile, program, whole)]
     if setpoints is not None:
         report(PLAN_SHARE)
-        # Setpoints on a path that has been measured need not be measured against the program as well.
+        # The path is already compared with the program, so the setpoints need not be.
         findings, _ = results[0]
         used = [ratio for name, _, _, _, ratio, _, _ in findings if name == "deviation"]
         stream = SetpointAudit(
@@ -169,7 +170,7 @@ def _audit_joints(
     setpoints: Chunks | None,
     report: Listener,
 ) -> Results:
-    """Where the path is the tool tip's: the tip by its path, the joints by the kinematics."""
+    """Audits a plan on the tool tip's path: the tip's limits on this path, the joints' by the kinematics."""
     axes = len(problem.path.axes)
     free = replace(
         limits,
@@ -203,7 +204,7 @@ def _audit_joints(
 
 
 def _seen(stream: SetpointAudit, setpoints: Chunks) -> Findings:
-    """What the audit of a stream finds in all its setpoints."""
+    """Audits all setpoints as a stream; returns the findings."""
     for chunk, share in setpoints:
         stream.push(
             np.ascontiguousarray(chunk.t, np.float64),
@@ -217,7 +218,7 @@ def _seen(stream: SetpointAudit, setpoints: Chunks) -> Findings:
 
 
 def _known(values: Floats) -> Floats | None:
-    """A column as the native audit takes it; None where it has no rows, and so is not known."""
+    """A column as the native audit takes it; None if it has no rows, because its values are unknown."""
     return np.ascontiguousarray(values, np.float64) if len(values) else None
 
 
@@ -233,21 +234,21 @@ def audit_setpoints(
 ) -> Audit:
     """Measures setpoints from files against the limits of a machine, by finite differences alone.
 
-    Velocity, acceleration and jerk may have no rows. Recorded velocities must be those of the positions,
-    recorded accelerations within the limit and those of the velocities, and where jerk is judged recorded
-    jerks those of the accelerations (`feedplan.audit.recorded`). `corners`: the velocity may jump from one
-    period to the next by what the acceleration limit gives in one, as where corners of lines are passed.
-    `resolution` [mm] is the last digit of positions that were written as text: what its rounding adds to a
-    difference is allowed. The `period` [s] is that of the times. Jerk is judged only if `jerk` says so.
-    A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
-    where the direction turns; only there it is allowed for. `progress` is called with the part done; what it
-    raises ends the audit. Raises InputError for axes that the machine lacks, and for a single setpoint.
+    Columns of velocity, acceleration and jerk may be empty. Recorded velocities must match the positions.
+    Recorded accelerations must keep the limit and match the velocities; where jerk is judged (`jerk`),
+    recorded jerks must match the accelerations (`feedplan.audit.recorded`). `corners` allows the velocity to
+    jump by acceleration limit × period from one setpoint to the next, as on paths that pass corners between
+    lines. `resolution` [mm] is the last digit of positions that were written as text: its rounding is allowed
+    for in differences. `period` [s] is the time step. A velocity jump that the machine allows at corners
+    appears as one or two accelerations above the limit where the direction turns; it is allowed only there.
+    `progress` is called with the finished share; an exception from it ends the audit. Raises InputError for
+    axes that the machine lacks, and for fewer than two setpoints.
     """
     names, machine_axes = points.axes, _machine_axes(machine, points.axes)
     if len(points) < 2:
         raise InputError(f"{len(points)} setpoints cannot be audited: give at least two")
     own_jump = [axis.max_velocity_jump for axis in machine_axes]
-    # What is no limit but a share of one is that of the smaller one of both directions.
+    # Allowances that are a share of a limit use the smaller limit of both directions.
     least = [size_of(axis.max_acceleration) for axis in machine_axes]
     jump = [max(own, corners * period * size) for own, size in zip(own_jump, least, strict=True)]
     limits = _Limits(
@@ -284,14 +285,14 @@ def audit_setpoints(
 
 
 def _in_chunks(points: SetpointChunk, report: Listener | None) -> Chunks:
-    """Setpoints in chunks; before each `report` is called with the part of them that is done."""
+    """The setpoints in chunks; `report` is called with the finished share before each chunk."""
     for start in range(0, len(points), CHUNK):
         tell(report, start / len(points))
         yield points.part(slice(start, start + CHUNK), points.axes), None
 
 
 def _with_shares(setpoints: Setpoints | Iterable[SetpointChunk], report: Listener | None) -> Chunks:
-    """The setpoints in chunks, each with a listener for its progress; None where their number is unknown."""
+    """The setpoints in chunks, each with its progress callback (None if their number is unknown)."""
     if not isinstance(setpoints, Setpoints):
         yield from ((chunk, None) for chunk in setpoints)
         return

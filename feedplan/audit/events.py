@@ -1,4 +1,4 @@
-"""The check of events against the setpoints that they go with."""
+"""Checks events (stops, dwells, tool changes …) against the setpoints that belong to them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from feedplan.events import Event, TimedEvents
 from feedplan.program.actions import KINDS
 from feedplan.setpoints import SetpointChunk
 
-# Greatest difference of positions at one stop, in roundings of the greatest coordinate.
+# Positions during one stop may differ by this many units in the last place of the greatest coordinate.
 _ROUNDINGS = 4
-# A tool counts as at rest up to this part of its speed one period away: the time of a stop is rounded.
+# A tool rests if its speed is at most this share of its speed one period before or after: the time of a stop
+# is rounded.
 _REST = 1e-6
 
 
@@ -24,8 +25,8 @@ def require_events(
     """Raises InputError unless the events are of known kinds, in order and within the time of the setpoints,
     and the tool rests where they stop it: at the first setpoint at or after an event, all through a dwell.
 
-    Times may differ by `rounding` [s], a small part of a period, places of a tool at rest by `resolution`
-    [mm].
+    Times may differ by `rounding` [s], a small part of a period; positions of a tool at rest by 2 ×
+    `resolution` [mm].
     """
     rows = list(events)
     begin, end = float(points.t[0]), float(points.t[-1])
@@ -56,7 +57,7 @@ def require_events(
 
 
 def _moves(velocity: Floats, row: int) -> bool:
-    """Whether the tool moves at a row, by the velocities around it; False where none are known."""
+    """Whether the tool moves at a row, by the velocities around it; False if these are unknown."""
     if not len(velocity):
         return False
     speed = np.abs(velocity).max(axis=1)

@@ -1,8 +1,8 @@
-"""How fast the tool may go on each piece by the words of its program: which axes a block moves, and its feed.
+"""Speed limits of each piece from the words of its program: the axes that a block moves, and its feed.
 
 A feed holds along X, Y and Z where the block moves one of these, else along U, V and W, else for all other
-axes together. A piece is held to the feeds of all moves that it follows, and to those of its neighbours along
-axes that its own moves do not move: on a blend both blocks count.
+axes together. A piece keeps the feeds of all moves that it follows. Along axes that none of these moves, it
+keeps the feeds of the neighbouring moves: on a blend the feeds of both blocks hold.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from feedplan.constraints.problem import Problem
 from feedplan.program.program import Program
 from feedplan.progress import Listener, tell
 
-# X, Y, Z; U, V, W; the other axes; all together, where no program says more.
+# Indices of the speeds: 0 is X, Y, Z; 1 is U, V, W; 2 is the other axes; 3 (`ALL`) is all axes together, for
+# paths without a program.
 _LETTERS = (("X", "Y", "Z"), ("U", "V", "W"))
 ALL = 3
 
 
 def feed_axes(names: tuple[str, ...]) -> list[list[float]]:
-    """Which axes are in which speed, 1 or 0 (4, axes)."""
+    """Whether each axis (column) counts in each speed (row), 1 or 0 (4, axes)."""
     linear, parallel = ([float(name in letters) for name in names] for letters in _LETTERS)
     return [
         linear,
@@ -31,13 +32,13 @@ def feed_axes(names: tuple[str, ...]) -> list[list[float]]:
 
 
 def feed_limits(problem: Problem, program: Program | None, progress: Listener | None = None) -> Floats:
-    """The greatest of each speed on each piece (n, 4) [mm/s, deg/s]; infinite where it is not limited.
+    """The limit of each speed on each piece (n, 4) [mm/s, deg/s]; infinite where it is not limited.
 
-    Without a program the numbers are the problem's: along the axes that the piece moves if the problem counts
-    axes by shares, else in all axes together. `progress` is called when half of the work is done.
+    Without a program the limits are the problem's feeds: along the axes that the piece moves if the problem
+    has `feed_share`, else along all axes together. `progress` is called when half of the work is done.
     """
     path = problem.path
-    # Speed by speed, (4, n): much faster than four numbers for each of many pieces.
+    # Stored speed by speed, (4, n): much faster in NumPy than rows of four numbers.
     limits = np.full((4, len(path)), np.inf)
     groups = np.array(feed_axes(path.axes), dtype=bool)[:ALL]
     if program is not None:
@@ -70,7 +71,7 @@ def feed_limits(problem: Problem, program: Program | None, progress: Listener | 
 
 
 def _any(moving: Flags, groups: Flags) -> Flags:
-    """Which groups have an axis that moves (3, n)."""
+    """Whether each group has a moving axis in each row (3, n)."""
     moves = np.zeros((len(groups), len(moving)), dtype=np.bool_)
     for group, axis in np.argwhere(groups):
         moves[group] |= moving[:, axis]

@@ -1,4 +1,4 @@
-"""The audit of a table of knots: each run by its own step, from rest to rest."""
+"""Audits a table of knots: each part between two knots at rest by its own, constant time step."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def audit_knots(
 ) -> Audit:
     """Measures knots against the limits of a machine; arguments as for `audit_setpoints`.
 
-    Between two knots at rest all steps are one period of that part. What is measured is what the knots say:
-    mean velocities, accelerations and jerks over one, two and three steps, and velocities that belong to the
-    positions. The acceleration of the cubics that a drive makes of them is reported, not judged. Raises
-    InputError as `audit_setpoints`.
+    Between two knots at rest all time steps are equal, and this step is the `period` of that part. Measured
+    are mean velocities, accelerations and jerks over one, two and three steps, and whether velocities match
+    the positions. The acceleration of the cubics that a drive interpolates between knots is reported, not
+    judged. Raises InputError as `audit_setpoints` does.
     """
     t, axes = points.t, points.axes
     limits = [machine.axis(name).acceleration_range for name in axes if name in machine.axis_names]
@@ -59,7 +59,7 @@ def audit_knots(
 
 
 def _between(points: SetpointChunk, limits: Floats) -> Findings:
-    """The greatest accelerations on the cubics between knots; they are at the ends of a step."""
+    """The greatest acceleration on the cubic of each step; a cubic reaches it at an end of the step."""
     worst = Worst()
     t, velocity, line = points.t, points.velocity, points.line
     step = np.diff(t)[:, None]

@@ -1,10 +1,10 @@
-"""Recorded velocities, accelerations and jerks of setpoints against each other.
+"""Checks recorded velocities, accelerations and jerks of setpoints against each other.
 
-The mean of an acceleration over some steps is the change of the velocity over their time. It lies among the
-accelerations recorded at these setpoints, as far as those show what happens between them: within one step an
-acceleration may come and go, and be recorded nowhere. That changes the velocity by one or two accelerations
-times a period, so the mean over `STEPS` steps may leave the recorded range by `SHARE` of the limit. The same
-holds for the acceleration and the jerk, where the jerk is limited.
+The change of the velocity over some steps, divided by their time, is the mean acceleration. It lies between
+the least and the greatest acceleration recorded at these setpoints, except for accelerations that begin and
+end within one step and are recorded nowhere. These change the velocity by one or two times acceleration ×
+period, so the mean over `STEPS` steps may be outside the recorded range by `SHARE` of the limit. The same
+holds for the change of the acceleration and the recorded jerk, where jerk is limited.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ from feedplan.arrays import Floats
 from feedplan.audit.worst import Findings, Worst
 from feedplan.progress import Listener, tell
 
-# Steps of the mean: the ramps of a machine are longer, or its feed is slow.
+# Number of steps of the mean: the ramps of a machine take longer than this, or its feed is slow.
 STEPS = 16
 
-# What the mean may leave the recorded range by, as a share of the limit: four accelerations times a period.
+# Allowed distance of the mean from the recorded range, as a share of the limit; over 16 steps this is a
+# change of velocity of four times acceleration × period.
 SHARE = 0.25
 
 # Number of steps whose means are computed at once.
@@ -36,11 +37,12 @@ def audit_recorded(
     line: NDArray[np.int32],
     progress: Listener | None = None,
 ) -> Findings:
-    """The greatest contradiction, as the check `name`.
+    """The greatest distance of the mean change of `rate` from the recorded range of `change`, as the check
+    `name`.
 
-    `t` (n,) [s]; `rate` (n, axes) and what is recorded as its `change` by time, which the `limit` (axes,)
-    holds for; `jump` (axes,) is what a rate may jump by in each step. `line` (n,) source lines.
-    `progress` is called with the part done.
+    `t` (n,) [s]; `rate` (n, axes) is a velocity or acceleration, `change` (n, axes) its recorded derivative
+    by time, `limit` (axes,) the limit of `change`, `jump` (axes,) the allowed jump of `rate` in each step.
+    `line` (n,) are source lines. `progress` is called with the finished share.
     """
     worst = Worst()
     for start in range(0, len(t) - STEPS, _AT_ONCE):
@@ -59,7 +61,7 @@ def audit_recorded(
 
 
 def _over_steps(pick: np.ufunc, values: Floats) -> Floats:
-    """The least or greatest of each `STEPS` + 1 consecutive rows."""
+    """Least or greatest values (by `pick`) over each `STEPS` + 1 consecutive rows."""
     reach = 1
     while reach < STEPS:
         values = pick(values[:-reach], values[reach:])

@@ -1,4 +1,4 @@
-"""What an audit says: the worst place of every limit, in numbers and in sentences."""
+"""The verdict of an audit: the worst place of every limit, as numbers and as sentences."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any, NamedTuple
 from feedplan.audit.worst import Findings
 from feedplan.units import finite
 
-# A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
-# long paths (some 1e-10) and means nothing to a machine.
+# A measured value passes up to this multiple of its limit. The margin of 1e-6 covers the planner's own
+# rounding over long paths (about 1e-10) and is negligible for a machine.
 PASS_MARK = 1.0 + 1e-6
 
 
-# Times [s] from here on are shown by their first digits.
+# Times [s] from this one on are shown by significant digits, not by decimals.
 _LONGEST = 1e12
 
 
 class _Kind(NamedTuple):
-    """How a check is called in a sentence, and its unit."""
+    """The name of a checked quantity in a sentence, and its unit."""
 
     quantity: str
     unit: str
@@ -52,10 +52,10 @@ _KINDS = {
     "numbers": _Kind("number that is not finite or out of its range", ""),
 }
 
-# Checks that are reported and never judged: what they measure is not part of a plan.
+# Checks that are reported, never judged: they measure something that is not part of a plan.
 _TOLD = ("cubic_acceleration",)
 
-# What None stands for in JSON.
+# The values that None replaces in JSON.
 _NOT_FINITE = {"worst": math.nan, "limit": math.inf, "ratio": math.nan, "time": math.nan}
 
 # Limits of the machine and the program; all other checks are checks of consistency.
@@ -64,10 +64,10 @@ _LIMITS = {
     *("jump", "acceleration_jump"),
 }
 
-# Jumps of velocity up to here are none [mm/s].
+# Limits of velocity jumps up to this value count as no jump allowed [mm/s].
 _NO_JUMP = 1e-3
 
-# Where these fail, the differences over those times and numbers mean nothing.
+# If these checks fail, the results of the others are meaningless, so they are named first.
 _EXPLAINING = ("numbers", "grid")
 
 
@@ -75,10 +75,11 @@ _EXPLAINING = ("numbers", "grid")
 class LimitCheck:
     """The worst place of one limit.
 
-    `worst` is the value measured there, less what rounding may have added, `limit` what is allowed, `ratio`
-    their quotient; `time` [s] and source `line` say where (line 0: not known). `axis` is None where the check
-    belongs to no axis. What is not `judged` is reported only. In `travel` the ratio is the share of half the
-    travel. `length` is the unit of positions or of the path, `unit` that of the values.
+    `worst` is the value measured there, less its rounding error bound, `limit` the allowed value, `ratio`
+    worst / limit; `time` [s] and source `line` are the place (line 0: not known). `axis` is None where the
+    check belongs to no axis. A check that is not `judged` is only reported. For `travel`, `ratio` is the
+    distance from the middle of the travel over half the travel. `length` is the unit of positions or of the
+    path, `unit` that of the values.
     """
 
     name: str
@@ -93,7 +94,7 @@ class LimitCheck:
 
     @property
     def ok(self) -> bool:
-        """Whether the limit holds, or is not judged. What is not a number never holds."""
+        """Whether the limit holds or is not judged. NaN never holds."""
         return not self.judged or self.ratio <= PASS_MARK
 
     @property
@@ -120,7 +121,7 @@ class LimitCheck:
         return f"{place}: {what} {self.worst:.7g}{unit}, the limit is {self.limit:.7g}{unit}{times}"
 
     def to_json(self) -> dict[str, Any]:
-        """The numbers by name; what is not finite is None."""
+        """The numbers by name; None for numbers that are not finite."""
         return {
             "ok": self.ok,
             "worst": finite(self.worst),
@@ -146,7 +147,7 @@ class Audit:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """A sentence for every check that fails: place, value, limit; what explains others comes first."""
+        """A sentence for each failed check (place, value, limit); checks that explain others come first."""
         if not self.checks:
             return ("there is nothing that could be measured",)
         broken = sorted(self.broken, key=lambda check: check.name not in _EXPLAINING)
@@ -159,7 +160,7 @@ class Audit:
 
     @property
     def nearest(self) -> LimitCheck | None:
-        """The judged limit of the machine or the program that is used most."""
+        """The judged limit of the machine or the program with the greatest ratio."""
         used = (check for check in self.checks if check.judged and check.is_limit)
         return max(used, key=lambda check: check.ratio, default=None)
 
@@ -169,14 +170,14 @@ class Audit:
         return f"<Audit of {self.checked_samples} samples: {said}>"
 
     def check(self, name: str, axis: str | None = None) -> LimitCheck:
-        """One check by its name and axis. Raises KeyError where it was not made."""
+        """The check of a name and axis. Raises KeyError if it was not made."""
         for check in self.checks:
             if (check.name, check.axis) == (name, axis):
                 return check
         raise KeyError((name, axis))
 
     def to_json(self) -> dict[str, Any]:
-        """`ok`, `checked_samples`, `failures`, and the checks by name, those of an axis by name and axis."""
+        """`ok`, `checked_samples`, `failures`, and the checks by name, or by name and axis."""
         result: dict[str, Any] = {
             "ok": self.ok,
             "checked_samples": self.checked_samples,
@@ -191,7 +192,8 @@ class Audit:
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any], units: Mapping[str, str], length: str) -> Audit:
-        """The audit from `to_json`; `units` are those of the axes, `length` is that of the path."""
+        """Rebuilds the audit from `to_json`; `units` are the axes' units, `length` is the unit of the
+        path."""
         checks = []
         for name, entry in table.items():
             if name not in _KINDS:
@@ -213,9 +215,9 @@ def join(
     units: tuple[str, ...],
     way_unit: str,
 ) -> Audit:
-    """The worst of all results for every check, in the order of `_KINDS`.
+    """The verdict from several findings: the worst of each check, in the order of `_KINDS`.
 
-    `units` are those of the axes, `way_unit` that of lengths which belong to none of them.
+    `units` are the axes' units, `way_unit` is the unit of lengths that belong to no axis.
     """
     checks, samples = [], 0
     for findings, count in results:

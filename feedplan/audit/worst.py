@@ -1,4 +1,4 @@
-"""The worst places found by checks made in numpy, in the form in which the native audit gives its own."""
+"""Collects the worst place of each check made in NumPy, in the same form as the native audit's findings."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from feedplan.arrays import Floats
 
 # Name, axis (−1: none), worst value, limit, ratio, time, source line.
 Finding = tuple[str, int, float, float, float, float, int]
-# What was found, and the number of samples that were taken for it.
+# The findings, and the number of samples that they come from.
 Findings = tuple[list[Finding], int]
 
 
 class Worst:
-    """Keeps the worst place of every check; it measures samples that the native audit has counted."""
+    """Keeps the worst place of every check; the native audit has counted the samples already."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[str, int], Finding] = {}
@@ -22,8 +22,7 @@ class Worst:
     def offer(
         self, name: str, value: Floats, limit: Floats, time: Floats, line: NDArray[np.int32], axis: int
     ) -> None:
-        """Values of an axis at places (n,), each with its limit. What is not a number is the worst there
-        is."""
+        """Compares values of an axis at places (n,) with their limits; keeps the worst (NaN is worst)."""
         if not len(value):
             return
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -36,5 +35,5 @@ class Worst:
             self._found[name, axis] = (name, axis, max(float(value[worst]), 0.0), *place)
 
     def findings(self) -> Findings:
-        """What was found."""
+        """The findings, with 0 samples."""
         return list(self._found.values()), 0

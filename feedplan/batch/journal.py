@@ -38,7 +38,7 @@ class Journal:
         except OSError:
             self._file.close()
             raise InputError(f"another batch works on {folder}: choose another folder with -o") from None
-        # Temporary folders of a batch that was killed.
+        # Removes temporary folders of a batch that was killed.
         for left in folder.glob(".feedplan-*"):
             shutil.rmtree(left, ignore_errors=True)
         self._known = self._read()

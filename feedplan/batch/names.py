@@ -1,4 +1,4 @@
-"""Names of folders from the names of programs: readable, valid on every file system, all different."""
+"""Makes names of folders from the names of programs: readable, valid on every file system, all different."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import PurePath
 
-# Longest name: file systems allow 255 bytes, and the length of paths is limited too.
+# The greatest length of a name: file systems allow 255 bytes, and the length of paths is limited too.
 LONGEST = 100
 _OTHERS = re.compile(r"[^A-Za-z0-9._+-]+")
 # Names that Windows reserves for devices.

@@ -1,4 +1,4 @@
-"""The number of jobs to send as one task, because a task costs more than a small job."""
+"""Chooses the number of jobs that are sent as one task, because a task costs more than a small job."""
 
 from __future__ import annotations
 
@@ -29,8 +29,7 @@ class Packing:
             self._size += NEWS * (outcome.size - self._size)
 
     def count(self, left: int, slots: int) -> int:
-        """The number of jobs of the next task, of those that are left; small enough to keep all slots busy to
-        the end."""
+        """The number of jobs of the next task if `left` jobs remain; small enough to keep all slots busy."""
         with self._lock:
             if self._seconds is None:
                 return 1

@@ -1,4 +1,4 @@
-"""Plans a sweep on an executor, with a limited number of jobs at a time; rows are kept as jobs end."""
+"""Plans a sweep on an executor, with a limited number of jobs at a time; keeps each row when its job ends."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Row = dict[str, Any]
 def run_batch(
     sweep: Sweep, folder: FilePath, executor: Executor, progress: Progress | None = None
 ) -> tuple[list[Row], int]:
-    """Plans all of a sweep into `folder`; returns a row for each plan in order, and the number of plans that
-    were there already.
+    """Plans all jobs of a sweep into `folder`; returns a row for each plan in order, and the number of plans
+    that existed already.
 
-    `progress("batch", done)` is called with the part that is done. An exception, such as KeyboardInterrupt,
+    `progress("batch", done)` is called with the finished share. An exception, such as KeyboardInterrupt,
     stops the running jobs; finished plans stay, and another call with the same folder continues. Raises
     InputError if the folder or the executor cannot be used any more.
     """

@@ -1,4 +1,4 @@
-"""The rows of a batch as batch.csv, batch.json and a table on the terminal."""
+"""Writes the rows of a batch as batch.csv, batch.json and a table for the terminal."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HEADER = ("plan", "machine", "tolerance", "method", "time s", "gap", "computing"
 
 
 def summary_of(rows: Sequence[dict[str, Any]], kept: int, seconds: float) -> dict[str, Any]:
-    """The content of batch.json: the number of plans, the number of kept ones, and a row for each."""
+    """The content of batch.json: the number of plans, how many of them existed already (`kept`), all rows."""
     return {
         "format": 1,
         "plans": len(rows),
@@ -33,7 +33,7 @@ def summary_of(rows: Sequence[dict[str, Any]], kept: int, seconds: float) -> dic
 
 
 def write_summary(summary: dict[str, Any], folder: FilePath) -> tuple[FilePath, ...]:
-    """Writes both files; returns them. Raises InputError if the file system refuses."""
+    """Writes both files; returns their paths. Raises InputError if they cannot be written."""
     with staged(folder, last=SUMMARY) as stage:
         (stage / SUMMARY).write_text(summary_text(summary), encoding="utf-8")
         with (stage / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as stream:
@@ -49,7 +49,7 @@ def _cell(value: Any) -> Any:
 
 
 def table_rows(rows: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """The rows under `HEADER`."""
+    """The rows of the terminal's table, with the columns of `HEADER`."""
     return [
         (
             row["folder"],

@@ -1,4 +1,4 @@
-"""The plans of a batch: every program on every machine, at every tolerance, by every method."""
+"""Lists the plans of a batch: every program on every machine, at every tolerance, by every method."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Item:
 
     @property
     def files(self) -> list[FilePath]:
-        """What its folder has once it is planned, besides the report."""
+        """The files that its folder has after planning, except the report."""
         outputs = formats_named(self.job.order.formats).values()
         return [self.job.folder / name for name in (SUMMARY_FILE, *(output.FILE for output in outputs))]
 

@@ -47,13 +47,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _close_output()
         return PIPE_CLOSED
     except SystemExit as ended:
-        # click ends with 1 where a command writes into a closed pipe; 1 means a broken limit here.
+        # click ends with 1 if a command writes into a closed pipe; here 1 means a broken limit.
         if ended.code != 1:
             raise
         return PIPE_CLOSED
     except OSError as error:
-        # Errors of files are FeedplanErrors; an OSError comes from the standard output (a full disk, for
-        # instance).
+        # Errors of files are FeedplanErrors; an OSError comes from standard output (for example a full disk).
         _close_output()
         return fail(
             f"the standard output cannot be written: {(error.strerror or str(error)).lower()}", BAD_INPUT
@@ -65,8 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _close_output() -> None:
-    """Sends the rest of the output to nowhere: else the interpreter prints an error when it flushes it at
-    exit."""
+    """Discards the rest of the output: the interpreter would print an error when flushing it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -75,7 +73,7 @@ def _explained(error: Exception) -> tuple[str, int]:
     if isinstance(error, (InfeasibleError, SolverError)):
         return str(error), BROKEN
     if isinstance(error, FeedplanError):
-        # Programs and machine files have words of their own.
+        # Messages about programs and machine files use names of their own, not those of arguments.
         return _by_option(str(error)) if type(error) is InputError else str(error), BAD_INPUT
     if isinstance(error, MemoryError):
         return "the memory of this computer does not suffice: split the program", BAD_INPUT
@@ -85,7 +83,7 @@ def _explained(error: Exception) -> tuple[str, int]:
 
 
 def _by_option(sentence: str) -> str:
-    """The sentence with `--feed-step` for the argument `feed_step` of Python, and so on."""
+    """The sentence with option names such as `--feed-step` in place of Python's `feed_step`."""
     options = (
         option.name
         for command in _PLANNING
@@ -93,7 +91,7 @@ def _by_option(sentence: str) -> str:
         if option.name and "_" in option.name and f"--{option.name.replace('_', '-')}" in option.opts
     )
     names = "|".join(dict.fromkeys(options))
-    # Not within the name of a file.
+    # Names within file names are not replaced.
     alone = rf"(?<![\w./-])({names})(?![\w/-]|\.\w)"
     return re.sub(alone, lambda found: f"--{found[0].replace('_', '-')}", sentence)
 

@@ -27,7 +27,7 @@ from feedplan.units import counted, duration_text
 if TYPE_CHECKING:
     from feedplan.jobs.executor import Executor, JobLimits
 
-# Help text of the options that are swept.
+# Part of the help text of options that can be swept.
 _SWEPT = "may be given several times"
 
 

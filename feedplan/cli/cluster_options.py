@@ -18,7 +18,7 @@ def _address(
     return None
 
 
-# The command gets them as one argument, `cluster`, a ClusterAddress or None.
+# The command gets these options as one argument, `cluster`, a ClusterAddress or None.
 cluster_options = as_one(
     "cluster",
     _address,

@@ -114,7 +114,7 @@ def compare(
 
 
 def _warnings(rows: Sequence[Row]) -> Iterator[str]:
-    """The warnings of all plans, each once; with the method where not all plans have it."""
+    """The warnings of all plans, each once; with the names of the methods if not all plans have it."""
     plans = [row.plan for row in rows if row.plan]
     for warning in dict.fromkeys(warning for plan in plans for warning in plan.warnings):
         own = [plan.method for plan in plans if warning in plan.warnings]

@@ -12,13 +12,13 @@ from feedplan.errors import MachineError
 from feedplan.machine.controller import MODELS, Controller
 from feedplan.machine.machine import Machine
 
-# Makes the controller that the command line names, for a machine; None without a controller.
+# Returns the controller of the command line for a machine; None without a controller.
 Choice = Callable[[Machine], Controller | None]
 
 
 def chosen(machine: Machine, name: str | None, parameters: dict[str, Any]) -> Controller | None:
-    """The controller of that name with these parameters, added to the machine's if its controller has this
-    name.
+    """The controller of that name with these parameters, which are added to those of the machine's controller
+    if that has the same name.
 
     Raises MachineError for parameters without a controller.
     """
@@ -48,7 +48,7 @@ def _choice(controller: str | None, controller_options: tuple[str, ...]) -> Choi
     return lambda machine: chosen(machine, controller, given)
 
 
-# The command gets them as one argument, `controller`, a `Choice`.
+# The command gets these options as one argument, `controller`, a `Choice`.
 controller_options = as_one(
     "controller",
     _choice,

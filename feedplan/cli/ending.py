@@ -1,4 +1,4 @@
-"""How a command ends: its exit code, and the sentence of an error.
+"""The end of a command: its exit code, and the sentence of an error.
 
 0 done, 1 a limit is broken or no plan is feasible, 2 bad input or usage, 70 a defect in feedplan.
 """

@@ -28,13 +28,13 @@ from feedplan.program.program import Program
 from feedplan.program.read import Reading
 from feedplan.program.source import Source
 
-# For each stage: total progress at its begin [%], and its share of the total [%].
+# For each stage: total progress at its start [%], and its share of the total [%].
 _STAGES = {"read": (0, 10), "fit": (10, 20), "plan": (30, 40), "audit": (70, 20)}
 
 
 def filter_progress(write: Callable[[str], object]) -> Callable[[str, float], None]:
-    """A progress function that writes the total over all stages as LinuxCNC reads it, each whole per cent
-    once."""
+    """A progress function that writes the total progress over all stages in the form that LinuxCNC reads,
+    each whole per cent once."""
     told = -1
 
     def tell(stage: str, done: float) -> None:
@@ -88,6 +88,6 @@ def filter_(
 
 
 def _without_travel(machine: Machine) -> Machine:
-    """The same machine without ends of travel: only LinuxCNC knows the work offsets."""
+    """This machine with infinite travel, because only LinuxCNC knows the work offsets."""
     free = tuple(replace(axis, travel=(-math.inf, math.inf)) for axis in machine.axes)
     return replace(machine, axes=free)

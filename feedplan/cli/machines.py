@@ -81,7 +81,8 @@ def _limit(given: str) -> tuple[str, float]:
 
 
 def _write(text: str, output: str | None) -> None:
-    """Writes to standard output or to a new file; a file that exists may be edited by hand, and is kept."""
+    """Writes to standard output or to a new file. An existing file may have been edited by hand: it is kept,
+    and InputError is raised."""
     from feedplan.arguments import file_path
     from feedplan.outputs._staging import staged
 
@@ -104,7 +105,7 @@ def _machine_row(machine: Machine) -> tuple[str, ...]:
 
 
 def _by_unit(machine: Machine, limit: str) -> str:
-    """A limit of all axes, with a unit after the last of those that have it: `500 500 mm 150 deg`."""
+    """A limit of all axes, with the unit once after consecutive axes that share it: `500 500 mm 150 deg`."""
     groups = groupby(machine.axes, key=lambda axis: axis.unit)
     return " ".join(
         " ".join((*(_limit_text(getattr(axis, limit)) for axis in axes), unit)) for unit, axes in groups

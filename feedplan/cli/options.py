@@ -128,9 +128,9 @@ def _source(given: str) -> str | IO[bytes]:
 def as_one(
     name: str, make: Callable[..., Any], options: Sequence[Callable[..., Any]]
 ) -> Callable[[Command], Command]:
-    """Adds options to a command; its help lists them in this order.
+    """Adds options to a command; the command's help lists them in this order.
 
-    The command gets what `make` makes of them, by their names, as one argument of this `name`.
+    The command gets the result of `make(**options)` as one argument of this `name`.
     """
     taken = tuple(inspect.signature(make).parameters)
 
@@ -146,7 +146,7 @@ def as_one(
 
 
 def by_name(pairs: Iterable[tuple[str, Value]], option: str) -> dict[str, Value]:
-    """The values by their names. Raises UsageError for a name that an option was given twice with."""
+    """The values by their names. Raises UsageError for a name that is given twice."""
     found: dict[str, Value] = {}
     for name, value in pairs:
         if name in found:
@@ -166,5 +166,5 @@ def name_of(program: str | IO[bytes]) -> str:
 
 
 def given_only(**options: Any) -> dict[str, Any]:
-    """The options that were given; the method refuses those that it does not take."""
+    """The options that were given (not None); the method refuses those that it does not take."""
     return {name: value for name, value in options.items() if value is not None}

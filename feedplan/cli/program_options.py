@@ -1,4 +1,4 @@
-"""Options of the command line that ask for the program with planned feeds."""
+"""Options of the command line for the program with planned feeds."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ProgramWanted:
-    """The files in which the program with planned feeds is wanted, and its options."""
+    """The requested files for the program with planned feeds, and its options."""
 
     file: str | None
     in_folder: bool
     options: dict[str, Any]
 
     def require_other(self, machine: str) -> None:
-        """Raises InputError if the file is the machine's: it would be lost."""
+        """Raises InputError if the file is the machine's file, which would be overwritten."""
         if self.file is not None:
             require_other(machine, FilePath(self.file), what="machine file")
 
     def make(self, plan: Plan) -> PlannedProgram | None:
-        """Makes the program if it is wanted, and writes it to the file if one is given; else returns None."""
+        """Makes the program if it is requested, and writes it to the file if one is given; else returns
+        None."""
         if self.file is None and not self.in_folder:
             return None
         from feedplan.planned_feeds.rewrite import planned_program, write_program
@@ -64,7 +65,7 @@ def _wanted(
     return ProgramWanted(program_out, in_folder, given)
 
 
-# The command gets them as one argument, `wanted`.
+# The command gets these options as one argument, `wanted`.
 program_options = as_one(
     "wanted",
     _wanted,

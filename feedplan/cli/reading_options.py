@@ -1,4 +1,4 @@
-"""Options of the command line that say how a program is read, and for which machine."""
+"""Options of the command line for reading a program, and the machine that they are for."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _reading(tool_table: str | None, subprograms: tuple[str, ...], whole_step: f
     return Reading(**given)  # type: ignore[no-any-return,typeddict-item]
 
 
-# The command gets them as one argument, `reading`.
+# The command gets these options as one argument, `reading`.
 reading_options = as_one(
     "reading",
     _reading,
@@ -45,8 +45,8 @@ reading_options = as_one(
 def machine_for(
     name: str, source: str | IO[bytes], reading: Reading, feed: float | None = None
 ) -> tuple[Machine, str | IO[bytes] | Program, Reading]:
-    """The machine of that name or file, the source and how it is to be read; for `auto` the smallest machine
-    that the program fits, and the program, which has then been read."""
+    """The machine of that name or file, the source and its reading options. For `auto` these are the smallest
+    machine that the program fits, the program, which has then been read, and no options."""
     if name != AUTO:
         return Machine.load(name), source, reading
     given = source if isinstance(source, str) else source.read()

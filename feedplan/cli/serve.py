@@ -36,7 +36,7 @@ def _limit_option(own: Field[Any]) -> Callable[..., Any]:
     )
 
 
-# The command gets them as one argument, `limits`.
+# The command gets these options as one argument, `limits`.
 limit_options = as_one("limits", Limits, [_limit_option(own) for own in fields(Limits)])
 
 

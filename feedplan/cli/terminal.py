@@ -82,7 +82,7 @@ def warn(sentences: Iterable[str]) -> None:
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
-    """A function that shows how far a stage is, on a terminal; None elsewhere."""
+    """A function that shows the progress of a stage on a terminal; None elsewhere."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
@@ -99,7 +99,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
         def show(stage: str, done: float) -> None:
             if stage not in tasks:
-                # When a stage begins the stages before it are done, even if they did not report 1.0.
+                # When a stage begins, the stages before it are finished, even if they did not report 1.0.
                 for earlier in tasks.values():
                     bars.update(earlier, completed=1.0)
                 tasks[stage] = bars.add_task(stage, total=1.0)
@@ -231,7 +231,7 @@ def fit_rows(fit: Mapping[str, Any], unit: str = "mm") -> list[tuple[str, str]]:
 
 
 def gain_text(gain: Mapping[str, Any]) -> str:
-    """What a path fitted to the speed gained."""
+    """The time saved by a path that is fitted to the speed, as text."""
     times = " → ".join(duration_text(float(seconds)) for seconds in gain["times"])
     if len(gain["times"]) == 1:
         return f"{times} as fitted: a path fitted to the speed gains nothing"

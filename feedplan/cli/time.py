@@ -16,7 +16,7 @@ from feedplan.program.read import Reading
 from feedplan.report.operations import PARTS, OperationTime, by_tool
 from feedplan.units import duration_text
 
-# Most operations in the table: the longest ones.
+# The greatest number of operations in the table: the longest ones are shown.
 _SHOWN = 60
 
 

@@ -1,1 +1,1 @@
-"""A feedplan service from Python, with the calls of the package itself."""
+"""Uses a feedplan service from Python, with the same calls as the package itself."""

@@ -1,4 +1,4 @@
-"""The calls of the package on a service.
+"""The calls of the package, made by a service.
 
 client = feedplan.Client("http://127.0.0.1:8000")
 plan = client.plan("part.ngc", "mill", method="jerk-limited")
@@ -42,18 +42,18 @@ from feedplan.program.source import Source, content_of
 from feedplan.progress import Progress
 from feedplan.setpoints import MAX_SETPOINTS, Interpolator
 
-# Longest silence of the service [s]; while a job runs it sends something every 15 s.
+# The longest time without an answer of the service [s]; while a job runs it sends something every 15 s.
 SILENCE = 60.0
-# The defaults of `feedplan.plan`, which need not be sent.
+# The defaults of `feedplan.plan`, which are not sent.
 _USUAL: dict[str, Any] = dict(local_plan.__kwdefaults__ or {})
 
 
 class Client:
     """A service at an address such as http://127.0.0.1:8000, with its `token` if it has one.
 
-    `timeout` [s] is the longest silence of the service. All methods raise FeedplanError with one sentence if
-    the service cannot be reached or refuses the request; a wrong program gives the same error as
-    `feedplan.plan`.
+    `timeout` [s] is the longest time without an answer of the service. All methods raise FeedplanError with
+    one sentence if the service cannot be reached or refuses the request; a wrong program gives the same error
+    as `feedplan.plan`.
     """
 
     def __init__(self, url: str, token: str | None = None, *, timeout: float = SILENCE) -> None:
@@ -85,8 +85,9 @@ class Client:
     ) -> RemotePlan:
         """The plan of a program, made by the service; the arguments are those of `feedplan.plan`.
 
-        Of `reading` the service takes `block_delete`, `whole_step` and the content of a `tool_table`. Ctrl-C,
-        or an exception from `progress`, cancels the job unless an equal job existed before.
+        The service accepts only `block_delete`, `whole_step` and the content of a `tool_table` from
+        `reading`. Ctrl-C, or an exception from `progress`, cancels the job unless an equal job existed
+        before.
         """
         given = {
             "tolerance": tolerance,
@@ -278,7 +279,7 @@ def _text(file: str | os.PathLike[str]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """A controller in the form of a machine file, or a number of numpy as one of Python."""
+    """A controller in the form of a machine file, or a NumPy number as a Python number."""
     return {"type": value.name, **value.parameters} if isinstance(value, Controller) else value.item()
 
 

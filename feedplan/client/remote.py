@@ -1,4 +1,4 @@
-"""A plan on a service: its figures are here, its setpoints and report are loaded when they are used."""
+"""A plan on a service: its figures are stored here, its setpoints and report are loaded when used."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ from feedplan.setpoints import SetpointChunk, chunks
 
 class RemotePlan:
     """A plan on a service, the result of the job `id`. Its attributes are those of `feedplan.planning.Plan`,
-    but without the exact motion (`at`): `time` [s], dwells included; `lower_bound` [s], which no feasible
-    profile of this path can beat; `gap`, (time − lower_bound) / time; `method`, and the `options` that the
-    plan was made with; `compute`, the computing time of each stage [s]; `warnings`, sentences for the
-    user."""
+    but without the exact motion (`at`): `time` [s], including dwells; `lower_bound` [s] of the time of every
+    feasible profile of this path; `gap`, (time − lower_bound) / time; `method`, and the `options` of the
+    plan; `compute`, the computing time of each stage [s]; `warnings`, sentences for the user."""
 
     def __init__(self, transport: Transport, job: Mapping[str, Any]) -> None:
         self._transport = transport

@@ -1,4 +1,4 @@
-"""Requests to a service over HTTP: JSON, files and events; its problems become errors of feedplan.
+"""Sends requests to a service over HTTP: JSON, files and events; its problems become errors of feedplan.
 
 It needs only `http.client`, which is slow to import and therefore imported with the first request.
 """
@@ -40,7 +40,8 @@ _PART = 1 << 20
 
 
 class Transport:
-    """Sends requests to the service at an address, with its `token`; `timeout` [s] is its longest silence."""
+    """Sends requests to the service at an address, with its `token`; `timeout` [s] is the longest wait for an
+    answer."""
 
     def __init__(self, url: str, token: str | None, timeout: float) -> None:
         parts = urlsplit(url if is_text(url) else "")
@@ -132,15 +133,15 @@ class Transport:
                         event = {}
                     else:
                         event = {}
-            # A stream that has ended by itself has no more events.
+            # Counts attempts without an event: a stream that has ended has no more events.
             silent += 1
 
 
 def _answer(
     connection: HTTPConnection, method: str, target: str, body: bytes | None, headers: Mapping[str, str]
 ) -> HTTPResponse:
-    """The answer to a request. A service that refuses a request answers before all of it has arrived and
-    closes the connection: sending then breaks, and the answer is there."""
+    """The answer to a request. A service that refuses a request answers before it has received all of it, and
+    closes the connection: sending then fails, but the answer can be read."""
     from http.client import HTTPException
 
     try:

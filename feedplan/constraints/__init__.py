@@ -1,1 +1,1 @@
-"""Limits: a path on a machine becomes the one problem that every planner takes."""
+"""Limits: builds the planning problem, which every planner takes, from a path and a machine."""

@@ -1,4 +1,5 @@
-"""The feed limit of each piece: the commanded feed or the user's, and the share of each axis in it."""
+"""The feed limit of each piece (the programmed feed or the user's) and the factor with which each axis
+velocity counts in that speed."""
 
 from __future__ import annotations
 
@@ -12,13 +13,13 @@ from feedplan.errors import InputError, at_line
 from feedplan.geometry.feed_groups import feed_groups, leading_feed, moving_axes
 from feedplan.geometry.path import Path
 
-# The least feed [mm/s, or the unit of the axes per second]: the times of slower plans lose their digits.
+# The least feed [mm/s, or the unit of the axes per second]: with slower ones rounding of the times matters.
 LEAST_FEED = 1e-6
 
 
 @dataclass(frozen=True)
 class FeedRequest:
-    """The user's choice in place of the programmed feeds: `feed` [mm/s], if given, times `override`."""
+    """The user's changes to the programmed feeds: `feed` [mm/s] replaces them, `override` multiplies them."""
 
     feed: float | None = None
     override: float = 1.0
@@ -31,13 +32,13 @@ class FeedRequest:
             object.__setattr__(self, "feed", feed)
 
     def of(self, feed: Floats) -> Floats:
-        """The feed in place of a programmed one; infinite ones stay."""
+        """The programmed feeds with the user's changes; infinite feeds (no limit) stay infinite."""
         given = feed if self.feed is None else np.where(np.isfinite(feed), self.feed, feed)
         return np.asarray(given * self.override)
 
 
 def feed_limit(path: Path, greatest: float, request: FeedRequest) -> Floats:
-    """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is the speed of rapids.
+    """Greatest speed of each piece (n,) [mm/s]. `greatest` [mm/s] is the speed of rapids and limits all.
 
     Raises InputError for a feed below `LEAST_FEED`.
     """
@@ -52,11 +53,12 @@ def feed_limit(path: Path, greatest: float, request: FeedRequest) -> Floats:
 
 
 def feed_share(path: Path, greatest: float, request: FeedRequest) -> Floats | None:
-    """The share of the velocity of each axis in the speed that `feed_limit` limits (n, axes).
+    """Factor of each axis velocity in the speed that `feed_limit` limits (n, axes); None if all moving axes
+    have the factor 1.
 
-    It is 1 on the axes along which that feed counts, and 0 on axes without a feed. Where a piece keeps feeds
-    along two groups of axes, the share of the second group is the quotient of both feeds, so that the sum of
-    squares keeps both. None where the shares of all axes that move are 1.
+    It is 1 for the axes along which the feed counts, and 0 for axes without a feed. Where a piece has feeds
+    along two groups of axes, the factor of the second group is first feed / second feed: limiting the root of
+    the sum of squares then keeps both feeds.
     """
     if path.group_feed is None:
         return None

@@ -1,8 +1,9 @@
 """Joint motion along a path: one polynomial piece of the joints for each piece of the tool's path.
 
-Where K is affine, the joints' control points are K of the tool's. Elsewhere q'' is interpolated with a proven
-error (`feedplan.machine.joint_interpolants`) and the tool's pieces are cut to match. At every speed that the
-other limits allow the error of an axis's acceleration is below 1e-8 of its limit.
+K is the map from tool to joints. Where K is affine, the control points of the joints are K of the control
+points of the tool. Elsewhere q'' is interpolated with a proven error (`feedplan.machine.joint_interpolants`),
+and the tool's pieces are cut at the same places. At every speed that the other limits allow, the acceleration
+error of an axis is below 1e-8 of its limit.
 """
 
 from __future__ import annotations
@@ -35,17 +36,18 @@ from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import positions
 from feedplan.machine.singularities import JointPath, joint_path
 
-# Joints that differ by less than this are in the same position [mm, deg].
+# Joint positions that differ by less than this count as equal [mm, deg].
 MEETING = 1e-6
-# Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
+# Number of Chebyshev points of q'': it gives the joints' pieces the greatest degree that a curve may have.
 NODES = 8
 
 
 def way_scale(axes: tuple[str, ...], machine: Machine) -> Floats:
-    """The share of each axis of a path in its length (axes,), 1 for linear axes.
+    """The weight of each axis of a path in the path's length (axes,), 1 for linear axes.
 
-    A degree of a rotary axis counts as the way of the slowest linear axis in the time of that turn, both at
-    full speed; a direction counts as the angle by which it turns, on the slowest rotary axis.
+    A degree of a rotary axis counts as the distance [mm] that the slowest linear axis covers while the rotary
+    axis turns by one degree, both at full speed. A tool direction (I, J, K) counts by the angle that it
+    turns, at the speed of the slowest rotary axis.
     """
     linear = [size_of(axis.max_velocity) for axis in machine.axes if axis.kind == "linear"]
     rotary = {axis.name: size_of(axis.max_velocity) for axis in machine.axes if axis.kind == "rotary"}
@@ -56,11 +58,11 @@ def way_scale(axes: tuple[str, ...], machine: Machine) -> Floats:
 
 
 def joint_motion(path: Path, machine: Machine, feed: Floats) -> tuple[Path, dict[str, Any]]:
-    """The path cut so that each piece has one piece of the machine's joints, and the fields of a `Problem`
-    that tell the joints' motion.
+    """The path, cut so that each of its pieces matches one piece of the joints' motion, and the fields of a
+    `Problem` that describe this motion.
 
-    `feed` (n,) [mm/s] is the greatest speed of a piece. Raises InputError where the tool passes a singular
-    position or a joint leaves its travel, with the line.
+    `feed` (n,) [mm/s] is the greatest speed of each piece. Raises InputError with the source line where the
+    tool passes a singular position or a joint leaves its travel.
     """
     motions: list[_Motion] = []
     words: list[AxisWords] = []
@@ -88,7 +90,8 @@ def joint_motion(path: Path, machine: Machine, feed: Floats) -> tuple[Path, dict
 
 
 def _require_meeting(machine: Machine, line: int, start: Floats, motion: _Motion) -> None:
-    """Raises InputError unless the joints begin where those before end: a change of mode moves no joint."""
+    """Raises InputError unless the joints of `motion` begin at `start`, where the motion before ended: a
+    change of mode must not move a joint."""
     begin = motion.origin[0] + motion.joints.control_points[0]
     apart = np.abs(begin - start)
     k = int(apart.argmax())
@@ -103,7 +106,8 @@ def _require_meeting(machine: Machine, line: int, start: Floats, motion: _Motion
 
 @dataclass(frozen=True)
 class _Task:
-    """Pieces of neighbouring runs under one kinematics; the joints are at `start` before them."""
+    """Pieces of consecutive runs with the same kinematics; `start` are the joint positions before them, None
+    at the start of the path."""
 
     path: Path
     machine: Machine
@@ -130,8 +134,9 @@ class _Task:
 class _Motion:
     """Joint motion on n parts of pieces of the path under one kinematics.
 
-    `piece` (n,) and the fractions `part` (n, 2) of it that each part is, its curve in the `tool`'s path, its
-    curve in the `joints`, counted from `origin` (n, joints) [mm, deg], and the tool's `speed`.
+    For each part: `piece` (n,) is its piece of the path, `part` (n, 2) its first and last fraction of that
+    piece, `tool` its curve in the path, `joints` its curve in the joints, relative to `origin` (n, joints)
+    [mm, deg], and `speed` the square of the tool's speed.
     """
 
     words: AxisWords
@@ -144,7 +149,7 @@ class _Motion:
 
     @classmethod
     def joined(cls, motions: Sequence[_Motion]) -> _Motion:
-        """Motions as one, in the order of their pieces and in the words of the first."""
+        """Several motions as one, in the order of their pieces; the result has the `words` of the first."""
         piece = np.concatenate([motion.piece for motion in motions])
         order = np.argsort(piece, kind="stable")
         return cls(
@@ -159,7 +164,7 @@ class _Motion:
 
 
 def _words(path: Path, machine: Machine) -> list[AxisWords]:
-    """The words of each run, made once for each mode and tool length."""
+    """The axis words of each run; runs with equal mode and tool length share one object."""
     same: list[Any] = [None] * (len(path.runs) - 1)
     modes = same if path.coordinate_mode is None else map(CoordinateMode, path.coordinate_mode.tolist())
     lengths = same if path.tool_length is None else path.tool_length.tolist()
@@ -172,7 +177,8 @@ def _words(path: Path, machine: Machine) -> list[AxisWords]:
 
 
 def _posed(task: _Task) -> _Motion:
-    """The motion; a tool direction takes the pose nearest to the joints before, at first a possible one."""
+    """The joint motion of a task. For a tool direction, which two poses can give, it takes the pose whose
+    rotary joints are nearest to `start`; at the start of the path, the first pose that is possible."""
     make = _affine if task.words.kinematics.affine else _curved
     words, start = task.words, task.start
     if words.coordinate_mode is not CoordinateMode.VECTOR:
@@ -195,9 +201,10 @@ def _posed(task: _Task) -> _Motion:
 
 
 def _affine(task: _Task) -> _Motion:
-    """Joints that are weighted sums of the path's axes, and so are their control points.
+    """Joint motion for affine kinematics: the joints' control points are weighted sums of the path's.
 
-    Rational pieces are interpolated by polynomials, so that |C'|² and the joints have the same parameter.
+    Rational pieces are interpolated by polynomials (`_curved`), so that |C'|² and the joints have the same
+    parameter.
     """
     tool, words, machine = task.path.curve.take(task.pieces), task.words, task.machine
     rational = tool.rational
@@ -222,7 +229,8 @@ def _affine(task: _Task) -> _Motion:
 
 
 def _route(task: _Task, tips: CompositeCurve) -> JointPath:
-    """The joints along pieces of one degree; raises InputError for the first place that they cannot pass."""
+    """The joint positions along the tips, elevated to one degree; raises InputError for the first place that
+    the joints cannot pass."""
     tips = tips.elevated(int(tips.degree.max()))
     kinematics, travel = task.words.kinematics, [axis.travel for axis in task.machine.axes]
     route = joint_path(kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, task.start)
@@ -233,7 +241,7 @@ def _route(task: _Task, tips: CompositeCurve) -> JointPath:
 
 
 def _curved(task: _Task) -> _Motion:
-    """Joints by polynomials that interpolate K of the tool's pieces."""
+    """Joint motion by polynomials that interpolate K of the tool's pieces, for all other pieces."""
     kinematics, curve = task.words.kinematics, task.path.curve.take(task.pieces)
     tips = replace(curve, control_points=task.words.tip(curve.control_points))
     tips = tips.elevated(int(tips.degree.max()))
@@ -264,7 +272,8 @@ def _curved(task: _Task) -> _Motion:
 
 
 def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> SpeedPolynomial:
-    """The speed of the rotary joints, or of the tool's direction: the feed limits it where X, Y, Z rest."""
+    """The squared speed of the rotary joints or of the tool direction; the feed limits it where X, Y, Z
+    rest."""
     if task.words.coordinate_mode is CoordinateMode.VECTOR:
         square = interpolated_squares(_turning_of(task.direction(tool)), np.arange(len(tool)), tool.width)
         return SpeedPolynomial((1 + SPEED_SHARE) * square.ravel(), np.arange(len(tool) + 1) * square.shape[1])
@@ -274,7 +283,8 @@ def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) ->
 
 
 def _accuracy(task: _Task, curve: CompositeCurve, moves: Flags) -> Accuracy:
-    """The accuracy of interpolants: limits of the machine, and squares of speeds that are not polynomials."""
+    """The accuracy that the interpolants need: the machine's limits, and squared speeds that are no
+    polynomials."""
     even = curve.elevated(int(curve.degree.max()))
     squares = []
     if curve.weights is not None:
@@ -298,7 +308,8 @@ def _accuracy(task: _Task, curve: CompositeCurve, moves: Flags) -> Accuracy:
 
 
 def _turning_of(curve: CompositeCurve) -> Callable[[Integers, Floats], Floats]:
-    """The square of the rate at which a direction of any length turns [deg²], by u."""
+    """A function of piece and u for (dθ/du)² [deg²], θ being the angle by which the direction turns; the
+    direction may have any length."""
 
     def square(piece: Integers, u: Floats) -> Floats:
         direction, slope = curve.evaluate(piece, u, 1)
@@ -309,7 +320,7 @@ def _turning_of(curve: CompositeCurve) -> Callable[[Integers, Floats], Floats]:
 
 
 def _joint_pieces(interpolants: Interpolants) -> CompositeCurve:
-    """The integrals of the slopes, each from 0: small numbers keep the digits for second differences."""
+    """The integrals of the slopes, each from 0: second differences of small numbers lose fewer digits."""
     slope, count = interpolants.slope, len(interpolants)
     degree = slope.shape[1]
     steps = np.cumsum(slope, axis=1) * (interpolants.width / degree)[:, None, None]
@@ -318,14 +329,15 @@ def _joint_pieces(interpolants: Interpolants) -> CompositeCurve:
 
 
 def _tool_speed(linear: CompositeCurve) -> SpeedPolynomial:
-    """|C'|²: exact for polynomials; for rational pieces interpolated, and above the true one."""
+    """|C'|²: exact for polynomial pieces; for rational pieces an interpolation, raised so that it is
+    never below the true value."""
     speed = SpeedPolynomial.of(linear)
     above = np.repeat(np.where(linear.rational, 1 + SPEED_SHARE, 1.0), np.diff(speed.offsets))
     return replace(speed, coefficients=speed.coefficients * above)
 
 
 def _either(first: SpeedPolynomial, second: SpeedPolynomial, chosen: Flags) -> SpeedPolynomial:
-    """The first where it is chosen, piece by piece, and else the second."""
+    """Piece by piece the polynomial of `first` where `chosen` is true, else that of `second`."""
     if chosen.all():
         return first
     pieces = np.arange(len(chosen))

@@ -15,9 +15,10 @@ from feedplan.geometry.path import Path
 def junction_limit(path: Path, max_velocity_jump: Floats) -> Floats:
     """Greatest speed (n + 1,) [mm/s] at the ends of the pieces.
 
-    0 at the ends of runs. Within a run, where the unit tangent jumps by ΔT, min over the axes of
-    `max_velocity_jump` [mm/s] / |ΔT|, and infinite where it does not jump. A cusp in which the direction of
-    motion agrees is left to the planner. A smooth path rests where it turns back.
+    It is 0 at the ends of runs. Within a run, where the unit tangent jumps by ΔT, it is the minimum over the
+    axes of `max_velocity_jump` [mm/s] / |ΔT|; it is infinite where the tangent does not jump. A cusp whose
+    tangents agree is left to the planner. On a smooth path no jump is allowed: the tool rests where the path
+    turns back.
     """
     jump = tangent_jumps(path.curve)
     if path.corners is Corners.SMOOTH:

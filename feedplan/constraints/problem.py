@@ -1,4 +1,4 @@
-"""The planning problem: a path with every limit that holds on it."""
+"""The planning problem: a path and every limit that holds on it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 Limited = Literal["velocity", "acceleration"]
 _BY_AXIS = ("max_velocity", "max_acceleration", "max_jerk", "least_velocity", "least_acceleration")
-# The feed of rapids where the joints limit their speed: no tool is as fast [mm/s].
+# The feed of rapids on paths where only the joints limit their speed: faster than any tool [mm/s].
 NO_FEED = 1e9
 
 
@@ -39,27 +39,28 @@ NO_FEED = 1e9
 class Problem:
     """Minimise the time along `path` under these limits.
 
-    Each joint (`axes` names them; `units` take the place of mm) has `max_velocity` [mm/s], `max_acceleration`
-    [mm/s²] and `max_jerk` [mm/s³], which may be infinite. `least_velocity` and `least_acceleration` are the
-    negative limits where these differ, else empty.
+    Each joint (`axes` are the names, `units` the units that replace mm) has `max_velocity` [mm/s],
+    `max_acceleration` [mm/s²] and `max_jerk` [mm/s³], which may be infinite. `least_velocity` and
+    `least_acceleration` are the limits in the negative direction, empty if they are the negative of the
+    others.
 
-    Each of the n pieces has `feed` (n,), the greatest |(share_k q'_k)| u̇ [mm/s], finite. `feed_share` (n,
-    axes) is the share of each axis in that speed, None where all are 1. `junction_speed` (n + 1,) is the
-    greatest speed [mm/s] at the ends of the pieces: 0 at a stop, infinite where only the other limits hold. A
-    curve of radius ρ has the speed limit (2/T)·√(2ρδ − δ²) by `chord_tolerance` δ [mm] (infinite: no limit)
-    and `period` T [s]. `start_speed` and `end_speed` [mm/s] are those at the ends of the path.
-    `velocity_jump` is the jump that each axis velocity may make at a corner; None for the machine's own.
-    `request` is what the user asked for in place of the programmed feeds.
+    `feed` (n,) [mm/s] is the greatest |(share_k q'_k)| u̇ on each of the n pieces, finite. `feed_share` (n,
+    axes) is the factor of each axis in that speed, None where all are 1. `junction_speed` (n + 1,) is the
+    greatest speed [mm/s] at the ends of the pieces: 0 at a stop, infinite where only the other limits hold.
+    `chord_tolerance` δ [mm] (infinite: no limit) and `period` T [s] limit the speed on a curve of radius ρ to
+    (2/T)·√(2ρδ − δ²). `start_speed` and `end_speed` [mm/s] are those at the ends of the path. `velocity_jump`
+    (axes,) [mm/s] is the jump that each axis velocity may make at a corner; None means the machine's own.
+    `request` are the user's changes to the programmed feeds.
 
-    Where the joints move in another way than the path's axes,
+    Where the joints are not the axes of the path,
 
-    - `joints` is their motion [mm, deg]: for each piece of the path one polynomial piece over the same
-      parameter, counted from `joint_origin` (n, joints), 0 without one; `joint_axes` are their names;
-    - `tip_speed` is the square over u̇² of the speed that feed and junctions limit;
-    - `way_scale` (path axes,) is the share of each axis of the path in its length [mm per mm, deg, or unit of
-      a direction], 1 by default;
-    - `words` (one a run) are the kinematics from path to joints, and `cut` is the path before it was cut to
-      match the joints' pieces.
+    - `joints` is their motion [mm, deg]: for each piece of the path one polynomial piece with the same
+      parameter, relative to `joint_origin` (n, joints), which is 0 if None; `joint_axes` are their names;
+    - `tip_speed` is (v/u̇)² for the speed v that feed and junctions limit;
+    - `way_scale` (path axes,) is the weight of each axis in the path's length [mm per mm, deg, or unit of a
+      direction], 1 by default;
+    - `words` (one a run) are the kinematics from path to joints, and `cut` relates the path's pieces to the
+      path before it was cut to match the joints' pieces.
     """
 
     path: Path
@@ -102,31 +103,32 @@ class Problem:
 
     @property
     def min_velocity(self) -> Floats:
-        """The least velocity of each axis (axes,) [mm/s]."""
+        """The velocity limit of each axis in the negative direction (axes,), at most 0 [mm/s]."""
         return self.least_velocity if len(self.least_velocity) else -self.max_velocity
 
     @property
     def min_acceleration(self) -> Floats:
-        """The least acceleration of each axis (axes,) [mm/s²]."""
+        """The acceleration limit of each axis in the negative direction (axes,), at most 0 [mm/s²]."""
         return self.least_acceleration if len(self.least_acceleration) else -self.max_acceleration
 
     def limits(self, name: Limited) -> Floats:
-        """The sizes of the limits upward and downward (2, axes)."""
+        """The limits as absolute values (2, axes): those of positive values, then those of negative ones."""
         return np.stack([getattr(self, f"max_{name}"), -getattr(self, f"min_{name}")])
 
     def limit(self, name: Limited, values: Floats) -> Floats:
-        """The sizes of the limits of values (…, axes), each that of its direction."""
+        """The limits of values (…, axes) as absolute values, each by the sign of its value."""
         up, down = self.limits(name)
         return np.asarray(np.where(values < 0.0, down, up))
 
     def use(self, name: Limited, values: Floats) -> Floats:
-        """The share of their limits that values (…, axes) use, each of the limit of its direction."""
+        """Use of the limits by values (…, axes): |value| / |limit|, where the value's sign selects the
+        limit."""
         least, most = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
         return np.asarray(values / np.where(values < 0.0, least, most))
 
     @property
     def even(self) -> Problem:
-        """The problem with the lesser limits of both directions; itself where none differs by direction."""
+        """The problem with the smaller limit of both directions; itself if no limit differs by direction."""
         if not len(self.least_velocity) and not len(self.least_acceleration):
             return self
         return replace(
@@ -149,7 +151,7 @@ class Problem:
 
     @property
     def way_units(self) -> tuple[str, str]:
-        """Units of the tool's way where X, Y, Z, or U, V, W move, and where others do alone."""
+        """Units of the path's length: on pieces that move X, Y, Z or U, V, W, and on all other pieces."""
         units = self.units if self.joints is None else usual_units(self.path.axes)
         leads = np.logical_or.reduce(feed_groups(self.path.axes)[:-1])
         named = list(zip(units, leads.tolist(), strict=True))
@@ -160,12 +162,12 @@ class Problem:
 
     @property
     def unit(self) -> str:
-        """The unit of the length of the path: that of turning if it moves no tool."""
+        """The unit of the path's length: that of turning if no piece moves the tool."""
         return self.tool_motion.unit
 
     @cached_property
     def native(self) -> NativeProblem:
-        """The problem as kernels take it, made once."""
+        """The problem in the form that the native kernels take; made once."""
         return NativeProblem(self)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -177,10 +179,10 @@ class Problem:
         return self.path.curve if self.joints is None else self.joints
 
     def derivatives(self, piece: NDArray[np.integer], u: Floats, order: int) -> Floats:
-        """The joints' q, q', … by u at places (m,): (order + 1, m, joints), order ≤ 3.
+        """q, q', … of the joints, derivatives by u, at places (m,): (order + 1, m, joints), order ≤ 3.
 
-        Exact to rounding: by the kinematics from the path as it was before it was cut, not by `joints`;
-        angles up to whole turns.
+        Exact to rounding, because they are computed from the uncut path by the kinematics, not from `joints`;
+        angles may differ by whole turns.
         """
         if not self.words:
             return self.path.curve.evaluate(piece, u, order)
@@ -224,8 +226,8 @@ class Problem:
     def way_curve(self) -> CompositeCurve | None:
         """The path with its axes scaled [mm], where the joints have pieces of their own.
 
-        Laws of jerk use its length: its speed is 0 only where all joints rest, while the tool's speed in X,
-        Y, Z is also 0 where the tool only turns.
+        Profiles with jerk limits use its length: its speed is 0 only where all joints rest, while the tool's
+        speed in X, Y, Z is also 0 where the tool only turns.
         """
         if self.joints is None:
             return None
@@ -235,7 +237,7 @@ class Problem:
 
     @cached_property
     def way_speed(self) -> SpeedPolynomial | None:
-        """The square of the speed of `way_curve`, per u̇²."""
+        """(v/u̇)² for the speed v along `way_curve`."""
         return None if self.way_curve is None else SpeedPolynomial.of(self.way_curve)
 
     @cached_property
@@ -253,21 +255,21 @@ def build_problem(
     start_speed: float = 0.0,
     end_speed: float = 0.0,
 ) -> Problem:
-    """The path on the machine.
+    """Builds the problem of a path on a machine.
 
     `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them (rapids keep the axes'
-    limits), `start_speed` and `end_speed` [mm/s] hold at the ends of the whole path. Corners of a path that
-    keeps those of the program are passed with the jump that the machine allows, or that its accelerations
-    give in one servo period if that is more. A jump that the machine allows is no more than the chord
-    tolerance in a period, on linear axes: the line between two setpoints cuts the corner by less.
-    Raises InputError for a value out of range, and for a place that the joints cannot pass.
+    limits), `start_speed` and `end_speed` [mm/s] hold at the ends of the whole path. On a path with
+    `Corners.PROGRAMMED`, corners are passed with the velocity jump that the machine allows, or with
+    acceleration × servo period if that is more. On linear axes the allowed jump is at most chord tolerance /
+    period, so that the line between two setpoints cuts the corner by less than the chord tolerance. Raises
+    InputError for a value out of range, and for a place that the joints cannot pass.
     """
     remedy = "a finite speed of 0 or more"
     start_speed = number(start_speed, "start speed", remedy, not_negative, "mm/s")
     end_speed = number(end_speed, "end speed", remedy, not_negative, "mm/s")
     request = FeedRequest(feed, feed_override)
     if has_joints_of_its_own(path, machine):
-        # Kinematics are loaded where they are needed.
+        # Imported here, so that kinematics are loaded only if needed.
         from feedplan.constraints.joints import joint_motion
 
         axes, greatest, jump = list(machine.axes), NO_FEED, None
@@ -279,7 +281,7 @@ def build_problem(
         others = {"feed_share": feed_share(path, greatest, request)}
     min_velocity, max_velocity = np.array([axis.velocity_range for axis in axes]).T
     min_acceleration, max_acceleration = np.array([axis.acceleration_range for axis in axes]).T
-    # Where the joints move in another way than the tool, corners are stops.
+    # Where the joints are not the axes of the path (`jump` is None), corners are stops.
     junction_speed = junction_limit(path, np.zeros(len(path.axes)) if jump is None else jump)
     junction_speed[0], junction_speed[-1] = start_speed, end_speed
     return Problem(
@@ -303,7 +305,7 @@ def build_problem(
 
 
 def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
-    """Whether the joints move in another way than the path's axes."""
+    """Whether the joints are not the axes of the path."""
     if machine.is_plain:
         return False
     mode = path.coordinate_mode
@@ -311,7 +313,7 @@ def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
 
 
 def _velocity_jump(path: Path, machine: Machine, axes: Sequence[Axis]) -> Floats:
-    """What the velocity of each axis may jump by at a corner (axes,) [mm/s]."""
+    """The greatest jump of each axis velocity at a corner (axes,) [mm/s]."""
     cut = machine.chord_tolerance / machine.period
     most = [cut if axis.kind == "linear" else np.inf for axis in axes]
     jump = np.minimum([axis.max_velocity_jump for axis in axes], most)
@@ -321,7 +323,7 @@ def _velocity_jump(path: Path, machine: Machine, axes: Sequence[Axis]) -> Floats
 
 
 def feed_square(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Floats:
-    """The square of the speed that the feed limits over p at places (n,)."""
+    """The square of the speed that the feed limits, divided by p = u̇², at places (n,)."""
     if problem.feed_share is None:
         return speed_square(problem, piece, u)
     slope = problem.curve.evaluate(piece, u, 1)[1]
@@ -329,7 +331,7 @@ def feed_square(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Floa
 
 
 def speed_square(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Floats:
-    """The square of the tool's speed over p at places (n,)."""
+    """The square of the tool's speed, divided by p = u̇², at places (n,)."""
     tip = problem.tip_speed
     if tip is None:
         return np.asarray((problem.curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1))

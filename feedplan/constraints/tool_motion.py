@@ -1,9 +1,9 @@
 """The tool's motion along a path: X, Y, Z [mm] if a piece moves one of them, else U, V, W [mm], else all
 other axes [deg].
 
-The other axes are rotary axes or the joints of an arm; the length is then that of the path in their space, in
-their unit. So millimetres and degrees are never added, unless a path has joints of several units. Feeds of
-part programs are speeds along the same axes.
+The other axes are rotary axes or the joints of an arm; the length is then measured in the space of these
+axes, in their unit. So millimetres and degrees are never added, unless a path has joints of several units.
+Feeds of part programs are speeds along the same axes.
 """
 
 from __future__ import annotations
@@ -22,20 +22,19 @@ from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
 from feedplan.machine.axis import DIRECTION
 
-# The tool's direction is a unit vector.
+# A change of the tool's direction (a unit vector) is an angle in radians; lengths are in degrees.
 _DEGREES = dict.fromkeys(DIRECTION, math.degrees(1.0))
 
-# Differences of control points up to this many units in the last place of the greatest are rounding, not
-# motion.
+# Differences of control points up to this many units in the last place of the greatest are rounding.
 _ROUNDINGS = 64.0
 
 
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
-    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0;
-    `turns` (n,) is true for pieces on which only rotary axes and joints move. `share`
-    (n, axes) is the weight of each axis, None if all are 1. `units` are those of the length if the tool
-    moves, and if it turns alone."""
+    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0; `turns` (n,)
+    is true for pieces on which only rotary axes and joints move. `share` (n, axes) is the weight of each
+    axis, None if all are 1. `units` are those of the length: first if the tool moves, then if it only turns.
+    """
 
     curve: CompositeCurve
     share: Floats | None
@@ -59,12 +58,12 @@ class ToolMotion:
 
     @property
     def unit(self) -> str:
-        """The unit of the length that is drawn: that of turning if no piece moves the tool."""
+        """The unit of the length that figures show: that of turning if no piece moves the tool."""
         return self.units[1 if self.turns.all() else 0]
 
     @cached_property
     def drawn(self) -> Flags:
-        """Pieces (n,) whose length is in that unit."""
+        """Whether the length of each piece (n,) is in the unit `unit`."""
         return np.asarray(~self.turns | self.turns.all())
 
     def slope(self, piece: NDArray[np.integer], u: Floats) -> Floats:
@@ -82,7 +81,7 @@ class ToolMotion:
 
     @cached_property
     def _left_out(self) -> Floats:
-        """Length (n,) of the pieces up to each that are not drawn."""
+        """Length (n,) of pieces that are not drawn, from the start of the path to the end of each piece."""
         return np.cumsum(np.where(self.drawn, 0.0, self.lengths))
 
 
@@ -100,7 +99,7 @@ def _counted(path: Path) -> tuple[Floats, Flags]:
     axes, points, first = path.axes, path.curve.control_points, path.curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
     rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
-    # The first group that moves is the one whose length is measured, the last one where none does.
+    # The length of the first group that moves is measured; that of the last group if nothing moves.
     group = leading_group(axes, extent > rounding) % GROUPS
     scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
     return feed_groups(axes)[group] * scale, group == GROUPS - 1

@@ -1,1 +1,1 @@
-"""Curves of any degree, polynomial and rational, and their lengths: the parts of programs and paths."""
+"""Curves of any degree, polynomial and rational, and their lengths: used by programs and paths."""

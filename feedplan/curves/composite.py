@@ -1,4 +1,4 @@
-"""Curves of any degree: Bézier curves, B-splines and NURBS as Bézier pieces joined end to end."""
+"""Curves of any degree: Bézier curves, B-splines and NURBS as connected Bézier pieces."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ MAX_DEGREE = 9
 class CompositeCurve(OfNative[Curve]):
     """Bézier pieces C_i(u), u in [0, width_i], each of its own degree 1 to 9, polynomial or rational.
 
-    `control_points` (total, axes) [mm, or degrees on rotary axes], the degree_i + 1 points of piece i from
-    `offsets[i]` to `offsets[i + 1]`; `weights` (total,), ones where a piece is polynomial, or None where all
-    are; `offsets` (n + 1,); `width` (n,) of the parameter intervals. All are read-only.
+    `control_points` (total, axes) [mm, or degrees on rotary axes]: the degree_i + 1 points of piece i are
+    those from `offsets[i]` up to (not including) `offsets[i + 1]`; `weights` (total,), all 1 where a piece is
+    polynomial, or None if all pieces are; `offsets` (n + 1,); `width` (n,) of the parameter intervals. All
+    are read-only.
 
     Raises InputError for columns that do not fit together and values that cannot be used.
     """
@@ -44,7 +45,7 @@ class CompositeCurve(OfNative[Curve]):
 
     @classmethod
     def from_pieces(cls, control_points: ArrayLike, width: ArrayLike) -> CompositeCurve:
-        """Polynomial pieces of one degree d by their control points (n, d + 1, axes) and widths (n,)."""
+        """Polynomial pieces of one degree d, from control points (n, d + 1, axes) and widths (n,)."""
         control = floats(control_points, "control points", 3)
         count, points_each, axes = control.shape
         return cls(
@@ -55,7 +56,7 @@ class CompositeCurve(OfNative[Curve]):
     def from_bezier(
         cls, control_points: ArrayLike, weights: ArrayLike | None = None, width: float = 1.0
     ) -> CompositeCurve:
-        """One piece by its control points (degree + 1, axes), rational with `weights` (degree + 1,)."""
+        """One piece from its control points (degree + 1, axes), rational with `weights` (degree + 1,)."""
         control, weight = point_array(control_points, weights)
         if not 2 <= len(control) <= MAX_DEGREE + 1:
             raise InputError(
@@ -74,11 +75,11 @@ class CompositeCurve(OfNative[Curve]):
         *,
         periodic: bool = False,
     ) -> CompositeCurve:
-        """A B-spline by n control points (n, axes), n + degree + 1 `knots` and `degree`, as for `from_nurbs`;
-        or a `scipy.interpolate.BSpline` as it is.
+        """A B-spline from n control points (n, axes), n + degree + 1 `knots` and `degree`, as in
+        `from_nurbs`; or from a `scipy.interpolate.BSpline` given as `control_points`.
 
-        The curve of a scipy spline is that on the base interval [t[k], t[n]], which does not depend on the
-        kind of extrapolation; a periodic spline is closed there.
+        The curve of a scipy spline is the spline on its base interval [t[k], t[n]], which does not depend on
+        the kind of extrapolation; a periodic spline is closed there.
         """
         if knots is None and degree is None:
             spline = control_points
@@ -104,11 +105,11 @@ class CompositeCurve(OfNative[Curve]):
         *,
         periodic: bool = False,
     ) -> CompositeCurve:
-        """A NURBS curve by n control points (n, axes), n + degree + 1 `knots` and `weights` (n,).
+        """A NURBS curve from n control points (n, axes), n + degree + 1 `knots` and `weights` (n,).
 
         The knots may be clamped or not: the curve is on [knots[degree], knots[n]], and its pieces are the
-        spans. With `periodic` the n control points and n + 1 knots are one period of a closed curve, of which
-        the first span belongs to the first degree + 1 points.
+        spans. With `periodic` the n control points and n + 1 knots are one period of a closed curve; its
+        first span belongs to the first degree + 1 points.
 
         Raises InputError for lists that do not fit together and values that cannot be used.
         """
@@ -119,7 +120,7 @@ class CompositeCurve(OfNative[Curve]):
 
     @classmethod
     def joined(cls, curves: Sequence[CompositeCurve], gap: float = 1e-6) -> CompositeCurve:
-        """Curves one after the other; the end of each is the start of the next within `gap` [mm]."""
+        """Several curves as one; from the end of each to the start of the next it is at most `gap` [mm]."""
         remedy = "a list of at least one CompositeCurve"
         if not isinstance(curves, Sequence) or not all(isinstance(curve, CompositeCurve) for curve in curves):
             raise refuse("curves", curves, remedy)
@@ -166,14 +167,14 @@ class CompositeCurve(OfNative[Curve]):
         return self.take(np.arange(first, max(last, first)))
 
     def take(self, pieces: NDArray[np.integer]) -> CompositeCurve:
-        """These pieces (m,) in this order, whether or not they meet."""
+        """The pieces with these indices (m,), in this order; they need not be connected."""
         rows, offsets = rows_of(self.offsets, pieces)
         weights = None if self.weights is None else self.weights[rows]
         return CompositeCurve(self.control_points[rows], weights, offsets, self.width[pieces])
 
     @property
     def rational(self) -> Flags:
-        """Which pieces are rational with weights that differ (n,)."""
+        """Whether each piece is rational with weights that differ (n,)."""
         if self.weights is None:
             return np.zeros(len(self), dtype=bool)
         first = np.repeat(self.weights[self.offsets[:-1]], np.diff(self.offsets))
@@ -191,7 +192,7 @@ class CompositeCurve(OfNative[Curve]):
 
     @property
     def by_piece(self) -> Floats:
-        """Control points (n, d + 1, axes) of pieces that all have one degree d.
+        """Control points (n, d + 1, axes) if all pieces have the same degree d.
 
         Raises InputError where the degrees differ.
         """
@@ -205,7 +206,7 @@ class CompositeCurve(OfNative[Curve]):
 
     @property
     def weights_by_piece(self) -> Floats | None:
-        """Their weights (n, d + 1), or None where all pieces are polynomial."""
+        """Weights (n, d + 1) for the points of `by_piece`, or None where all pieces are polynomial."""
         return None if self.weights is None else self.weights.reshape(self.by_piece.shape[:2])
 
     def evaluate(self, piece: ArrayLike, u: ArrayLike, order: int = 0) -> Floats:
@@ -219,7 +220,7 @@ class CompositeCurve(OfNative[Curve]):
         return self.of(self.native.reversed())
 
     def elevated(self, degree: int) -> CompositeCurve:
-        """The same curve with every piece of a lower degree raised to `degree`."""
+        """The same curve, with the degree of every piece of a lower degree raised to `degree`."""
         return self.of(self.native.elevated(_degree(degree)))
 
     def split(self, piece: ArrayLike, u: ArrayLike) -> CompositeCurve:
@@ -234,7 +235,7 @@ class CompositeCurve(OfNative[Curve]):
         return self.of(self.native.split(pieces[new], at[new]))
 
     def with_width(self, width: ArrayLike) -> CompositeCurve:
-        """The same pieces on parameter intervals of other widths (n,), or all of one width."""
+        """The same pieces with other widths of their parameter intervals (n,), or one width for all."""
         array = floats(width, "widths").reshape(np.shape(width))
         if array.ndim and array.shape != self.width.shape:
             raise InputError(f"{array.shape} widths for {len(self)} pieces: give one for each, or one number")
@@ -244,15 +245,15 @@ class CompositeCurve(OfNative[Curve]):
 
     @property
     def has_length(self) -> Flags:
-        """Which pieces have control points that differ (n,)."""
+        """Whether each piece has control points that differ (n,)."""
         first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         apart = (self.control_points != first).any(axis=1)
         return np.logical_or.reduceat(apart, self.offsets[:-1])
 
 
 def rows_of(offsets: Integers, pieces: NDArray[np.integer]) -> tuple[Integers, Integers]:
-    """The rows of these pieces (m,), piece i having those from `offsets[i]` to `offsets[i + 1]`, and their
-    offsets (m + 1,) where they are taken in this order."""
+    """The rows of the given pieces (m,) in this order, where piece i has the rows from `offsets[i]` up to
+    `offsets[i + 1]`; and the offsets (m + 1,) of the pieces in these rows."""
     counts = np.diff(offsets)[pieces]
     taken = np.concatenate([[0], np.cumsum(counts)])
     return np.repeat(offsets[pieces] - taken[:-1], counts) + np.arange(taken[-1]), taken

@@ -1,4 +1,4 @@
-"""The length along a curve of any degree, and the inverse: places at given lengths."""
+"""The length along a curve of any degree, and its inverse: the places at given lengths."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from feedplan.lazy import cached_property
 class CurveLength:
     """The length of a curve as a function of the place on it, tabulated to a proven error.
 
-    `accuracy` is the allowed error of each piece as a share of its length; rounding adds to it. Source:
-    Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps. Raises InputError
-    for an empty curve and an accuracy that is not possible.
+    `accuracy` is the allowed relative error of the length of each piece; rounding adds to it. Source:
+    Cheatham 2007, chapter 3, corrected, extended to curves of any degree, with intervals halved towards
+    cusps. Raises InputError for an empty curve and an accuracy that is not possible.
     """
 
     def __init__(self, curve: CompositeCurve, accuracy: float = 1e-13) -> None:
@@ -42,7 +42,7 @@ class CurveLength:
 
     @property
     def error(self) -> float:
-        """Bound of the error of every length on the curve [mm]."""
+        """Error bound of every length on the curve [mm]."""
         return self._table.error
 
     def length(self, piece: ArrayLike, u: ArrayLike) -> Floats:
@@ -50,6 +50,6 @@ class CurveLength:
         return self._table.lengths(*places(piece, u))
 
     def locate(self, lengths: ArrayLike, tolerance: float = 1e-12) -> tuple[NDArray[np.uint32], Floats]:
-        """The pieces and the parameters u at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an
-        end gives that end."""
+        """The pieces and the parameters u (m,) at lengths (m,) [mm], within `tolerance` [mm]; a length beyond
+        an end of the curve gives that end."""
         return self._table.locate(floats(lengths, "lengths", 1), tolerance)

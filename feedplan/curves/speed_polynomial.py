@@ -1,4 +1,4 @@
-"""The square of the speed |C'(u)|² along Bézier pieces as a polynomial of the parameter on each piece."""
+"""The square of the speed, |C'(u)|², along Bézier pieces, as a polynomial of the parameter on each piece."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from feedplan.arrays import Floats, Integers
 from feedplan.curves.composite import CompositeCurve, rows_of
 
-# Chebyshev points of |C'|² of rational pieces.
+# Number of Chebyshev points at which |C'|² of rational pieces is interpolated.
 SPEED_NODES = 12
 
 
 @dataclass(frozen=True, eq=False)
 class SpeedPolynomial:
-    """The square of a speed over u̇².
+    """(v/u̇)² for a speed v, as a polynomial on each piece.
 
-    `coefficients` (total,) are those of Bernstein polynomials of u, those of piece i from `offsets[i]` to
-    before `offsets[i + 1]`; `offsets` (n + 1,).
+    `coefficients` (total,) are Bernstein coefficients in u; those of piece i are from `offsets[i]` up to (not
+    including) `offsets[i + 1]`; `offsets` (n + 1,).
     """
 
     coefficients: Floats
@@ -46,7 +46,7 @@ class SpeedPolynomial:
             rows = np.flatnonzero((curve.degree == d) & ~rational)
             points = curve.control_points[first[rows][:, None] + np.arange(d + 1)]
             slope = d * np.diff(points, axis=1) / curve.width[rows][:, None, None]
-            # Scaled by binomials a product is a convolution.
+            # With coefficients scaled by binomials, the product of polynomials is a convolution.
             scaled = slope * _binomials(d - 1)[:, None]
             square = np.zeros((len(rows), 2 * d - 1))
             for i in range(d):
@@ -56,17 +56,17 @@ class SpeedPolynomial:
 
     @classmethod
     def joined(cls, parts: Sequence[SpeedPolynomial]) -> SpeedPolynomial:
-        """Those of pieces one after the other."""
+        """The polynomials of several curves, one after the other."""
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
         coefficients = np.concatenate([part.coefficients for part in parts])
         return cls(coefficients, np.concatenate([[0], np.cumsum(counts)]))
 
     def __getitem__(self, pieces: slice) -> SpeedPolynomial:
-        """Those of neighbouring pieces."""
+        """The polynomials of consecutive pieces."""
         return self.take(np.arange(pieces.start, pieces.stop))
 
     def take(self, pieces: NDArray[np.integer]) -> SpeedPolynomial:
-        """Those of these pieces (m,) in this order."""
+        """The polynomials of the given pieces (m,), in this order."""
         rows, offsets = rows_of(self.offsets, pieces)
         return SpeedPolynomial(self.coefficients[rows], offsets)
 
@@ -86,19 +86,20 @@ class SpeedPolynomial:
 def interpolated_squares(
     square: Callable[[Integers, Floats], Floats], piece: Integers, width: Floats
 ) -> Floats:
-    """Bernstein coefficients (n, SPEED_NODES) through a function of piece and u, on these pieces (n,)."""
+    """Bernstein coefficients (n, SPEED_NODES) of the polynomials that interpolate a function of piece and u
+    on the given pieces (n,)."""
     u = (width[:, None] * chebyshev(SPEED_NODES)).ravel()
     values = square(np.repeat(piece, SPEED_NODES), u).reshape(-1, SPEED_NODES)
     return np.asarray(np.einsum("ij,nj->ni", to_bernstein(SPEED_NODES), values))
 
 
 def to_bernstein(count: int) -> Floats:
-    """The matrix (count, count) that takes values at `chebyshev(count)` to Bernstein coefficients."""
+    """The matrix (count, count) that turns values at `chebyshev(count)` into Bernstein coefficients."""
     return np.ascontiguousarray(np.linalg.inv(_bernstein(count - 1, chebyshev(count))))
 
 
 def interpolation(count: int, at: Floats) -> Floats:
-    """The matrix (places, count) that takes values at `chebyshev(count)` to those at places in [0, 1]."""
+    """The matrix (places, count) that turns values at `chebyshev(count)` into values at places in [0, 1]."""
     matrix: Floats = _bernstein(count - 1, at) @ to_bernstein(count)
     return matrix
 

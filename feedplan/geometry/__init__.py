@@ -1,1 +1,1 @@
-"""Geometry: a program's moves as a path of polynomial pieces, exact and never tessellated."""
+"""Geometry: the path of a program as exact polynomial pieces, never as short lines."""

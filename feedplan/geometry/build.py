@@ -1,4 +1,5 @@
-"""From a program on a machine to its path: lines, circles, splines, fitted chains, corners and runs."""
+"""Builds the path of a program on a machine: lines, circles, splines, fitted chains, rounded corners,
+runs."""
 
 from __future__ import annotations
 
@@ -23,9 +24,9 @@ from feedplan.machine.machine import Machine
 from feedplan.program.program import PathControl, Program
 from feedplan.progress import Listener, part, tell
 
-# The greatest distance [mm] between the ends of a spline and of its move: both are sums of the same offsets.
+# The greatest distance [mm] between the ends of a spline and of its move; they differ only by rounding.
 _SPLINE_GAP = 1e-6
-# The part of the work that is done after the native builder.
+# Share of the progress reached when the native builder is done.
 _BUILT = 0.9
 
 
@@ -50,31 +51,31 @@ def build_path(
       program's P, else `FitSettings.default_tolerance`; 0 means exact lines with stops. Q limits the fit
       only.
 
-    Where G64 meets G61 the stricter mode holds. A blend of a rapid and a feed move has the feed up to the
-    place nearest to the corner. Arcs become true circles. Splines enter the path unchanged, their widths
-    scaled to about the length, without pieces of no length; only at corners are their ends cut and bent, as
-    those of lines and arcs are.
+    Where G64 meets G61 the stricter mode holds. On a blend of a rapid and a feed move the feed holds on the
+    side of the feed move, up to the place nearest to the corner. Arcs become true circles. Splines keep their
+    shape; their parameter widths are scaled to about their length, and pieces without length are left out.
+    Only at corners are their ends cut and bent, like those of lines and arcs.
 
     `corners` chooses another treatment of corners:
 
-    - ARCS: nothing is fitted, and corners of two lines become true arcs within the tolerance. JOINED: the
-      same, after points within Q, else the tolerance, of a line are left out.
-    - PROGRAMMED: nothing is fitted or rounded, and runs pass corners.
-    - SMOOTH: all moves between two stops, arcs and splines too, are one curve of continuous fourth derivative
-      within the tolerance; Q does not count. Exact moves are followed within `exact_tolerance`, with the
-      lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and bends
-      of points keep their size. The path stops where a rapid meets a feed below 1e-4 of the machine's speed,
-      where an exact path meets another one, and where it turns back by more than 135°. Where it goes back
-      along its own line, and nothing else asks for a stop, it rests within a run. Where no curve is found,
-      corners are rounded one by one between stops, and `Path.warnings` says so. With a `motion` along a path
-      of the same program the curve is fitted to its speed: arcs and bends are cut up to the tolerance, and
-      turns up to 178° are no stops.
+    - ARCS: nothing is fitted, and corners of two lines become true arcs within the tolerance. JOINED: as
+      ARCS, but first points of G1 moves are left out that are within Q, else the tolerance, of a line.
+    - PROGRAMMED: nothing is fitted or rounded, and the path passes corners without a stop.
+    - SMOOTH: all moves between two stops, arcs and splines too, are one curve with continuous fourth
+      derivative within the tolerance; Q is ignored. Exact moves, with the lines that they touch, are followed
+      within `exact_tolerance`. Lines longer than `max_chord` are straight in the middle. Arcs, splines and
+      bends of points keep their size. The path stops where a rapid meets a feed below 1e-4 of the machine's
+      speed, where an exact path meets another one, and where it turns back by more than 135°. Where it goes
+      back along its own line, and nothing else requires a stop, it rests within a run. Where no curve is
+      found, corners are rounded one by one between stops, and `Path.warnings` says so. With a `motion` along
+      a path of the same program the curve is fitted to its speed: arcs and bends are cut up to the tolerance,
+      and turns up to 178° are no stops.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The tool
     also stops where the coordinate mode or the tool length changes.
 
-    The axes of the path are those of the machine that the program names; axes that it names and never moves
-    may be missing. In the mode JOINTS they are in the machine's order, and positions stay within its travel.
+    The axes of the path are those that the program names; axes that it names and never moves may be missing
+    on the machine. In the mode JOINTS they are in the machine's order, and positions stay within its travel.
     In other modes they are in the order of the kinematics, and travel is checked on the joints afterwards.
 
     A feed counts along X, Y and Z where a move moves one of these, else along U, V and W, else along the
@@ -82,9 +83,9 @@ def build_path(
     other modes than JOINTS it is a stop. A fitted chain continues across changes of feed: its pieces are cut
     there, so that none is faster than the feed of a block that it follows.
 
-    `progress` gets the part done. Raises MachineError (an axis is missing), ProgramError (a move has no
-    length, an arc no radius, a spline does not fit its move), InputError (a position outside the travel, a
-    negative tolerance).
+    `progress` is called with the finished share. Raises MachineError (an axis is missing), ProgramError (a
+    move has no length, an arc no radius, a spline does not fit its move), InputError (a position outside the
+    travel, a negative tolerance).
     """
     settings = FitSettings()
     if tolerance is not None:
@@ -164,7 +165,7 @@ def build_path(
 
 
 def _new_words(program: Program, first: Integers) -> Flags:
-    """Whether mode or tool length change before a run (r,), of which `first` (r,) is the first move."""
+    """Whether mode or tool length change before each run (r,), whose first move is `first` (r,)."""
     changes = np.searchsorted(program.change_move, first, side="right")
     new: Flags = np.diff(changes, prepend=changes[:1]) > 0
     if program.coordinate_mode is not None:
@@ -175,7 +176,7 @@ def _new_words(program: Program, first: Integers) -> Flags:
 
 
 def _changes_of_group(names: tuple[str, ...], moving: Flags) -> Flags:
-    """(m − 1,) whether the feed of the next move counts along other axes."""
+    """(m − 1,) whether the feed of the next move counts along other axes than that of the move before."""
     leading = leading_group(names, moving)
     return np.asarray((leading[1:] != leading[:-1]) & (leading[1:] >= 0) & (leading[:-1] >= 0))
 
@@ -205,7 +206,7 @@ def _lines(program: Program, moves: Integers, most: int = 5) -> str:
 
 
 def _splines(program: Program) -> CompositeCurve | None:
-    """The program's splines, from exactly where moves start to their targets."""
+    """The program's splines, with their end points set exactly to the starts and targets of their moves."""
     if program.splines is None or len(program.spline_move) == 0:
         return None
     curve, move, pieces = program.splines, program.spline_move, program.spline_pieces
@@ -237,7 +238,7 @@ def _splines(program: Program) -> CompositeCurve | None:
 def _tolerances(
     program: Program, tolerance: float | None, settings: FitSettings, corners: Corners
 ) -> tuple[Floats, Floats]:
-    """Per move the allowed deviation and the fit's share of it [mm]; 0 where the path is exact."""
+    """For each move the allowed deviation, and the part of it for the fit [mm]; 0 where the path is exact."""
     if tolerance is None:
         limit = np.where(
             np.isnan(program.blend_tolerance), settings.default_tolerance, program.blend_tolerance
@@ -250,6 +251,6 @@ def _tolerances(
     limit = np.where(may_leave, limit, 0.0)
     if corners is Corners.JOINED:
         return limit, np.where(np.isinf(fit_limit), limit, np.where(may_leave, fit_limit, 0.0))
-    if corners is not Corners.ROUNDED:  # the others do not fit chains by themselves
+    if corners is not Corners.ROUNDED:  # other treatments of corners fit no chains
         return limit, np.zeros(len(program))
     return limit, np.minimum(fit_limit, settings.fit_share * limit)

@@ -15,13 +15,14 @@ class FitSettings:
     - `default_tolerance` [mm] holds in G64 without P, and where a program has no path-control mode. Parts
       with tolerances of a tenth of a millimetre leave about a hundredth to the controller.
     - `exact_tolerance` [mm] is the tolerance of arcs in every mode, and of the exact path; lines and splines
-      are exact. Half of it limits the distance of a circle through both ends from the programmed arc, whose
-      ends are rounded: an arc beyond it is a spiral and becomes quadratics within the same distance. It
-      limits the error of a helix along its axis, too. The other half smooths joints.
+      are exact. The ends of programmed arcs are rounded numbers, so a circle through both ends may be half of
+      it away from the programmed arc; an arc that is farther away is a spiral and becomes quadratics within
+      the same distance. Half of it also limits the error of a helix along its axis. The other half is used to
+      smooth joints.
     - `fit_share` is the greatest share of the tolerance that the fit uses; corners are rounded by the rest.
     - `max_chord` [mm]: longer G1 chords stay lines. A long chord among short ones was meant as a line.
     - `alpha`: chains are broken where their curvature exceeds alpha·a_max/F² (Zhang et al. 2010, eq. 2; they
-      take 4 or 9), a_max being the combined acceleration of the axes and F the greatest feed of the chain.
+      take 4 or 9), where a_max is the combined acceleration of the axes and F the greatest feed of the chain.
     - `corner_angle` [deg]: a chain that turns less at a breaking point stays smooth there. A polygon of 14 or
       more equal chords is read as a curve, a twelve-sided one as corners.
     """

@@ -1,7 +1,7 @@
-"""Leaves out points of G1 moves that are within a tolerance of a line: LinuxCNC's naive CAM detector.
+"""Leaves out points of G1 moves that are within a tolerance of a line, as LinuxCNC's naive CAM detector does.
 
-A line goes from a point of the program to the farthest later one that has all points between them within the
-tolerance, found point by point: the first that has not ends the line at the point before (LinuxCNC,
+A line starts at a point of the program and grows point by point, as long as all points between its ends are
+within the tolerance. The first point that breaks this ends the line at the point before it (LinuxCNC,
 `emccanon.cc`: `linkable`).
 """
 
@@ -20,10 +20,10 @@ MOST = 100
 
 
 def joined(program: Program, tolerance: Floats, halt: Flags) -> tuple[Program, Integers]:
-    """The program with fewer moves, and the move that each one ends with (k,).
+    """The program with fewer moves, and the last original move in each new move (k,).
 
-    `tolerance` (n,) [mm] holds for each move, 0 joins none; after `halt` (n,) a new line begins, and where
-    feed or tolerance change. Only moves of X, Y and Z alone are joined.
+    `tolerance` (n,) [mm] is that of each move, 0 joins no moves. A new line begins after a move with `halt`
+    (n,), and where feed or tolerance change. Only moves of X, Y and Z alone are joined.
     """
     last = _ends(program, tolerance, halt)
     if len(last) == len(program):
@@ -55,7 +55,7 @@ _BY_MOVE = (
 
 
 def _ends(program: Program, tolerance: Floats, halt: Flags) -> Integers:
-    """The moves with which lines end (k,)."""
+    """Indices of the moves at which lines end (k,)."""
     columns = [i for i, name in enumerate(program.axes) if name in LINEAR_AXES]
     others = [i for i in range(len(program.axes)) if i not in columns]
     moving = program.moving()
@@ -78,7 +78,7 @@ def _ends(program: Program, tolerance: Floats, halt: Flags) -> Integers:
 
 
 def _near(points: Floats, tolerance: float) -> bool:
-    """Whether all points are within the tolerance of the line from the first to the last one."""
+    """Whether all points are within the tolerance of the line segment from the first to the last point."""
     way = points[-1] - points[0]
     square = float(way @ way)
     if square == 0.0:

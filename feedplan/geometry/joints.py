@@ -9,20 +9,20 @@ import numpy as np
 from feedplan.arrays import Floats
 from feedplan.curves.composite import CompositeCurve
 
-# A unit tangent computed from control points of size |C| with an edge of length e carries a rounding error
-# of a few eps·|C|/e; a smaller turn than this many times that is no corner.
+# The rounding error of a unit tangent is a few eps·|C|/e, for control points of size |C| and an edge of
+# length e. A turn is no corner if it is at most SMOOTH_TURN plus ROUNDING_MARGIN·eps·|C|/e.
 ROUNDING_MARGIN = 32.0
 SMOOTH_TURN = 1e-9
 
-# Edges shorter than this share of a control polygon, as next to a cusp, have no direction.
+# Edges shorter than this share of the size of a control polygon, as next to a cusp, have no direction.
 VANISHING_EDGE = 1e-12
 
 
 def tangent_jumps(curve: CompositeCurve) -> Floats:
-    """|T₊ − T₋| by axis at the joints between pieces (n − 1, axes), T being the unit tangents.
+    """T₊ − T₋| of each axis at the joints between pieces (n − 1, axes); T are the unit tangents.
 
-    0 where the jump may be rounding, NaN next to a piece without length. In a cusp T is the
-    direction in which the motion ends or begins.
+    0 where the jump may be rounding, NaN next to a piece without length. At a cusp T is the direction in
+    which the motion ends or begins.
     """
     edge_in, edge_out = end_edges(curve)
     edge_out, edge_in = edge_out[:-1], edge_in[1:]
@@ -37,16 +37,17 @@ def tangent_jumps(curve: CompositeCurve) -> Floats:
 
 
 def end_edges(curve: CompositeCurve) -> tuple[Floats, Floats]:
-    """The edges of the control polygons along the tangents at both ends of each piece, each (n, axes).
+    """The edges of the control polygons that give the tangents at both ends of each piece, each (n, axes).
 
-    The first and the last edge that have a length; 0 on a piece without any.
+    They are the first and the last edge with a length; 0 on a piece without length.
     """
     control, degree = curve.control_points, curve.degree
     first, last = curve.offsets[:-1], curve.offsets[1:] - 1
     start, end = control[first + 1] - control[first], control[last] - control[last - 1]
     if len(curve) == 0:
         return start, end
-    # A piece is no larger than the whole curve: few edges are so short that the size of their pieces counts.
+    # No piece is larger than the whole curve. So if all edges are long compared with the whole curve, the
+    # size of each piece need not be computed.
     if min(_greatest(edge).min() for edge in (start, end)) > VANISHING_EDGE * (control.max() - control.min()):
         return start, end
     greatest, least = (f.reduceat(control, first) for f in (np.maximum, np.minimum))

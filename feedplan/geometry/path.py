@@ -29,27 +29,28 @@ from feedplan.units import counted
 
 DEFAULT_AXES = "XYZABC"
 
-# The greatest distance [mm] between the ends of neighbouring pieces: rounding separates them so far.
+# The greatest distance [mm] between the ends of neighbouring pieces: larger gaps are not rounding.
 MAX_GAP = 1e-6
 
-# A speed [mm/s] and an acceleration [mm/s²] with which the tolerance alone limits the length of corners.
+# A speed [mm/s] and an acceleration [mm/s²] with which only the tolerance limits the size of corners.
 _ANY_SPEED, _ANY_ACCELERATION = 1e6, 1.0
 
 
 @dataclass(frozen=True)
 class FitSummary:
-    """What fitting did: G1 `points` in, B-`splines` and `polynomials` out, `deviation` [mm] of the path.
+    """Result of the fit: numbers of G1 `points`, B-`splines` and `polynomials`, and the path's `deviation`
+    [mm].
 
-    `points` are the G1 moves of the chains that were fitted, lines that stayed lines among them; each of
-    those counts as a spline and a polynomial. `splines` and `polynomials` count what the fit made, before
+    `points` counts the G1 moves of the fitted chains. Lines that stayed lines are included, and each also
+    counts as one spline and one polynomial. `splines` and `polynomials` count what the fit made, before
     pieces are cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance
-    between the whole path (arcs and corners too) and the programmed one, both ways.
+    between the whole path (arcs and corners too) and the programmed one, in both directions.
 
-    The last three are for smooth paths (`Corners.SMOOTH`), else None. They are distances [mm] from
-    the program, positive on the outside, away from the centre of curvature. `mean_offset` is the mean over
-    all bends, which are arcs and points that turn by less than 30°, away from corners: the error of the
-    radius of a hole or a boss. `inside` and `outside` are the greatest distances on each side, corners
-    included, at the programmed points and at places between them.
+    The last three are None except for smooth paths (`Corners.SMOOTH`). They are distances [mm] from the
+    program, positive on the outside, away from the centre of curvature. `mean_offset` is the mean over all
+    bends (arcs, and points that turn by less than 30°) away from corners: the error of the radius of a hole
+    or a boss. `inside` and `outside` are the greatest distances on each side, corners included, at the
+    programmed points and at places between them.
     """
 
     points: int = 0
@@ -64,7 +65,8 @@ class FitSummary:
     def of(
         cls, points: int, splines: int, polynomials: int, deviation: float, offsets: list[float] | None
     ) -> FitSummary:
-        """From the numbers of the native fit; `offsets` are the mean and the greatest on both sides."""
+        """Makes a summary from the numbers of the native fit; `offsets` are the mean offset and the greatest
+        distances inside and outside."""
         return cls(points, splines, polynomials, deviation, *(offsets or (None, None, None)))
 
     @property
@@ -80,9 +82,10 @@ class FitSummary:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """The curve from which a path was cut: its piece i is the fractions `part[i]` (n, 2) of `piece[i]` (n,).
+    """The curve from which a path was cut: piece i of the path is the fractions `part[i]` (n, 2) of
+    `piece[i]` (n,) of the curve.
 
-    Derivatives are taken from `curve`: the control points of a short part lack the digits for them.
+    Derivatives are computed from `curve`, because differences of a short part's control points lose digits.
     """
 
     curve: CompositeCurve
@@ -99,8 +102,8 @@ class Cut:
 class Path:
     """Pieces C_i(u), u in [0, width_i], joined end to end, in runs between full stops.
 
-    `axes` names the columns of `curve`, which has the n pieces [mm, deg], each of its own degree, polynomial
-    or rational. Within a run the tangent is continuous, unless corners are passed with a velocity jump.
+    `axes` names the columns of `curve` [mm, deg]; its n pieces are polynomial or rational and may differ in
+    degree. Within a run the tangent is continuous, unless corners are passed with a velocity jump.
 
     Each piece has
 
@@ -109,7 +112,8 @@ class Path:
     - `feed` (n,), the commanded feed [mm/s], infinite on rapids. Where axes of several groups move,
       `group_feed` (n, 3) has the greatest speeds along X, Y, Z, along U, V, W [mm/s], and of all other axes
       together [deg/s], infinite where none is commanded; more than one is finite on a blend of moves whose
-      feeds count along different axes, and `feed` is the first. None where all axes are one group.
+      feeds count along different axes, and then `feed` is the first finite one. None where all axes are one
+      group.
 
     Each of the r runs has
 
@@ -119,8 +123,8 @@ class Path:
     - `new_words` (r,): mode or tool length change before the run. The same joint positions are written in
       other words, so the path may jump there.
 
-    `fit` says what fitting did, `corners` what became of the program's corners, and `warnings` are sentences
-    for the user. Arrays are read-only: `dataclasses.replace` makes a path with others.
+    `fit` is the result of the fit, `corners` the treatment of the program's corners, and `warnings` are
+    sentences for the user. Arrays are read-only: `dataclasses.replace` makes a path with other arrays.
     """
 
     axes: tuple[str, ...]
@@ -154,19 +158,20 @@ class Path:
     ) -> Path:
         """The path along a curve [mm, deg].
 
-        `axes` names them, by default the first of XYZABC: up to nine names of a machine's axes (see `Axis`).
-        `feed` [mm/s] is the greatest speed along X, Y and Z on pieces that move one of these, else along U, V
-        and W, else of all other axes together [deg/s], as in a program; by default only
-        the limits of the axes hold. Gaps up to 1e-6 mm are closed.
+        `axes` are the names of its coordinates, by default the first of XYZABC: up to nine names of a
+        machine's axes (see `Axis`). `feed` [mm/s] is the greatest speed along X, Y and Z on pieces that move
+        one of these, else along U, V and W, else of all other axes together [deg/s], as in a program; by
+        default only the limits of the axes hold. Gaps up to 1e-6 mm are closed.
 
         Straight pieces, of any degree and with any weights, become lines of degree 1, cut where they turn
         back. Neighbours on one line become one, unless both had degree 1. Curved pieces are cut in their
-        cusps. Pieces without length are left out. The path has the same places as `curve` and the same
-        parameter intervals; only the speed of the parameter on lines becomes constant.
+        cusps. Pieces without length are left out. The path has the same shape and parameter intervals as
+        `curve`; only on lines |C'| becomes constant.
 
-        Differences of up to 16 roundings of the greatest coordinate count as 0. A piece is straight if its
-        control points are so near to a line. A curved piece that turns back within this distance has a cusp;
-        control points within 1e-9 of the greatest coordinate from the cusp are moved into it.
+        Differences of up to 16 units in the last place of the greatest coordinate count as 0. A piece is
+        straight if its control points are within this distance of a line. A curved piece that turns back
+        within this distance has a cusp; control points within 1e-9 of the greatest coordinate from the cusp
+        are moved into it.
 
         Runs end at corners, where the path turns back, and in cusps; these are stops. `path.move` gives the
         first and the last piece of `curve` that a piece follows, and all source lines are 0.
@@ -247,7 +252,7 @@ class Path:
         settings: FitSettings | None = None,
         corners: Corners = Corners.ROUNDED,
     ) -> Path:
-        """The path through `points` (n, axes) [mm, deg], as that of a program of G1 moves in G64.
+        """The path through `points` (n, axes) [mm, deg], the same as for a program of G1 moves in G64.
 
         It stays within `tolerance` [mm] of the polygon, both ways: chains are fitted by B-splines, corners
         rounded as far as the tolerance allows, or as `corners` says (ROUNDED, ARCS or SMOOTH); 0 means exact
@@ -322,7 +327,7 @@ class Path:
         moving: Flags,
         move: Integers,
     ) -> Path:
-        """The path along a curve at one feed; `moving` (m, axes) are the axes that each move moves."""
+        """The path along a curve at one feed; `moving` (m, axes) says which axes each move moves."""
         count = len(curve)
         return cls(
             axes=axes,
@@ -338,7 +343,8 @@ class Path:
 
     @classmethod
     def _scaled(cls, curve: CompositeCurve, axes: Sequence[str] | None, feed: float) -> Path:
-        """The path along a curve whose parameter becomes about the length, by one factor for all pieces."""
+        """The path along a curve, with all parameter widths scaled by one factor to sum to about its
+        length."""
         edges = np.linalg.norm(np.diff(curve.control_points, axis=0), axis=1)
         edges[curve.offsets[1:-1] - 1] = 0.0
         length = float(edges.sum())
@@ -356,18 +362,18 @@ class Path:
 
     @property
     def width(self) -> Floats:
-        """The parameter interval of each piece (n,) [mm: about the length]."""
+        """The width of each piece's parameter interval (n,) [mm: about the length]."""
         return self.curve.width
 
     @property
     def length(self) -> float:
-        """Length along all axes [mm; of joints their unit]."""
+        """Length along all axes [mm; for joints in their unit]."""
         return self.lengths.total
 
     def evaluate(self, s: ArrayLike, order: int = 0) -> Floats:
-        """The place at one length or at lengths (n,) from the start: (axes,) or (n, axes) [mm, deg].
+        """The position at one length or at lengths (n,) from the start: (axes,) or (n, axes) [mm, deg].
 
-        `order` 1 gives the unit tangent there, 2 the curvature vector [1/mm]; NaN where the path has neither.
+        `order` 1 gives the unit tangent there, 2 the curvature vector [1/mm]; NaN where they do not exist.
         Raises InputError for a length that is not on the path, and for another order.
         """
         if not is_whole(order, 0, 2):
@@ -387,11 +393,11 @@ class Path:
 
     @cached_property
     def lengths(self) -> CurveLength:
-        """The length along all axes as a function of the place."""
+        """The length along all axes from the start, as a function of piece and u."""
         return CurveLength(self.curve)
 
     def cut(self, curve: CompositeCurve, piece: Integers) -> Path:
-        """The same path with pieces cut: `curve` has the parts in order, part i of the piece `piece[i]`."""
+        """This path with its pieces cut: `curve` has the parts in order, part i of piece `piece[i]`."""
         return replace(
             self,
             curve=curve,
@@ -405,12 +411,13 @@ class Path:
 
     @property
     def pauses(self) -> float:
-        """Time of all pauses, before the first run and after each [s]."""
+        """Total time of the pauses before the first run and after each run [s]."""
         return self.start_dwell + math.fsum(self.dwell)
 
 
 def _closed_gaps(curve: CompositeCurve) -> CompositeCurve:
-    """The curve with each piece starting exactly where the one before ends."""
+    """The curve, changed so that each piece starts exactly where the piece before it ends. Raises InputError
+    for gaps above `MAX_GAP`."""
     control = curve.control_points.copy()
     start, end = curve.offsets[1:-1], curve.offsets[1:-1] - 1
     gap = np.linalg.norm(control[start] - control[end], axis=1)

@@ -1,4 +1,4 @@
-"""The axes of a path: which letters of a program a machine takes, in which mode, and the limits they set."""
+"""The axes of a path: the program's letters that a machine takes, their mode, and the limits of the axes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from feedplan.program.program import Program
 class PathWords:
     """The axes of a path.
 
-    `names` are those of the machine that the program names, in the machine's order. `joints` (n,): the
-    words of the move are joint positions; `changes` (n − 1,): the mode or the tool length of the next move
-    differs. `max_velocity`, `max_acceleration`, `max_jerk` (axes,) are for rounding corners and fits, the
-    smaller ones of both directions: those of the joint where all words are joints; otherwise the least of all
-    linear joints, or of the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`:
-    all words are joints, and those that move allow a velocity jump at corners.
+    `names` are the machine's axes that the program names, in the machine's order. `joints` (n,): the words of
+    the move are joint positions; `changes` (n − 1,): the mode or the tool length of the next move differs.
+    `max_velocity`, `max_acceleration`, `max_jerk` (axes,) are used to round corners and to fit, the smaller
+    limit of both directions: where all words are joints, the limit of the joint; else the limit of a rotary
+    axis itself, and for other axes the least limit of all linear joints. `travel` (axes, 2) holds where words
+    are joints. `may_jump`: all words are joints, and all that move allow a velocity jump at corners.
     """
 
     names: tuple[str, ...]
@@ -75,7 +75,7 @@ def path_words(program: Program, machine: Machine) -> PathWords:
         before, after = program.tool_length[:-1], program.tool_length[1:]
         changes |= (before != after) & ~(np.isnan(before) & np.isnan(after))
     joints = coordinate_mode == CoordinateMode.JOINTS
-    # Where the joints move in another way than the tip, a corner is a stop.
+    # Where words are not joints, a corner is a stop.
     may_jump = bool(joints.all()) and all(
         machine.axis(name).max_velocity_jump > 0 for name in names if used[program.axes.index(name)]
     )
@@ -99,7 +99,7 @@ def _letters(machine: Machine, coordinate_mode: CoordinateMode) -> tuple[str, ..
         return machine.axis_names
     if coordinate_mode is CoordinateMode.TIP:
         return machine.inverse.tip_names
-    # Kinematics are loaded where they are needed.
+    # Imported here, so that kinematics are loaded only if needed.
     from feedplan.machine.axis_words import axis_words
 
     return axis_words(machine, DIRECTION, coordinate_mode).kinematics.tip_names

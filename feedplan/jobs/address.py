@@ -1,4 +1,4 @@
-"""The address of a Dask cluster: on this computer, or anywhere by TLS with certificates."""
+"""The address of a Dask cluster: on this computer, or on any computer by TLS with certificates."""
 
 from __future__ import annotations
 

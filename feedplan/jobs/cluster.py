@@ -45,7 +45,7 @@ class Cluster:
         self._address, self._limits = address, (limits.max_time, limits.max_memory)
         self._lock = threading.Lock()
         self._heard: dict[str, _Heard] = {}
-        # The number of threads, None if the scheduler could not be reached, and when it was counted [s].
+        # The number of threads (None if the scheduler could not be reached), and when they were counted [s].
         self._counted: tuple[int | None, float] = (None, -COUNTED)
         self._closed = False
         self._client: Client = self._new_client()
@@ -67,7 +67,7 @@ class Cluster:
         return count
 
     def slots(self) -> int:
-        """See `Executor`; 1 without workers, for clusters that start workers when there is work."""
+        """See `Executor`; 1 without workers, because some clusters start workers only when there is work."""
         threads = self.threads()
         return 0 if threads is None else max(threads, 1)
 
@@ -142,8 +142,8 @@ class Cluster:
             heard.add(*message["progress"])
 
     def _connected(self) -> Client:
-        """The connection to the scheduler, made again if it was broken, which loses all tasks; None while it
-        cannot be made."""
+        """The connection to the scheduler; a broken one is made again (all its tasks are lost). None if that
+        fails."""
         with self._lock:
             if self._client is not None and self._client.status != "running":
                 close(self._client)
@@ -166,7 +166,7 @@ class _Lost:
     """A task that has lost as many workers as Dask allows, with the outcome of its job, if the task has one
     job.
 
-    A task that never `started` has only waited on workers that another task has lost.
+    A task that never `started` has only waited on workers that other tasks made fail.
     """
 
     outcome: Outcome

@@ -1,4 +1,4 @@
-"""Runs in a worker of a cluster: does the same work as a process, with files that are sent both ways."""
+"""Runs jobs in a worker of a cluster: the same work as in a process, with files that are sent both ways."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class _JobProgress:
         self._tell = paced(lambda stage, part: send(TOPIC, {"task": name, "progress": [number, stage, part]}))
 
     def progress(self, stage: str, part: float) -> None:
-        """Reports the part of a stage that is done. Raises Stopped."""
+        """Reports the finished share of a stage. Raises Stopped."""
         self.over_time = time.monotonic() > self._end
         if self.over_time:
             raise Stopped

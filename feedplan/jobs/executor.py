@@ -1,4 +1,4 @@
-"""The interface between batches or the service and what runs their jobs."""
+"""The interface of executors, which run the jobs of batches and of the service."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from feedplan.jobs.order import Job
 from feedplan.jobs.outcome import Outcome
 
 MB = 1_000_000
-# Called with the index of a job in its sequence, a stage, and the part of the stage that is done (0 to 1).
+# Called with the index of a job in its sequence, a stage, and the finished share of the stage (0 to 1).
 JobListener = Callable[[int, str, float], None]
 
 
@@ -29,7 +29,7 @@ class JobLimits:
         )
 
     def over_memory(self, used: int) -> Outcome:
-        """The outcome of a job that has `used` more than `max_memory` [bytes]."""
+        """The outcome of a job whose memory `used` [bytes] exceeds `max_memory`."""
         return Outcome.failed(
             "limit",
             f"the job takes {used / MB:.6g} MB of memory, more than the {self.max_memory:g} of max_memory: "
@@ -40,15 +40,14 @@ class JobLimits:
 class Executor(Protocol):
     """Runs jobs; all methods may be called from any thread.
 
-    `depth` is the number of sequences to give to each slot at a time: 2 if a slot needs a while to get the
-    next one.
+    `depth` is the number of sequences given to each slot at a time: 2 if a slot would wait for the next one.
     """
 
     depth: int
 
     def slots(self) -> int:
-        """The number of sequences of jobs that can run at the same time; it may change. 0 while what runs
-        them cannot be reached."""
+        """The number of sequences of jobs that can run at the same time; it may change. It is 0 while the
+        workers cannot be reached."""
 
     def run(self, jobs: Sequence[Job], report: JobListener, stop: Event) -> list[Outcome]:
         """Runs these jobs in order, waits for them and returns their outcomes.

@@ -14,7 +14,7 @@ import feedplan
 
 @functools.cache
 def identity() -> str:
-    """Version, hash of all files of the package, and the versions of Python, numpy and the C library."""
+    """Version, hash of all files of the package, and the versions of Python, NumPy and the C library."""
     package = FilePath(feedplan.__file__).parent
     sha256 = hashlib.sha256()
     for file in sorted(package.rglob("*")):

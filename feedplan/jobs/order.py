@@ -11,11 +11,12 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Order:
-    """Plain values that say how to plan a program, the same on every computer.
+    """A description, in plain values, of how to plan a program; it is the same on every computer.
 
-    `name` of the program is shown in messages, and its ending decides the language; `machine` is the text of
-    a machine file, or `auto`; `options` are keywords of `feedplan.plan`, `reading` keywords of `read_program`
-    except files; `formats` are those of the setpoints; with `drawing` the data of a page is written too.
+    `name` is that of the program: it is shown in messages, and its ending decides the language; `machine` is
+    the text of a machine file, or `auto`; `options` are keywords of `feedplan.plan`, `reading` keywords of
+    `read_program` except files; `formats` are those of the setpoints; with `drawing` the data of a page is
+    written too.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Order:
 
     @staticmethod
     def of(text: str) -> Order:
-        """The order of such a text."""
+        """The order from a text made by `text`."""
         table = json.loads(text)
         return Order(**{**table, "formats": tuple(table["formats"])})
 
@@ -40,7 +41,7 @@ class Order:
 @dataclass(frozen=True)
 class Job:
     """An order with its files: the `program`, the `tool_table`, the folders of `subprograms` that the program
-    may call, and the `folder` of its plan, which appears whole or not at all."""
+    may call, and the `folder` of its plan, which is written completely or not at all."""
 
     order: Order
     program: FilePath
@@ -62,7 +63,7 @@ class Job:
 
     @staticmethod
     def of(text: str | bytes) -> Job:
-        """The job of such a text."""
+        """The job from a text made by `text`."""
         table = json.loads(text)
         return Job(
             Order.of(table["order"]),

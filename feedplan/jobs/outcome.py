@@ -14,8 +14,8 @@ Kind = ErrorKind | Literal["disk", "limit", "worker", "defect"]
 
 @dataclass(frozen=True)
 class Failure:
-    """The reason why a job has no plan: its kind, one sentence, the line of the program; for a defect of
-    feedplan the `trace`."""
+    """The reason why a job has no plan: its kind, one sentence, the line of the program, and, for a defect of
+    feedplan, the `trace`."""
 
     kind: Kind
     sentence: str
@@ -43,7 +43,7 @@ class Outcome:
 
     @staticmethod
     def of(text: str) -> Outcome:
-        """The outcome of such a text."""
+        """The outcome from a text made by `text`."""
         table = json.loads(text)
         failure = table.pop("failure")
         return Outcome(**table, failure=failure and Failure(**failure))

@@ -1,7 +1,7 @@
-"""The process that works on jobs, one after the other.
+"""The process that runs jobs, one after the other.
 
-It exchanges JSON with its parent, never pickled objects. The process ends when the connection is closed, and
-stops its job at the next report of progress when it is told to.
+It exchanges JSON with its parent, never pickled objects. The process ends when the connection is closed; if
+told to stop, it ends its job at the job's next report of progress.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from feedplan.jobs.order import Job
 from feedplan.jobs.work import Stopped, paced, work_on
 from feedplan.progress import Progress
 
-# Modules that most jobs need; the fork server imports them once. `__main__` is that of the command.
+# Modules that most jobs need; the fork server imports them once. `feedplan.__main__` is the command's.
 LOADED = (
     __name__,
     *("feedplan.__main__", "feedplan.machine.kinematics", "feedplan.planners.bang_bang"),
@@ -47,7 +47,7 @@ def _become_a_worker(niceness: int) -> None:
         os.dup2(nothing, stream)
     with suppress(OSError):
         os.nice(niceness)
-    with suppress(OSError):  # Linux: if memory runs out, this process is killed, not its parent
+    with suppress(OSError):  # Linux: if memory runs out, this process is killed instead of its parent
         FilePath("/proc/self/oom_score_adj").write_text("1000")
 
 
@@ -64,7 +64,7 @@ class _Parent:
         while True:
             try:
                 message = self._connection.recv_bytes(LONGEST_MESSAGE)
-            except (EOFError, OSError):  # the parent is gone: nothing here needs an orderly end
+            except (EOFError, OSError):  # the parent has ended: there is nothing to clean up
                 os._exit(0)
             if message == STOP:
                 self._stop.set()

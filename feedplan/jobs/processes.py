@@ -1,8 +1,8 @@
-"""Jobs in processes of this computer.
+"""Runs jobs in processes of this computer.
 
-Each sequence of jobs has a process, started in some 10 ms from a fork server that has feedplan loaded. A job
-that is killed, or runs out of memory or time, ends only its process; the jobs after it get another process.
-Processes share no pipe, because a killed process could keep the lock of a shared one.
+Each sequence of jobs has a process, started in about 10 ms from a fork server that has already loaded
+feedplan. A job that is killed, or runs out of memory or time, ends only its process; the jobs after it get
+another process. Processes share no pipe, because a killed process could keep the lock of a shared one.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from feedplan.jobs.executor import MB, JobLimits, JobListener
 from feedplan.jobs.order import Job
 from feedplan.jobs.outcome import Outcome
 
-# Time between two checks of a process, and longest time for it to stop when it is told to [s].
+# Time between two checks of a process, and the longest time for it to stop when told to [s].
 EVERY, GRACE = 0.05, 2.0
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 
@@ -119,9 +119,9 @@ class Processes:
 
 
 def _start_fork_server() -> None:
-    """Ctrl-C in a terminal reaches all processes there, and only that of the command is to answer it: the
-    fork server and its children inherit the mask."""
-    # It would unblock the signal.
+    """Starts the fork server with SIGINT blocked; its children inherit the mask. Ctrl-C in a terminal reaches
+    all processes there, but only that of the command must answer it."""
+    # Started first, because its start would unblock the signal.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -138,7 +138,7 @@ def _ended(process: BaseProcess) -> Outcome:
 
 
 def memory_of(process: int | None) -> int:
-    """The resident memory of a process [bytes]; 0 if the system does not tell."""
+    """The resident memory of a process [bytes]; 0 if the system does not provide it."""
     try:
         return int(FilePath(f"/proc/{process}/statm").read_text("ascii").split()[1]) * _PAGE
     except (OSError, IndexError, ValueError):

@@ -25,7 +25,7 @@ STAGES = {
     "audit": (0.6, 0.8),
     "write": (0.8, 1.0),
 }
-# Time between two reports of progress [s]; each begin of a stage is reported too.
+# Time between two reports of progress [s]; the first report of each stage is always passed on.
 EVERY = 0.25
 MOST_FAILURES, MOST_WARNINGS = 5, 20
 
@@ -86,7 +86,7 @@ def _figures(made: Plan) -> dict[str, Any]:
 
 
 def paced(tell: Progress) -> Progress:
-    """A progress function that tells how far a job is, every EVERY seconds at most."""
+    """A progress function that calls `tell` at most every EVERY seconds, and at the start of a stage."""
     told, last = "", 0.0
 
     def report(stage: str, part: float) -> None:
@@ -100,6 +100,6 @@ def paced(tell: Progress) -> Progress:
 
 
 def of_whole(stage: str, part: float) -> float:
-    """The part of the whole work that is done when a part of a stage is done."""
+    """The finished share of the whole work when the share `part` of a stage is finished."""
     start, end = STAGES[stage]
     return start + (end - start) * part

@@ -1,1 +1,1 @@
-"""Machines: axes with their limits, the servo period, and how axes carry the tool."""
+"""Machines: axes with their limits, the servo period, and the kinematics between axes and tool."""

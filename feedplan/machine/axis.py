@@ -11,53 +11,53 @@ from typing import Literal, TypeAlias
 from feedplan.arguments import is_text
 from feedplan.machine.checks import numbers, require, set_limit, set_within
 
-# The letters of programs, and which of them are rotary where an axis does not say.
+# The axis letters of programs, and the letters of rotary axes unless an axis has a `kind`.
 AXIS_LETTERS = "XYZABCUVW"
 ROTARY_LETTERS = ("A", "B", "C")
 # The letters of the tool's direction.
 DIRECTION = ("I", "J", "K")
 AXIS_NAME = re.compile(r"(?![IJK]\Z)[A-Za-z_][A-Za-z0-9_]{0,31}", re.ASCII)
-# The unit of an axis stands in tables, between brackets.
+# The unit of an axis appears in tables between brackets.
 _UNIT = re.compile(r"[^\s\[\]<>&\"'`\\,;]{1,12}")
 _ROTARY_UNITS = ("deg", "°", "rad")
 NAME_REMEDY = "1 to 32 letters, digits and underscores, no digit first, other than I, J and K"
 AxisKind = Literal["linear", "rotary"]
-# The same in both directions, or the least and the greatest.
+# One number for both directions, or the least (negative) and the greatest value.
 Limit: TypeAlias = float | tuple[float, float]
 
-# Ranges of the numbers of machines, in mm or degrees and seconds. A number outside is a mistake: ramps would
-# be shorter than the rounding of positions, or plans longer than a year.
+# Allowed ranges of a machine's numbers, in mm or degrees and seconds. A number outside is a mistake: ramps
+# would be shorter than the rounding of positions, or plans longer than a year.
 VELOCITIES = 1e-5, 1e9
 GREATEST_ACCELERATION = 1e10
-# The times [s] after which an axis has its velocity, and its acceleration.
+# The time [s] in which an axis reaches its velocity (v/a), and its acceleration (a/j).
 RISE_TIMES = 1e-5, 1e7
 JERK_TIMES = 1e-7, 1e2
 # The least time to full acceleration as a share of the time to full velocity.
 LEAST_JERK_SHARE = 1e-7
-# The least way [mm] in which an axis has its velocity v²/a, and its acceleration a³/j².
+# The least distance [mm] in which an axis reaches its velocity, v²/a, and its acceleration, a³/j².
 LEAST_WAY = 1e-11
 FARTHEST = 1e9
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis, a joint of the machine, and its limits.
+    """One axis (joint) of the machine, and its limits.
 
     `name`: 1 to 32 letters, digits and underscores, the first no digit, other than I, J and K (a tool's
-    direction). Programs move axes named by one of the letters XYZABCUVW, paths from Python any axes.
-    `max_velocity` [mm/s], `max_acceleration` [mm/s²], each one number or, where it differs by direction, two:
-    (-1.0, 2.0) is at most 1 backward and 2 forward. `max_jerk` [mm/s³] (infinite: not limited),
-    `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
-    On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter or the unit
-    decides: A, B and C are rotary, and axes in deg, ° or rad.
+    direction). Programs can only move axes with one of the names XYZABCUVW, paths from Python any axes.
+    `max_velocity` [mm/s] and `max_acceleration` [mm/s²] are each one number or, where the limit differs by
+    direction, two: (-1.0, 2.0) allows 1 in the negative and 2 in the positive direction. `max_jerk` [mm/s³]
+    (infinite: not limited), `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] is allowed at a
+    corner (0: corners are stops). On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; if
+    it is empty, A, B, C and axes in deg, ° or rad are rotary, all others linear.
 
-    `unit` is that of its positions, 1 to 12 characters: empty, mm, or deg on a rotary axis. Another one, such
-    as rad or µm, takes the place of mm in all limits; programs, and kinematics with dimensions, need mm and
+    `unit` is the unit of its positions, 1 to 12 characters; empty means mm, or deg on a rotary axis. Another
+    unit, such as rad or µm, replaces mm in all limits; programs, and kinematics with dimensions, need mm and
     deg. Limits and positions are never converted.
 
-    Velocities v are from 1e-5 to 1e9, accelerations a at most 1e10; an axis has its velocity after v/a from
-    1e-5 to 1e7 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
-    v²/a and a³/j² of 1e-11 or more. Travel is within 1e9.
+    Velocities v must be from 1e-5 to 1e9, accelerations a at most 1e10. v/a, the time to full velocity, must
+    be from 1e-5 to 1e7 s; a/j, the time to full acceleration, from 1e-7 to 100 s and at least 1e-7 of v/a;
+    the distances v²/a and a³/j² at least 1e-11. Travel must be within ±1e9.
 
     Raises MachineError for other values.
     """
@@ -107,17 +107,17 @@ class Axis:
 
     @property
     def velocity_range(self) -> tuple[float, float]:
-        """The least and the greatest velocity."""
+        """The velocity limits (negative, positive)."""
         return range_of(self.max_velocity)
 
     @property
     def acceleration_range(self) -> tuple[float, float]:
-        """The least and the greatest acceleration."""
+        """The acceleration limits (negative, positive)."""
         return range_of(self.max_acceleration)
 
     @property
     def usual_unit(self) -> str:
-        """mm or deg, as programs have them."""
+        """The unit in programs: mm or deg."""
         return "deg" if self.kind == "rotary" else "mm"
 
 
@@ -127,16 +127,16 @@ def range_of(limit: Limit) -> tuple[float, float]:
 
 
 def sizes_of(limit: Limit) -> tuple[float, float]:
-    """The lesser and the greater size of a limit of two directions."""
+    """The limits of both directions as absolute values, the smaller one first."""
     least, greatest = sorted(map(abs, range_of(limit)))
     return least, greatest
 
 
 def size_of(limit: Limit) -> float:
-    """The size that a limit allows in both directions."""
+    """The absolute value that a limit allows in both directions."""
     return sizes_of(limit)[0]
 
 
 def usual_units(names: Iterable[str]) -> tuple[str, ...]:
-    """The units of axes and directions by their names alone: deg of A, B, C, I, J, K, else mm."""
+    """The units of axes and directions by their names alone: deg for A, B, C, I, J, K, else mm."""
     return tuple("deg" if name in (*ROTARY_LETTERS, *DIRECTION) else "mm" for name in names)

@@ -1,7 +1,8 @@
-"""The axis words of a program on a machine: from columns of a program to what its kinematics takes.
+"""The axis words of a program on a machine: maps a program's columns to the input of its kinematics.
 
-A reader gives the coordinate mode and the tool length of each move, and for directions the columns I, J, K.
-In the modes TIP and VECTOR the words are the tip itself: the reader leaves the tool length out of them.
+A program reader gives the coordinate mode and the tool length of each move, and the columns I, J, K for
+directions. In the modes TIP and VECTOR the words are the position of the tip: the reader does not add the
+tool length to them.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from feedplan.machine.rotary import RotaryChain, ToolVector
 
 @dataclass(frozen=True)
 class AxisWords:
-    """Moves in one coordinate mode: `kinematics` takes the columns `column` of the program's axes.
+    """The words of moves in one coordinate mode: `kinematics` takes these columns of the program's axes.
 
-    A column of −1 is an axis that the program does not use: it stays at 0.
+    The column −1 is an axis that the program does not use: it stays at 0.
     """
 
     coordinate_mode: CoordinateMode
@@ -33,12 +34,12 @@ class AxisWords:
 
     @property
     def other_pose(self) -> AxisWords:
-        """The same by the other pose that points the tool along a direction."""
+        """These words with the other pose of the joints that gives the same tool direction."""
         assert isinstance(self.kinematics, ToolVector)
         return replace(self, kinematics=replace(self.kinematics, side=-self.kinematics.side))
 
     def tip(self, points: Floats) -> Floats:
-        """What `kinematics` takes (…, tip axes), from points or Bézier points (…, program axes)."""
+        """The input of `kinematics` (…, tip axes), from points or Bézier points (…, program axes)."""
         columns = [
             points[..., column] if column >= 0 else np.zeros(points.shape[:-1]) for column in self.column
         ]
@@ -52,12 +53,12 @@ def axis_words(
     *,
     tool_length: float | None = None,
 ) -> AxisWords:
-    """The program axes `axes` on a machine; MachineError names a letter the machine does not have.
+    """The words of the program axes `axes`; raises MachineError for a letter that the machine lacks.
 
-    Letters of other modes are left out: I, J, K, or rotary joints beside a direction.
+    Letters of other modes are ignored: I, J, K, or rotary joints together with a direction.
 
-    Without a `coordinate_mode` it is the machine's own before any G43.4. `tool_length` [mm] replaces the
-    machine file's.
+    Without a `coordinate_mode`, it is the machine's mode before any G43.4. `tool_length` [mm] replaces the
+    one in the machine file.
     """
     axes = tuple(axes)
     kinematics = machine.inverse
@@ -75,7 +76,7 @@ def axis_words(
             )
         kinematics = ToolVector(kinematics)
     known = kinematics.tip_names
-    # The columns of a program with several modes serve all of them.
+    # A program with several modes has the columns of all of them.
     others = kinematics.joint_names if coordinate_mode is CoordinateMode.VECTOR else DIRECTION
     for letter in axes:
         if letter not in known and letter not in others:

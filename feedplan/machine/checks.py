@@ -1,4 +1,4 @@
-"""Checks of values of a machine; an error is one sentence with place, value and remedy."""
+"""Checks of the values of a machine; an error is one sentence with place, value and remedy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
 
-# Numbers may exceed the ends of ranges by this share, because the ends are rounded quotients.
+# Numbers may exceed the ends of their ranges by this share, because the ends are rounded quotients.
 ROUNDING = 1e-12
 
 
@@ -37,7 +37,7 @@ def numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = Fa
 def set_within(
     owner: object, key: str, place: str, unit: str, ends: tuple[float, float], infinite: bool = False
 ) -> None:
-    """Makes a field a float; raises MachineError unless it is between the ends, or infinite if allowed."""
+    """Converts a field to a float; raises MachineError unless it is between the ends, or allowed infinite."""
     value = getattr(owner, key)
     good = is_number(value) and (_within(value, ends) or (infinite and value == math.inf))
     remedy = f"a number from {ends[0]:g} to {ends[1]:g} [{unit}]{', or inf' if infinite else ''}"
@@ -46,7 +46,8 @@ def set_within(
 
 
 def set_limit(owner: object, key: str, place: str, unit: str, ends: tuple[float, float]) -> None:
-    """Makes a field a float between the ends, or a negative and a positive one where directions differ."""
+    """Converts a field to a float between the ends, or to a negative and a positive one where directions
+    differ. Raises MachineError for other values."""
     value = getattr(owner, key)
     if not isinstance(value, (list, tuple)):
         return set_within(owner, key, place, unit, ends)
@@ -66,12 +67,12 @@ def _within(value: float, ends: tuple[float, float]) -> bool:
 
 
 def require_text(value: object, what: str) -> None:
-    """Raises MachineError unless the value is a text, not empty, that a file can hold."""
+    """Raises MachineError unless the value is a non-empty text that a file can hold."""
     require(is_text(value) and value != "", what, value, "a text")
 
 
 def written(value: Any, what: str) -> Any:
-    """A value as a machine file gives it: text, true or false, a number, or a list or table of these.
+    """A value in the types of a machine file: text, true or false, a number, or a list or table of these.
 
     Tuples and arrays become lists. Raises MachineError for what a file cannot hold.
     """

@@ -1,4 +1,4 @@
-"""Models of controllers, and their parameters by the names in the controllers' own files.
+"""Models of controllers, and their parameters with the names in the controllers' own files.
 
 A machine file names its controller as `controller = "grbl"`, or in a table with parameters:
 
@@ -19,7 +19,7 @@ from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
 from feedplan.machine.checks import require, written
 
-# The unit of three numbers for X, Y and Z.
+# The unit of a parameter with three numbers, for X, Y and Z.
 BY_AXIS = "mm/s by axis"
 
 
@@ -29,10 +29,10 @@ def _positive(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter: the method's `option` it becomes, its `default` (None: no limit), its `unit`.
+    """A parameter: the method's `option` that it sets, its `default` (None: no limit), its `unit`.
 
-    A `unit` of "blocks" wants a whole number, `BY_AXIS` three numbers, "" a number from 0 to below 1; all
-    others want a positive number.
+    The `unit` "blocks" requires a whole number from 2, `BY_AXIS` three positive numbers, "" a number from 0
+    to below 1; all other units require a positive number.
     """
 
     option: str
@@ -40,7 +40,7 @@ class Parameter:
     unit: str
 
     def checked(self, what: str, value: Any) -> Any:
-        """The value as a machine file has it; raises MachineError for a value that is not allowed."""
+        """The value in the form of a machine file; raises MachineError for a value that is not allowed."""
         value = written(value, what)
         if self.unit == "blocks":
             good = is_number(value) and value >= 2 and value % 1 == 0
@@ -58,7 +58,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Model:
-    """The `method` that plans as a controller does, options that are always the same, and its parameters."""
+    """The `method` that plans as a controller does, its parameters, and its options that never change."""
 
     method: str
     parameters: Mapping[str, Parameter]
@@ -115,10 +115,9 @@ MODELS: dict[str, Model] = {
 
 @dataclass(frozen=True)
 class Controller:
-    """A controller by `name`, one of `MODELS`, with those of its parameters that are not its defaults.
+    """A controller by `name`, one of `MODELS`, with those of its parameters that differ from the defaults.
 
-    Raises MachineError for an unknown name, for parameters that it has not, and for values that these cannot
-    have.
+    Raises MachineError for an unknown name, for unknown parameters, and for values that are not allowed.
     """
 
     name: str
@@ -143,7 +142,7 @@ class Controller:
 
     @property
     def model(self) -> Model:
-        """The method and the parameters."""
+        """The model: the method and the parameters."""
         return MODELS[self.name]
 
     @property
@@ -156,7 +155,8 @@ class Controller:
 
     @classmethod
     def of(cls, given: Any) -> Controller:
-        """From a name, a table with `type` as in a machine file, or one as it is; raises MachineError."""
+        """A controller from a name, a table with `type` as in a machine file, or itself; raises
+        MachineError."""
         if isinstance(given, Controller):
             return given
         table = given if isinstance(given, Mapping) else {"type": given}

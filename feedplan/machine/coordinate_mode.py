@@ -1,4 +1,4 @@
-"""The coordinate mode of a program: what its axis words mean on a machine."""
+"""The coordinate mode of a program: the meaning of its axis words on a machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class CoordinateMode(IntEnum):
-    """What axis words mean."""
+    """The meaning of axis words."""
 
     JOINTS = 0  # every word is the position of the joint of its letter
     TIP = 1  # X, Y, Z are the tip on the part, rotary words the angles of the rotary joints (G43.4)

@@ -1,7 +1,8 @@
-"""A kinematics' formula as a list of operations: it is called once with numbers that note their use.
+"""Records a kinematics' formula as a list of operations: it is called once with objects that record their
+use.
 
-The native module evaluates the list on numbers, on Taylor series and on intervals. A formula that asks for a
-value, by a comparison or a function of another package, cannot be recorded and is refused.
+The native module evaluates the list on numbers, on Taylor series and on intervals. A formula that needs the
+value of a coordinate, by a comparison or a function of another package, cannot be recorded and is refused.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from feedplan.errors import MachineError
 
 
 class Op(IntEnum):
-    """Operations by the codes that the native module knows."""
+    """The codes of operations, as the native module knows them."""
 
     CONSTANT = 0
     NEGATIVE = 1
@@ -30,11 +31,11 @@ class Op(IntEnum):
     DIFFERENCE = 3
     PRODUCT = 4
     QUOTIENT = 5
-    SHIFT = 6  # plus a constant
-    SCALE = 7  # times a constant
+    SHIFT = 6  # x plus a constant
+    SCALE = 7  # x times a constant
     SQUARE = 8
     ROOT = 9
-    SINE = 10  # with the cosine of the same angle next
+    SINE = 10  # the next operation is the cosine of the same angle
     COSINE = 11
     ANGLE = 12
     RADIANS = 13
@@ -48,9 +49,10 @@ _AFFINE = [Op.CONSTANT, Op.NEGATIVE, Op.SUM, Op.DIFFERENCE, Op.SHIFT, Op.SCALE, 
 class Expression:
     """Joints as operations on tip coordinates.
 
-    Results are numbered: first the `inputs` coordinates, then one a row of `operations` (n, 3), each a code
-    and the numbers of its operands; `constants` (n,) are those of operations that have one. `outputs`
-    (joints,) are the results that are joint positions; `turning`: the joint is known up to whole turns.
+    Results are numbered: first the `inputs` coordinates, then one for each row of `operations` (n, 3), which
+    is a code and the numbers of its operands; `constants` (n,) are the constants of operations that have one.
+    `outputs` (joints,) are the numbers of the results that are joint positions; `turning` (joints,): the
+    joint is known up to whole turns.
     """
 
     inputs: int
@@ -72,9 +74,9 @@ def record(
     joint_names: tuple[str, ...],
     turning: Iterable[bool],
 ) -> Expression:
-    """The formula of the kinematics `name` from `inputs` tip coordinates to the joints.
+    """Records the formula of the kinematics `name` from `inputs` tip coordinates to the joints.
 
-    MachineError says in which way it cannot be recorded.
+    Raises MachineError, which says why the formula cannot be recorded.
     """
     tape = _Tape(name, inputs)
     given = formula(tuple(Traced(tape, i) for i in range(inputs)))
@@ -97,7 +99,7 @@ def record(
 
 
 class _Tape:
-    """The operations so far; an operation on the same operands is recorded once."""
+    """The operations recorded so far; the same operation on the same operands is recorded once."""
 
     def __init__(self, name: str, inputs: int) -> None:
         self.name, self.inputs = name, inputs
@@ -115,7 +117,7 @@ class _Tape:
         return Traced(self, self._known[key])
 
     def number(self, joint: Any) -> int:
-        """The number of a joint's result, which may be a constant."""
+        """The number of the result that is a joint position; a constant is recorded first."""
         if isinstance(joint, Traced):
             return joint.number
         if not (_is_scalar(joint) and math.isfinite(joint)):
@@ -130,7 +132,7 @@ class _Tape:
 
 
 def _refused(what: str) -> Callable[..., Any]:
-    """A method that refuses its use in a formula."""
+    """A method that raises MachineError when a formula uses it."""
 
     def method(self: Traced, *_: Any, **__: Any) -> NoReturn:
         self.tape.refuse(what)
@@ -139,7 +141,7 @@ def _refused(what: str) -> Callable[..., Any]:
 
 
 class Traced:
-    """The result of an operation on a tape: `number` is its place in the list."""
+    """The result of an operation on a tape; `number` is its index in the list."""
 
     __slots__ = ("number", "tape")
 
@@ -230,7 +232,7 @@ class Traced:
         return self._with(Op.DEGREES)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **_: Any) -> Any:
-        """Arithmetic with a number of numpy's on the left; all else is refused."""
+        """Arithmetic with a NumPy number on the left; raises MachineError for other functions."""
         known = _ARITHMETIC.get(ufunc.__name__)
         if known is None or method != "__call__" or not all(_is_number(x) for x in inputs):
             self.tape.refuse(f"uses numpy's {ufunc.__name__}")

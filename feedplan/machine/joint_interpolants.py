@@ -1,4 +1,4 @@
-"""Polynomials that interpolate a joint's motion q'(u), with a proven bound of the error.
+"""Polynomials that interpolate a joint's motion q'(u), with a proven error bound.
 
 q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
 c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u, by the interpolation error formula
@@ -6,7 +6,7 @@ c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u, by the interpolation error
     |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
 
 so the error of a joint's acceleration q' s + q'' p is at most ε₁ |s| + ε₂ p. Parts are halved until ε₂ is
-small enough. Rounding is not part of ε: it adds some 1e-14 of the largest |q''| of the part.
+small enough. Rounding is not included in ε: it adds about 1e-14 of the largest |q''| of the part.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from feedplan.curves.speed_polynomial import SPEED_NODES, chebyshev, interpolati
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.path_derivatives import TipPieces, contiguous
 
-# The greatest relative error of squares of speeds that are not polynomials.
+# The greatest relative error of interpolated squares of speeds.
 SPEED_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
 class SquareOfSpeed:
-    """The square of a speed that is interpolated on some `pieces` (n,).
+    """The square of a speed that is to be interpolated on the chosen `pieces` (n,).
 
-    That of a motion with these control points (n, d + 1, axes), or with `turning` the square of the rate
-    [deg] at which a direction of any length turns. Weights are those of the tip.
+    It is the speed of a motion with these control points (n, d + 1, axes), or with `turning` the rate [deg]
+    at which a direction of any length turns. The weights are those of the tip.
     """
 
     control_points: Floats
@@ -41,11 +41,12 @@ class SquareOfSpeed:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """The required accuracy of interpolants: accelerations within 1e-9 of their limits.
+    """The required accuracy of interpolants: errors of accelerations below 1e-9 of their limits.
 
-    Per joint: `acceleration`, the lesser limit of both directions, `least_velocity`, `greatest_velocity`.
-    Per piece: `feed` [mm/s], control points `linear` (n, d + 1, k) of the tool in X, Y, Z, and whether it
-    `moves` there. The speeds that feed and velocities allow are estimated; limits hold at every lower speed.
+    For each joint: `acceleration`, the smaller limit of both directions, `least_velocity` and
+    `greatest_velocity`. For each piece: `feed` [mm/s], control points `linear` (n, d + 1, k) of the tool in
+    X, Y, Z, and whether the tool `moves` in them. The speeds that feed and velocities allow are estimated;
+    the accuracy holds at every lower speed.
     """
 
     acceleration: Floats
@@ -59,7 +60,7 @@ class Accuracy:
 
     @property
     def speed_nodes(self) -> Floats:
-        """The places at which squares of speeds are interpolated."""
+        """The places in [0, 1] at which squares of speeds are interpolated."""
         return chebyshev(SPEED_NODES)
 
     @property
@@ -69,7 +70,7 @@ class Accuracy:
 
     @property
     def speed_interpolation(self) -> Floats:
-        """The matrix from values at the nodes to values at the places between."""
+        """The matrix that turns values at `speed_nodes` into values at `speed_between`."""
         return np.ascontiguousarray(interpolation(SPEED_NODES, self.speed_between))
 
 
@@ -77,10 +78,11 @@ class Accuracy:
 class Interpolants:
     """Interpolants on m parts, in order of the path.
 
-    `piece` (m,) and `part` (m, 2) say of which piece which fractions; `width` (m,) is their length in u.
-    `slope` (m, n + 1, joints) are the Bernstein coefficients of q' [mm or deg per unit of u], degree n;
-    `slope_error` and `curvature_error` (m, joints) are ε₁ and ε₂. They are infinite on parts that could not
-    be made small enough, because K is singular there or 2^-30 of a piece is still too wide.
+    `piece` (m,) and `part` (m, 2) are the piece of each part and its first and last fraction of it; `width`
+    (m,) is the part's length in u. `slope` (m, n + 1, joints) are the Bernstein coefficients of q' [mm or deg
+    per unit of u], degree n; `slope_error` and `curvature_error` (m, joints) are ε₁ and ε₂. They are infinite
+    on parts that could not be made small enough, because K is singular there or 2^-30 of a piece is still too
+    wide.
     """
 
     piece: Integers
@@ -102,7 +104,7 @@ def joint_interpolants(
     nodes: int = 9,
     weights: ArrayLike | None = None,
 ) -> Interpolants:
-    """Interpolants of degree `nodes` with ε₂ within `tolerance`, (joints,), one for all, or an Accuracy."""
+    """Interpolants of degree `nodes` with ε₂ within `tolerance`: (joints,), one number, or an Accuracy."""
     tips = TipPieces.of(control_points, width, weights)
     if not isinstance(tolerance, Accuracy):
         tolerance = contiguous(np.broadcast_to(tolerance, len(kinematics.joint_names)))

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
 
 MAX_AXES = 9
-# The greatest quotient of the velocities of two axes.
+# The greatest ratio of the velocities of two axes.
 MOST_TIMES = 1e8
 PERIODS = 1e-6, 10.0
-# The least period as a share of the longest time to full velocity, which counts as at most this time [s].
+# The least period as a share of the longest time in which an axis reaches full velocity, which counts as at
+# most `LONG` [s].
 LEAST_PERIOD_SHARE, LONG = 1e-7, 1e2
 CHORD_TOLERANCES = 1e-7, 1e6
-# Chord tolerance e and period T limit the acceleration on arcs to 8 e/T²: the least share of an axis's limit.
+# Chord tolerance e and period T limit the acceleration on arcs to 8 e/T², which must be at least this share
+# of an axis's limit.
 LEAST_CHORD_SHARE = 1e-9
 
 
@@ -37,14 +39,15 @@ class Machine:
     """A machine tool.
 
     `period` is the servo period [s], `chord_tolerance` the allowed distance [mm] between the path and the
-    straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28
-    and G30 go to (and where programs begin if their words always are the tool's tip; empty: 0), `offsets` the
+    straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28 and
+    G30 go to (and where programs begin if their words always mean the tool's tip; empty: 0), `offsets` the
     work offsets by name (`"G54"`) [mm]; both have one number for each of `program_letters`. `kinematics` is
-    the type that turns the tool tip into joint positions, `parameters` its keys in the machine file,
-    `controller` what drives the machine today (or its name; None: not known). Periods
-    T are from 1e-6 to 10 s and 1e-7 of the longest time to a full velocity, or of 100 s, or more, chord
-    tolerances e from 1e-7 to 1e6 mm; the acceleration 8 e/T² to which they limit arcs is at least 1e-9 of the
-    greatest of an axis, and no axis is more than 1e8 times as fast as another one.
+    the type that computes joint positions from the tool tip, `parameters` its keys in the machine file,
+    `controller` the controller that drives the machine today (or its name; None: not known). Periods T must
+    be from 1e-6 to 10 s, and at least 1e-7 of the longest time in which an axis reaches full velocity (at
+    most 100 s counts). Chord tolerances e must be from 1e-7 to 1e6 mm; they limit the acceleration on arcs to
+    8 e/T², which must be at least 1e-9 of the greatest acceleration of an axis. No axis may be more than 1e8
+    times as fast as another one.
 
     Raises MachineError for other values.
     """
@@ -115,23 +118,23 @@ class Machine:
 
     @property
     def is_plain(self) -> bool:
-        """Every program axis is the joint of its own letter, in the same unit."""
+        """Whether every program axis is the joint of its own letter, in the same unit."""
         return self.kinematics == "cartesian" and not self.parameters
 
     @property
     def words_are_joints(self) -> bool:
-        """Axis words are joint positions as they stand, unless G43.4 or the like says otherwise."""
+        """Whether axis words are joint positions, unless G43.4 or the like changes this."""
         return self.is_plain or not self.inverse.always
 
     @property
     def program_letters(self) -> tuple[str, ...]:
-        """The letters of a program's axis words: the tip's where words always mean that, else the joints'."""
+        """The letters of a program's axis words: the tip's if words always mean the tip, else the joints'."""
         return self.axis_names if self.words_are_joints else self.inverse.tip_names
 
     @cached_property
     def inverse(self) -> Kinematics:
         """The kinematics q = K(P) with this machine's dimensions; raises MachineError if they do not fit."""
-        # Most machines are plain, and need none.
+        # Imported here, because most machines are plain and need no kinematics.
         from feedplan.machine import kinematics
 
         return kinematics.create(self.kinematics, self.axes, self.parameters, self.name)
@@ -159,16 +162,16 @@ class Machine:
 
     @classmethod
     def of(cls, given: Machine | str | os.PathLike[str]) -> Machine:
-        """A machine as it is, or what `load` makes of a name or file."""
+        """The machine itself, or the machine that `load` finds for a name or file."""
         return given if isinstance(given, Machine) else cls.load(given)
 
     @classmethod
     def from_toml(cls, text: str, name: str, joints_only: bool = False) -> Machine:
         """The machine that the text of the machine file `name` describes.
 
-        `joints_only` leaves out its kinematics, and what depends on it: setpoints need the limits of joints
-        alone, and are checked where a kinematics that a user registered is not known.
-        Raises MachineError naming the file, the key and the remedy.
+        `joints_only` ignores its kinematics, and everything that depends on it: for checking setpoints the
+        limits of the joints suffice, also where a kinematics registered by a user is not known. Raises
+        MachineError naming the file, the key and the remedy.
         """
         require_text(name, "the name of the machine file")
         require(isinstance(text, str), f"the text of machine file {name}", text, "a text")
@@ -183,7 +186,7 @@ class Machine:
             raise MachineError(f"machine file {name} is not valid TOML ({error}): correct it there") from None
 
     def to_toml(self) -> str:
-        """The text of a machine file that gives the same machine."""
+        """The text of a machine file for this machine."""
         head: dict[str, Any] = {"name": self.name, "period": self.period}
         head["chord_tolerance"] = self.chord_tolerance
         if self.home:
@@ -200,7 +203,7 @@ class Machine:
         return "\n".join(lines) + "\n"
 
     def with_period(self, period: float) -> Machine:
-        """The same machine with another servo period [s]."""
+        """This machine with another servo period [s]."""
         return replace(self, period=period)
 
 
@@ -217,7 +220,7 @@ def bundled_machines() -> tuple[str, ...]:
 
 
 def bundled_text(name: str) -> str:
-    """The machine file of a bundled machine; raises MachineError where there is none of that name."""
+    """The machine file of a bundled machine; raises MachineError for an unknown name."""
     if name not in bundled_machines():
         known = ", ".join(bundled_machines())
         raise MachineError(
@@ -227,7 +230,7 @@ def bundled_text(name: str) -> str:
 
 
 def template() -> str:
-    """The text of a machine file with comments, from which users begin."""
+    """The text of a commented machine file, as a start for users."""
     return resources.files(__package__).joinpath("template.toml").read_text("utf-8")
 
 
@@ -272,7 +275,7 @@ def _check_keys(table: dict[str, Any], known: set[str], place: str) -> None:
 
 
 def _axes(given: Any) -> tuple[Axis, ...]:
-    """Axes of different names; raises MachineError that names the first which cannot be used."""
+    """Axes with different names; raises MachineError that names the first one that cannot be used."""
     remedy = f"a list of 1 to {MAX_AXES} axes"
     if isinstance(given, Axis):
         raise MachineError(f"axes is the axis {given.name} alone: give {remedy}")
@@ -290,7 +293,7 @@ def _axes(given: Any) -> tuple[Axis, ...]:
 
 
 def _pairs(offsets: Any) -> tuple[tuple[str, Any], ...]:
-    """Names and places, given as such or as a mapping; raises MachineError for anything else."""
+    """Names with positions, from a list of pairs or a mapping; raises MachineError for anything else."""
     remedy = "names with places, such as G54 with [0.0, 0.0, 0.0]"
     pairs = one_by_one(offsets.items() if isinstance(offsets, Mapping) else offsets, "offsets", remedy)
     good = all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs)

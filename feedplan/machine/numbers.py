@@ -1,8 +1,8 @@
-"""The functions of a kinematics' formula, which also uses + − × ÷, whole powers and abs.
+"""The functions for the formula of a kinematics, besides + − × ÷, whole powers and abs.
 
-Arrays and floats go to numpy; any other number type brings methods of the same names, as the numbers do that
-record a formula (`feedplan.machine.expression`). `atan2` in degrees is `degrees(atan2(y, x))`: the factor
-180/π is enclosed, not rounded, where intervals are evaluated.
+Arrays and floats use NumPy; any other number type must have methods of the same names, as the numbers have
+that record a formula (`feedplan.machine.expression`). `atan2` in degrees is `degrees(atan2(y, x))`: the
+factor 180/π is enclosed, not rounded, where intervals are evaluated.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-# An array, a float, a recording number or a type of the user's own with the same methods.
+# An array, a float, a recording number, or a user's type with the same methods.
 Number: TypeAlias = Any
 
 
@@ -21,12 +21,12 @@ def sqrt(x: Number) -> Number:
 
 
 def square(x: Number) -> Number:
-    """x², which intervals enclose tighter than a product of two unrelated factors."""
+    """x²; for intervals its bounds are tighter than those of the product x·x."""
     return x.square() if hasattr(x, "square") else np.square(x)
 
 
 def sin_cos(x: Number) -> tuple[Number, Number]:
-    """Sine and cosine of an angle in radians; together they cost as much as one."""
+    """Sine and cosine of an angle in radians; for recording numbers both cost as much as one."""
     if hasattr(x, "sin_cos"):
         sine, cosine = x.sin_cos()
         return sine, cosine
@@ -44,7 +44,7 @@ def cos(x: Number) -> Number:
 
 
 def atan2(y: Number, x: Number) -> Number:
-    """The angle of the vector (x, y) in radians, as numpy's arctan2."""
+    """The angle of the vector (x, y) in radians, as NumPy's arctan2."""
     for number in (y, x):
         if hasattr(number, "atan2"):
             return number.atan2(y, x)

@@ -1,4 +1,4 @@
-"""The `[kinematics]` table of a machine file, read key by key; every error names machine, key and remedy."""
+"""Reads the `[kinematics]` table of a machine file key by key; every error names machine, key and remedy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Vector = tuple[float, float, float]
 
 
 class Parameters:
-    """Keys of a kinematics and their values; `finish` refuses keys that were never read."""
+    """The keys of a kinematics and their values; `finish` refuses keys that were never read."""
 
     def __init__(self, values: Mapping[str, Any], machine: str) -> None:
         self.machine = machine
@@ -21,7 +21,7 @@ class Parameters:
         self._asked: list[str] = []
 
     def number(self, key: str, default: float | None = None, unit: str = "mm") -> float:
-        """A finite number; required where there is no default."""
+        """A finite number; it is required if there is no default."""
         value = self._take(key, default)
         self.require(_finite(value), key, value, f"a finite number [{unit}]")
         return float(value)
@@ -53,11 +53,11 @@ class Parameters:
         return dict(value)
 
     def require(self, condition: bool, key: str, value: object, remedy: str) -> None:
-        """Refuses a value in one sentence."""
+        """Raises MachineError, in one sentence, unless the condition holds."""
         require(condition, f"machine {self.machine}: kinematics {key}", value, remedy)
 
     def finish(self) -> None:
-        """Refuses keys that were never read."""
+        """Raises MachineError if there are keys that were never read."""
         unknown = sorted(set(self._values) - set(self._asked))
         known = ", ".join(sorted(self._asked)) or "no keys but type"
         self.require(not unknown, "keys", unknown, f"only {known}")

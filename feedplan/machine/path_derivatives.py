@@ -1,8 +1,8 @@
-"""Joint motion along polynomial pieces of a tip path: positions and exact derivatives at points.
+"""Joint motion along pieces of a tip path: positions, and exact derivatives at given places.
 
-A piece is given by Bézier points (n, d + 1, axes) of the tip, in the order of `Kinematics.tip_names`, over
-u in [0, width]; with weights (n, d + 1) it is rational. The recorded formula of the kinematics is evaluated
-natively on Taylor series in u.
+A piece is given by Bézier points (n, d + 1, axes) of the tip, in the order of `Kinematics.tip_names`, with
+the parameter u in [0, width]; with weights (n, d + 1) it is rational. The recorded formula of the kinematics
+is evaluated natively on Taylor series in u.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from feedplan.machine.kinematics import Kinematics
 
 @dataclass(frozen=True)
 class TipPieces:
-    """Pieces of a tip path as the native module takes them."""
+    """Pieces of a tip path in the form that the native module takes."""
 
     control_points: Floats
     width: Floats
@@ -28,7 +28,7 @@ class TipPieces:
 
     @classmethod
     def of(cls, control_points: ArrayLike, width: ArrayLike, weights: ArrayLike | None) -> TipPieces:
-        """From arrays of any kind."""
+        """Makes pieces from arrays of any kind."""
         return cls(contiguous(control_points), contiguous(width), contiguous(weights))
 
 
@@ -49,7 +49,7 @@ def derivatives(
 ) -> Floats:
     """q, q', …, q^(order) (order + 1, n, joints) at u = fraction · width of each piece.
 
-    Exact but for rounding; not finite where K is singular. For many points of a piece repeat the piece.
+    Exact up to rounding; not finite where K is singular. For several places of a piece, repeat the piece.
     """
     pieces = TipPieces.of(control_points, width, weights)
     found = joint_derivatives(kinematics.recorded, pieces, contiguous(fraction), order)
@@ -61,5 +61,5 @@ def contiguous(values: None) -> None: ...
 @overload
 def contiguous(values: ArrayLike) -> Floats: ...
 def contiguous(values: ArrayLike | None) -> Floats | None:
-    """A C-contiguous array of floats, as the native module takes them."""
+    """A C-contiguous array of floats, as the native module needs it."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)

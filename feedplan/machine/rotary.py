@@ -1,13 +1,14 @@
-"""Machines with rotary axes on the table, on the head or on both: from the tip and its angles to the joints.
+"""Machines with rotary axes on table, head or both: joint positions from the tip and the angles.
 
     J = T(w) − H(0, 0, −L),   T = T_1 ∘ T_2,  T_i(x) = p_i + R(−θ_i)(x − p_i),   H alike with R(+θ_i)
 
-w is the tip where the part would be with all tables at zero, in the machine's coordinates; J are the linear
-joints: where the tool's gauge point (spindle nose) is with all angles at zero; L the tool's length below it.
-Axis 1 is the one nearest the machine's frame. p_i is a point of the turning axis with all angles at zero: for
-tables in the machine's coordinates, for heads from the gauge point. ISO 841 counts every axis by the tool's
-motion against the part, so a table turns against its own count; the tool's direction in the part is
-R(tables, part first) R(heads) ẑ. A `sense` of −1 counts an axis the other way.
+w is the tip in the part's coordinates, which are the machine's coordinates with all tables at zero. J are the
+linear joints, which give the position of the tool's gauge point (spindle nose) with all angles at zero. L is
+the tool's length below the gauge point. Axis 1 is the one nearest the machine's frame. p_i is a point of the
+rotary axis with all angles at zero: for tables in the machine's coordinates, for heads relative to the gauge
+point. ISO 841 counts every axis by the tool's motion relative to the part, so a table turns opposite to its
+angle; the tool's direction in the part is R(tables, part first) R(heads) ẑ. A `sense` of −1 reverses the sign
+of an axis's angle.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ LINEAR = ("X", "Y", "Z")
 
 @dataclass(frozen=True)
 class RotaryAxis:
-    """A turning axis: A, B or C about X, Y or Z through `pivot` [mm]; `sense` −1 counts against ISO 841."""
+    """A rotary axis: A, B or C about X, Y or Z through `pivot` [mm]; `sense` −1 is opposite to ISO 841."""
 
     name: str
     pivot: Vector = (0.0, 0.0, 0.0)
@@ -37,7 +38,8 @@ class RotaryAxis:
 class RotaryChain(Kinematics):
     """X, Y, Z and rotary axes `tables` and `heads`, each from the machine's frame outwards.
 
-    The rotary words are the joints' own angles (G43.4). `tool_length` [mm] from the gauge point to the tip.
+    The rotary words are the angles of the joints (G43.4). `tool_length` [mm] is the distance from the gauge
+    point to the tip.
     """
 
     joint_names: tuple[str, ...]
@@ -52,11 +54,11 @@ class RotaryChain(Kinematics):
         return self.joint_names
 
     def with_tool(self, length: float) -> RotaryChain:
-        """The same machine with another tool length [mm]."""
+        """This machine with another tool length [mm]."""
         return replace(self, tool_length=float(length))
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
-        """Linear joints of the gauge point [mm], then the angles [deg] as they are."""
+        """The linear joints [mm], then the angles [deg] unchanged."""
         waves = self._waves(tip[3:])
         point = tuple(tip[:3])
         for axis in reversed(self.tables):
@@ -75,7 +77,7 @@ class RotaryChain(Kinematics):
         return (*point, *joints[3:])
 
     def _waves(self, angles: Sequence[Number]) -> dict[str, tuple[Number, Number]]:
-        """Sine and cosine of each rotary axis, counted by ISO 841."""
+        """Sine and cosine of each rotary axis's angle, with the sign of ISO 841."""
         senses = {axis.name: axis.sense for axis in (*self.tables, *self.heads)}
         waves = {}
         for name, angle in zip(self.joint_names[3:], angles, strict=True):
@@ -84,7 +86,7 @@ class RotaryChain(Kinematics):
         return waves
 
     def _tool(self, waves: dict[str, tuple[Number, Number]]) -> tuple[Number, ...]:
-        """The tip as seen from the linear joints: H(0, 0, −L)."""
+        """The tip relative to the linear joints: H(0, 0, −L)."""
         point: tuple[Number, ...] = (0.0, 0.0, -self.tool_length)
         for axis in reversed(self.heads):
             sine, cosine = waves[axis.name]
@@ -94,10 +96,10 @@ class RotaryChain(Kinematics):
 
 @dataclass(frozen=True)
 class ToolVector(Kinematics):
-    """A five-axis machine programmed by the tip and the tool's direction I, J, K (G43.5), of any length.
+    """A five-axis machine programmed by the tip and the tool's direction I, J, K of any length (G43.5).
 
     The direction points from the tip to the spindle. `side` ±1 chooses between the two pairs of angles that
-    give it. K is singular where the tool is parallel to the first axis from the part.
+    give it. K is singular where the tool is parallel to the rotary axis nearest to the part.
     """
 
     chain: RotaryChain
@@ -113,11 +115,11 @@ class ToolVector(Kinematics):
 
     @property
     def joint_names(self) -> tuple[str, ...]:  # type: ignore[override]
-        """As the chain's."""
+        """The joint names of the chain."""
         return self.chain.joint_names
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
-        """The chain's joints with the angles that point the tool."""
+        """The joints of the chain, with the angles that give the tool's direction."""
         angles = self.angles(tip[3:])
         return self.chain.joints((*tip[:3], *(angles[name] for name in self.joint_names[3:])))
 
@@ -130,14 +132,14 @@ class ToolVector(Kinematics):
         return (*self.chain.tip(joints)[:3], *direction)
 
     def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
-        """The sine of the angle between the tool and the first axis from the part."""
+        """The sine of the angle between the tool and the rotary axis nearest to the part."""
         i, j, k = tip[3:]
         first = self.from_part[0].name
         across = {"A": hypot(j, k), "B": hypot(i, k), "C": hypot(i, j)}[first]
         return {f"a tool axis parallel to {first}": across / hypot(hypot(i, j), k)}
 
     def angles(self, direction: Sequence[Number]) -> dict[str, Number]:
-        """The two rotary axes [deg] that point the tool along a direction."""
+        """The angles of the two rotary axes [deg] that give the tool a direction."""
         i, j, k = direction
         first, second = self.from_part
         s = self.side
@@ -157,19 +159,19 @@ class ToolVector(Kinematics):
 
     @property
     def from_part(self) -> tuple[RotaryAxis, ...]:
-        """The rotary axes from the part over the frame to the tool."""
+        """The rotary axes in order from the part to the frame and on to the tool."""
         return (*reversed(self.chain.tables), *self.chain.heads)
 
 
 def shortest_turn(start: float, target: float) -> float:
-    """The angle [deg] equal to `target` up to whole turns that is nearest to `start`."""
+    """The angle [deg] nearest to `start` that differs from `target` by whole turns."""
     return target + 360.0 * round((start - target) / 360.0)
 
 
 def build_chain(
     axes: tuple[Axis, ...], parameters: Parameters, tables: tuple[str, ...], heads: tuple[str, ...]
 ) -> RotaryChain:
-    """A chain of named axes with the keys `tool_length`, `pivot_a`, `pivot_b`, `pivot_c` [mm], `reversed`."""
+    """A chain of these axes with the keys `tool_length`, `pivot_a`, `pivot_b`, `pivot_c` [mm], `reversed`."""
     names = (*tables, *heads)
     backwards = parameters.letters("reversed", names)
 
@@ -188,7 +190,7 @@ def build_chain(
 
 
 def require_pointing(first: str, second: str, machine: str) -> None:
-    """Two rotary axes, part side first, that can point the tool anywhere."""
+    """Raises MachineError unless two rotary axes, part side first, can point the tool in every direction."""
     if first == second or second == "C":
         raise MachineError(
             f"machine {machine}: rotary axes {first} (part side) and {second} (tool side) cannot "

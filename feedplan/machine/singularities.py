@@ -1,8 +1,9 @@
-"""Joint positions along a whole tip path: continuous angles, singular places, overrun travel ends.
+"""Joint positions along a whole tip path: continuous angles, singular places, and overrun travel ends.
 
-Pieces are cut until interval arithmetic proves on each part that K is differentiable there and that no angle
-turns by half a turn or more. What cannot be proven down to 2^-30 of a piece is a singular place: K is
-singular within that distance. A travel end is overrun where the joint's proven range lies beyond it.
+Pieces are halved until interval arithmetic proves for each part that K is differentiable there and that no
+angle turns by half a turn or more. Where this cannot be proven down to 2^-30 of a piece, there is a singular
+place: K is singular within that distance. A travel end is overrun where the joint's proven range is beyond
+it.
 """
 
 from __future__ import annotations
@@ -24,14 +25,14 @@ TURN = 360.0
 
 @dataclass(frozen=True)
 class Bounds:
-    """Lower and upper bounds `lo` ≤ `hi` of one shape; rounding is included."""
+    """Lower and upper bounds `lo` ≤ `hi`, arrays of the same shape; rounding is included."""
 
     lo: Floats
     hi: Floats
 
     @property
     def middle(self) -> Floats:
-        """Numbers about half way between the bounds; NaN where unbounded."""
+        """Values near the middle of the bounds; NaN where they are infinite."""
         with np.errstate(invalid="ignore"):
             return np.asarray(0.5 * self.lo + 0.5 * self.hi)
 
@@ -40,8 +41,8 @@ class Bounds:
 class Place:
     """A place that the machine cannot pass, at `fraction` of piece `piece`.
 
-    A singular place has the index of no joint (−1), and `what` completes "the tool is at …". A travel end has
-    the `joint`'s index, its position `value` and the travel's end `limit` [mm, deg].
+    A singular place has `joint` −1, and `what` completes "the tool is at …". An overrun travel end has the
+    `joint`'s index, its position `value` and the end of the travel `limit` [mm, deg].
     """
 
     piece: int
@@ -71,10 +72,11 @@ class Place:
 
 @dataclass(frozen=True)
 class JointPath:
-    """Parts of a path on which the joints are smooth, in order, and the places that they cannot pass.
+    """Parts of a path on which the joints are smooth, in order, and the places that the joints cannot pass.
 
-    Per part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) bounds of the
-    joints' positions [mm, deg], angles on their turn. `places` are in order of the path.
+    For each part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) bounds of the
+    joints' positions [mm, deg], with angles continued over whole turns. `places` are in the order of the
+    path.
     """
 
     kinematics: Kinematics
@@ -91,7 +93,7 @@ class JointPath:
         principal = derivatives(
             self.kinematics, tips.control_points[piece], tips.width[piece], fraction, 0, weights
         )[0]
-        # The end of a part is found as the start of the next: there both are on the same turn.
+        # The end of a part is looked up as the start of the next part: both parts are on the same turn there.
         found = np.searchsorted(self.piece + self.part[:, 0], piece + fraction, side="right") - 1
         turns = np.round((self.range.middle[found] - principal) / TURN)
         return np.asarray(principal + np.nan_to_num(turns) * np.array(self.kinematics.turning) * TURN)
@@ -105,11 +107,11 @@ def joint_path(
     weights: ArrayLike | None = None,
     start: ArrayLike | None = None,
 ) -> JointPath:
-    """The joints along pieces joined end to end, as `feedplan.machine.path_derivatives` takes them.
+    """The joints along connected pieces, given as in `feedplan.machine.path_derivatives`.
 
-    `start` (joints,) [mm, deg] is where the joints are before: angles begin on the nearest turn. Without it
-    they begin on the turn that keeps the whole path within `travel`, (least, greatest) of each joint, if
-    there is one; else as K gives them.
+    `start` (joints,) [mm, deg] are the joint positions before: angles begin on the nearest turn. Without
+    `start` they begin on the turn that keeps the whole path within `travel`, (least, greatest) of each joint,
+    if there is one; else with the values of K.
     """
     tips = TipPieces.of(control_points, width, weights)
     piece, part, lo, hi, singular, overruns = native_joint_path(
@@ -125,7 +127,7 @@ def joint_path(
 
 
 def _singular(kinematics: Kinematics, tips: TipPieces, piece: int, fraction: float) -> Place:
-    """A singular place; its name is that of the measure of `Kinematics.singular` that vanishes there."""
+    """A singular place; it is named after the quantity of `Kinematics.singular` that is least there."""
     weights = None if tips.weights is None else tips.weights[piece]
     curve = CompositeCurve.from_bezier(tips.control_points[piece], weights)
     point = curve.evaluate(0, fraction)[0, 0]

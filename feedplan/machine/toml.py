@@ -1,4 +1,4 @@
-"""TOML text to tables and back, for machine files: text of bounded size, values as a machine has them."""
+"""Converts TOML text to tables and back, for machine files; the size of the text is limited."""
 
 from __future__ import annotations
 
@@ -16,34 +16,35 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-# The greatest machine file. Reading takes as long as the square of the number of keys within keys.
+# The greatest size of a machine file, and the greatest depth of keys within keys: reading time grows with the
+# square of this depth.
 MAX_LETTERS = 1 << 17
 MAX_LEVELS = 20
 _NOT_OF_KEYS = re.compile(r"[^\w\-\"'. \t]+")
 
 
 def table_of(text: str) -> dict[str, Any]:
-    """The table that a TOML text writes.
+    """The table in a TOML text.
 
-    Raises MachineError for a text that is too long or too deep; ValueError and RecursionError of the package
-    for one that is not valid, such as integers of thousands of digits.
+    Raises MachineError for a text that is too long or too deep; ValueError and RecursionError, from the TOML
+    package, for a text that is not valid, such as integers of thousands of digits.
     """
     if len(text) > MAX_LETTERS:
         raise MachineError(f"it has more than {MAX_LETTERS} letters: give fewer")
     for part in _NOT_OF_KEYS.split(text):
         if sum(bool(key.strip()) for key in part.split(".")) > MAX_LEVELS:
             raise MachineError(f"{shown(part)} has more than {MAX_LEVELS} levels: give fewer")
-    # Editors of Windows put a byte order mark before a text in UTF-8.
+    # Windows editors put a byte order mark before a text in UTF-8.
     return tomllib.loads(text.removeprefix("\ufeff"))
 
 
 def table_lines(head: str, rows: Mapping[str, Any]) -> list[str]:
-    """A table as lines of TOML, its head first, such as `[offsets]`."""
+    """A table as lines of TOML; the first line is its head, such as `[offsets]`."""
     return [head, *(f"{_key(key)} = {toml_value(value)}" for key, value in rows.items())]
 
 
 def toml_value(value: Any) -> str:
-    """A value in TOML; JSON has the same texts, but for one control character."""
+    """A value in TOML; JSON writes texts in the same way, except for one control character."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):

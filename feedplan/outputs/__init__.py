@@ -3,12 +3,12 @@
 A format is a module here whose name does not begin with an underscore and is in `FormatName`. It has
 
 - `FILE`, the name of its file;
-- `ROWS`, the kind of its rows: `SETPOINTS`, one a servo period, or `KNOTS`, equal steps between stops;
-- `writer(file, header, count)`, a context that writes `count` rows: it gives a function that takes chunks
-  in the order of time, and completes the file at its end;
+- `ROWS`, the kind of its rows: `SETPOINTS`, one for each servo period, or `KNOTS`, equal steps between stops;
+- `writer(file, header, count)`, a context that writes `count` rows: it gives a function that takes chunks in
+  the order of time, and completes the file at its end;
 - `load(file)`, which reads the rows back as one chunk, a SetpointFile.
 
-Each file holds version, axes, units, period (or longest step) and the events of the program
+Each file contains version, axes, units, period (or longest step) and the events of the program
 (`feedplan.events`).
 """
 
@@ -28,7 +28,7 @@ from feedplan.events import TimedEvents
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
-# The columns that have one value for each axis, and what their unit adds to the unit of the axis.
+# The columns that have one value for each axis, and the text that their unit adds to the unit of the axis.
 QUANTITIES = {"position": "", "velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
 
 FormatName = Literal["csv", "halstreamer", "json", "npz", "npz-compressed", "parquet", "pvt"]
@@ -44,7 +44,7 @@ FORMAT = 1
 @dataclass(frozen=True)
 class Header:
     """The header of a file: names of the `axes`, their `units` (mm, deg, …), the servo `period` [s] or the
-    longest step of knots, and the `events` by the clock of the rows."""
+    longest step of knots, and the `events` on the clock of the rows."""
 
     axes: tuple[str, ...]
     units: tuple[str, ...]
@@ -120,8 +120,8 @@ _PLACE = "a file of setpoints or the folder of a plan"
 def load_setpoints(place: str | os.PathLike[str], progress: Listener | None = None) -> SetpointFile:
     """The setpoints in a file, or in the folder of a plan, as one chunk.
 
-    The arrays of an npz file stay on disk and are read where they are used. `progress` is told how far the
-    reading of a text file is. Raises InputError with the file and the remedy.
+    The arrays of an npz file stay on disk and are read when they are used. `progress` is called with the
+    finished share of reading a text file. Raises InputError with the file and the remedy.
     """
     callback(progress, "the part done")
     file = file_path(place, "the place", _PLACE)

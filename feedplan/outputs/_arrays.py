@@ -1,4 +1,4 @@
-"""Checks the arrays of a file by shape and type, and makes a chunk of setpoints of them."""
+"""Checks the shapes and types of the arrays of a file, and makes a chunk of setpoints from them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLUMNS = ("t", *QUANTITIES, "line")
 def chunk_of(
     arrays: Mapping[str, Any], file: FilePath, columns: Sequence[str] = COLUMNS, rows: str = SETPOINTS
 ) -> SetpointFile:
-    """The chunk in these named arrays. Raises InputError with the file and what is wrong in it.
+    """The chunk in these named arrays. Raises InputError with the file and the mistake in it.
 
     `columns` are the columns of the format. `format`, `units`, `period` and `events` may be missing, as in
     files of other programs.
@@ -67,6 +67,6 @@ def chunk_of(
 
 
 def _single(value: Any) -> Any:
-    """A number that a file may hold as an array of one element."""
+    """The number in an array of one element, in which form a file may have it; other values unchanged."""
     array = np.asarray(value)
     return array.item() if array.size == 1 else value

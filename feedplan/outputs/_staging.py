@@ -1,4 +1,4 @@
-"""Writes a folder that appears whole or not at all: files go to a temporary folder, which is then renamed."""
+"""Writes a folder completely or not at all: files go to a temporary folder, which is then renamed."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def require_folder(folder: FilePath) -> None:
 def staged(folder: FilePath, last: str) -> Iterator[FilePath]:
     """A temporary folder to write into; its files move to `folder` when the block ends without an error.
 
-    A new `folder` appears by one rename. In a folder that exists each file replaces the one of the same name.
-    The old file `last` goes before the others, the new one comes after them: while it is there, all files are
-    of one plan. Other files stay. After an error no temporary file is left. Raises InputError if the file
-    system refuses.
+    If `folder` does not exist, it appears by one rename. Otherwise each file replaces the one of the same
+    name: the old file `last` is removed before the others are replaced, and the new one is moved after them,
+    so while it exists, all files belong to one plan. Other files stay. After an error no temporary file is
+    left. Raises InputError if the files cannot be written.
     """
     require_folder(folder)
-    # In the folder or in its nearest parent that exists, so that both are on the same file system.
+    # It is made in `folder` or its nearest existing parent, so that both are on the same file system.
     home = folder
     while not home.exists():
         home = home.parent
@@ -60,7 +60,7 @@ def _move(stage: FilePath, folder: FilePath, last: str) -> None:
     if others:
         (folder / last).unlink(missing_ok=True)
     for name in others:
-        # Where one file replaces another, some file systems wait until the new one is on the disk.
+        # If one file replaces another, some file systems wait until the new one is on the disk.
         (folder / name).unlink(missing_ok=True)
         (stage / name).rename(folder / name)
     (stage / last).replace(folder / last)

@@ -1,4 +1,4 @@
-"""Rows of numbers as text; header and events are comments between the rows.
+"""Writes and reads rows of numbers as text; header and events are comments between the rows.
 
 A comment is `# name {JSON}`; `#+` continues it on the next line if it is too long for other readers. An event
 is before the first row at or after its time.
@@ -28,7 +28,7 @@ from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 HEADER, EVENT, _MORE = "feedplan", "event", "#+"
-# Most bytes of a line; LinuxCNC's halstreamer reads lines of 4000 bytes.
+# The greatest number of bytes of a line; LinuxCNC's halstreamer reads lines of up to 4000 bytes.
 _LONGEST = 1000
 _BYTES_AT_ONCE = 1_000_000
 _AXIS = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
@@ -53,7 +53,8 @@ def row_writer(
     separator: bytes = b",",
     extra: dict[str, Any] | None = None,
 ) -> Iterator[Add]:
-    """Writes a row for every setpoint: what `values_of` makes of a chunk (n, k), then the source line.
+    """Writes a row for every setpoint: the values (n, k) that `values_of` computes from a chunk, then the
+    source line.
 
     Events are between the rows; `extra` is added to the header.
     """
@@ -79,13 +80,13 @@ def row_writer(
             done = due
 
         yield add
-        # By rounding, events may be after the last row.
+        # Because of rounding, events may be after the last row.
         stream.writelines(_comment(EVENT, to_json(event)) for event in events)
 
 
 @dataclass(frozen=True)
 class Head:
-    """The begin of a file of rows: `header` as written, empty if missing; the line with the `names` of the
+    """The head of a file of rows: `header` as written, empty if missing; the line with the `names` of the
     columns, empty if the format has none."""
 
     file: FilePath
@@ -116,9 +117,10 @@ def read_head(file: FilePath, has_names: bool) -> Head:
 def read_columns(
     file: FilePath, column_names: Callable[[Sequence[str], Sequence[str]], str], progress: Listener | None
 ) -> tuple[Head, Floats, dict[str, Any]]:
-    """The head and the table of a file with names of columns, and its axes, their units and its events.
+    """The head and the table (n, columns) of a file with column names, and a dict of its axes, their units
+    and its events.
 
-    `column_names` makes the expected line of names of axes and units.
+    `column_names` makes the expected line of names from axes and units.
     """
     head = read_head(file, has_names=True)
     found = _AXIS.findall(head.names)
@@ -134,7 +136,7 @@ def read_rows(
 ) -> tuple[Floats, TimedEvents]:
     """The rows of `width` numbers after the head (n, width), and the events between them.
 
-    Raises InputError with file, line and what is wrong.
+    Raises InputError with file, line and the mistake.
     """
     file, waits_for_names = head.file, bool(head.names)
     size = max(file.stat().st_size, 1)

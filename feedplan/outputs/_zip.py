@@ -1,9 +1,9 @@
 """A zip archive of .npy members that are all filled in one pass over the rows.
 
-The standard library writes one member after the other: that would need one pass over all setpoints for each
-member, or all setpoints in memory. Here the sizes are known beforehand and nothing is compressed, so the
+The standard library writes one member after the other, which would need one pass over all setpoints for each
+member, or all setpoints in memory. Here the sizes are known in advance and nothing is compressed, so the
 offset of every member is known at the start; only the checksums are written at the end. Heads and directory
-are those of `zipfile`.
+are made by `zipfile`.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-_HEAD_ROOM = 1024  # more bytes than a .npy head has
+_HEAD_ROOM = 1024  # upper bound of the size of a .npy head [bytes]
 _ALIGNMENT = 64
-_READABLE = 0o600 << 16  # the permission of a file
+_READABLE = 0o600 << 16  # file permission: owner may read and write
 
 
 @dataclass
 class _Member:
-    """A member of the archive; its `data` begins at that byte, and so many bytes of it are `written`."""
+    """A member of the archive; `data` is the offset of its data in the archive, `written` the number of bytes
+    of it that are written."""
 
     entry: zipfile.ZipInfo
     is_large: bool
@@ -35,7 +36,7 @@ class _Member:
 
     @property
     def head(self) -> bytes:
-        """What is before the data in the archive."""
+        """The zip head of the member, which is before its data."""
         return self.entry.FileHeader(zip64=self.is_large)
 
 
@@ -48,7 +49,7 @@ class NpyArchive:
         self._end = 0
         for name, (shape, dtype) in arrays.items():
             body = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
-            # An entry without a date is of 1 January 1980, so that equal setpoints make equal files.
+            # An entry without a date has 1 January 1980, so that equal setpoints make equal files.
             entry = zipfile.ZipInfo(f"{name}.npy")
             entry.header_offset, entry.external_attr = self._end, _READABLE
             entry.CRC = entry.file_size = entry.compress_size = 0

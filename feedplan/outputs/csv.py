@@ -1,4 +1,4 @@
-"""Setpoints as text: a line of names with units, then a line for every setpoint.
+"""Setpoints as text: a line of column names with units, then a line for every setpoint.
 
 A comment `# feedplan {…}` before the names has version and period; a comment `# event {…}` is before the
 first setpoint at or after an event of the program. `pandas.read_csv(file, comment="#")` skips both. Every

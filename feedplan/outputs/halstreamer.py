@@ -25,7 +25,7 @@ from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.halstream"
 ROWS = SETPOINTS
-# A time may differ from a whole number of periods by this much, which is rounding [periods].
+# Times may differ from a whole number of periods by this much because of rounding [periods].
 _ROUNDING = 1e-6
 
 

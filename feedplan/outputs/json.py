@@ -32,8 +32,8 @@ _ROWS_AT_ONCE = 10_000
 
 @contextmanager
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
-    """Writes one object; each array is a file of its own until all are joined, so that memory does not
-    grow."""
+    """Writes one object. Each array is written to its own temporary file until all are joined, so that memory
+    does not grow."""
     names = ("t", *QUANTITIES, "line")
     with ExitStack() as stack:
         parts: dict[str, IO[str]] = {

@@ -1,5 +1,5 @@
-"""Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`, and single
-numbers `format` and `period` [s]; `units` are those of the axes, as mm or deg.
+"""Setpoints as NumPy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`, and single
+numbers `format` and `period` [s]; `units` are the units of the axes, such as mm or deg.
 
 `events` are records of `time` [s], `line`, `kind`, `channel`, `value`, `stops` and `text`, the index of
 the text in `bytes(event_texts).decode().split("\n")`.
@@ -30,8 +30,8 @@ from feedplan.setpoints import SetpointChunk
 FILE = "setpoints.npz"
 ROWS = SETPOINTS
 
-# A file whose arrays take more than 100 times its own bytes, and more than 2^28 bytes, was made to fill the
-# memory: compressed setpoints have a third of their size.
+# A file is refused if its arrays have more than 100 times its own bytes, and more than 2^28 bytes: it would
+# fill the memory, while compressed setpoints have about a third of their size.
 _DENSEST, _SMALL = 100, 1 << 28
 
 

@@ -1,4 +1,4 @@
-"""Setpoints as compressed npz: smaller and slower to write than npz; reading takes all of it into memory."""
+"""Setpoints as compressed npz: smaller and slower to write than npz; reading loads the whole file."""
 
 from __future__ import annotations
 

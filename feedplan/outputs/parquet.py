@@ -26,7 +26,7 @@ from feedplan.setpoints import SetpointChunk
 FILE = "setpoints.parquet"
 ROWS = SETPOINTS
 _KEY = b"feedplan"
-# Rows of one row group.
+# Number of rows of one row group.
 _GROUP = 100_000
 
 

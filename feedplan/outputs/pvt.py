@@ -1,14 +1,15 @@
-"""A table of position, velocity and time, for drives that interpolate between its knots.
+"""Knots as a table of position, velocity and time, for drives that interpolate between knots.
 
-A line has the time of a knot by the plan's own clock, the time since the knot before, position and
-velocity of each axis, and the source line: `time [s],step [s],position X [mm],velocity X [mm/s],…,line`.
-Between two stops all steps are equal, at most as long as the step that was asked for; knots at stops have
-the plan's own times and velocity 0, and a pause is one step. Header and events are comments, as in csv. Every
-number is the shortest text that reads back unchanged.
+A line has the time of a knot on the plan's own clock, the time since the knot before, position and velocity
+of each axis, and the source line: `time [s],step [s],position X [mm],velocity X [mm/s],…,line`. Between two
+stops all steps are equal, at most as long as the requested step; knots at stops have the plan's own times and
+velocity 0, and a pause is one step. Header and events are comments, as in csv. Every number is the shortest
+text that reads back unchanged.
 
 A drive moves from knot to knot on cubic polynomials, which have the plan's positions and velocities at the
-knots. If the plan's acceleration jumps between two knots, the cubic's overshoots, whatever the step: plans
-with limited jerk suit such drives, and `feedplan check` measures the greatest acceleration of the cubics.
+knots. If the plan's acceleration jumps between two knots, the cubic's acceleration overshoots for every step:
+plans with limited jerk are suitable for such drives, and `feedplan check` measures the greatest acceleration
+of the cubics.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What the text of a program says about feeds, line by line.
+"""Finds in the text of a program, line by line, all words that concern feeds.
 
-These are its F words, the modes that say how F is read, and the lines that do not run once and in order.
+These are F words, the modes that decide the meaning of F, and the lines that do not run once and in order.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _COMPUTED = (
     + _BRACKETS
     + rb")?)"
 )
-# Comments, texts for the operator and names of parameters have no words in them.
+# Comments, texts for the operator and names of parameters contain no words.
 _NO_WORDS = rb"\([^()\r\n]*\)?|;[^\r\n]*|[Mm][ \t]*0*11[78](?![\d.])[^\r\n]*|\#?<[^>\r\n]*>"
 _LINE = rb"(?<![^\r\n])[ \t]*(?:[Nn][ \t]*\d+[ \t]*)?"
 _CODES = rb"93|94|95|20|21|90\.1|91\.1|90|91|40|41\.1|42\.1|41|42|15|16|7|8|33\.1|33|76|74|84|43\.5|49|68|69"
@@ -60,7 +60,7 @@ _CLOSES = (b"ENDSUB", b"ENDWHILE", b"ENDREPEAT", b"ENDIF")
 
 
 class Exclusion(IntEnum):
-    """Why the F of a line cannot be changed."""
+    """The reason why the F of a line cannot be changed."""
 
     NO = 0
     FLOW = 1  # in a subroutine, loop or branch, a call of one, or after the end of the program
@@ -81,15 +81,15 @@ REASONS = {
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """The lines of a text, of which there are n.
+    """The n lines of a text.
 
-    - `start` (n + 1,): where each line begins; `exclusion` (n,): an `Exclusion`;
-    - `feed_at` (n, 2): where the number of its F begins and ends, −1 without one; `feed` (n,): that number,
-      NaN without one and where it is computed;
+    - `start` (n + 1,): offsets of the lines in the text; `exclusion` (n,): an `Exclusion`;
+    - `feed_at` (n, 2): where the number of its F begins and ends, −1 without F; `feed` (n,): that number, NaN
+      without F or if it is computed;
     - `modes` (n, 2): where the number of a code G93 to G95 begins and ends, −1 without one;
-    - `voids` (n,): a change of units or of the feed mode gives the F in force another meaning;
+    - `voids` (n,): a change of units or of the feed mode on the line changes the meaning of the F in force;
     - in force on the line (n,): `inverse` (G93), `per_minute` (G94), `absolute`, `absolute_centres`,
-      `inches`, and `plain`: words of axes are positions of the tool, without compensation, polar words and
+      `inches`, and `plain`: axis words are positions of the tool, without compensation, polar words and
       diameters.
 
     `calls_set_feed`: after a line of FLOW or MODES the feed in force is not known.
@@ -114,12 +114,12 @@ class Blocks:
         return len(self.start) - 1
 
     def line(self, index: int) -> bytes:
-        """A line by its index from 0, with its end."""
+        """The line with an index from 0, including its line end."""
         return self.content[self.start[index] : self.start[index + 1]]
 
 
 def line_starts(content: bytes) -> Integers:
-    """Where lines begin (n + 1,), the last one is the end; lines end with LF, CR LF or CR."""
+    """Offsets of the lines (n + 1,); the last one is the end of the text. Lines end with LF, CR LF or CR."""
     data = np.frombuffer(content, dtype=np.uint8)
     ends = data == ord("\n")
     returns = np.flatnonzero(data == ord("\r"))
@@ -141,12 +141,12 @@ class _Modes:
             "inches": False,
         }
         self.beside: set[bytes] = set()
-        # The modes in force from a line on; of several in one line the last ones.
+        # The modes in force from a line on; if a line has several entries, the last one counts.
         self._given = [(0, {**self.now, "plain": True})]
         self.units = self.feed_mode = b""
 
     def take(self, line: int, code: bytes) -> bool:
-        """Applies a code; returns whether it gives the F in force another meaning."""
+        """Applies a code; returns whether it changes the meaning of the F in force."""
         voids = False
         if code in (b"93", b"94", b"95"):
             voids = code != (self.feed_mode or b"94")
@@ -176,7 +176,7 @@ class _Modes:
 
 
 def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
-    """The lines of a program; those after `/` are left out with `block_delete`."""
+    """The lines of a program; with `block_delete` those after `/` are excluded."""
     start = line_starts(content)
     count = len(start) - 1
     exclusion = np.zeros(count, dtype=np.uint8)
@@ -223,7 +223,7 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
         else:
             keyword = _KEYWORD.match(token["flow"])
             word = keyword["word"].upper() if keyword else b""
-            # The `while` that ends a `do` closes it; any other one opens a loop.
+            # A `while` that ends a `do` closes it; any other `while` opens a loop.
             closes_do = word == b"WHILE" and dos > 0
             if word in _CLOSES or closes_do:
                 depth, dos = max(depth - 1, 0), dos - int(closes_do)
@@ -241,7 +241,7 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
     if depth:
         exclusion[opened:] = Exclusion.FLOW
     if jumps:
-        # Fanuc's GOTO goes to any line.
+        # Fanuc's GOTO may jump to any line.
         exclusion[exclusion != Exclusion.DELETED] = Exclusion.FLOW
     if (exclusion == Exclusion.THREAD).any():
         _follow_threads(content, start, exclusion)
@@ -260,7 +260,7 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
 
 
 def _tokens(content: bytes, start: Integers) -> Iterator[tuple[re.Match[bytes], int]]:
-    """The tokens of a text, each with its line by index; a part at a time, as a text may have millions."""
+    """The tokens of a text with the index of their line; a part at a time, as there may be millions."""
     found = _TOKEN.finditer(content)
     while tokens := list(islice(found, _AT_ONCE)):
         at = np.searchsorted(start, [token.start() for token in tokens], side="right") - 1

@@ -1,4 +1,4 @@
-"""The dialects of controls, and the words of a program that each of them lacks."""
+"""The dialects of controls, and the words of a program that each control does not understand."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ _LACKS: dict[DialectName, tuple[tuple[bytes, str], ...]] = {
 # The most characters of a line, without blanks and comments where these are not stored.
 _LONGEST: dict[DialectName, int] = {"linuxcnc": 255, "grbl": 70, "fanuc": 250}
 _NAMES_OF: dict[DialectName, str] = {"linuxcnc": "LinuxCNC", "grbl": "grbl", "fanuc": "Fanuc"}
-# Words that a program has not any more when it was written anew, and what has become of them.
+# Words that are no longer in a program after it was written anew, and what replaces them.
 _GONE = (
     (
         _g(r"43|43\.1|43\.2"),
@@ -97,17 +97,17 @@ _COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*")
 
 
 def writes_points(dialect: DialectName) -> bool:
-    """Whether an F needs a decimal point."""
+    """Whether the F of this control needs a decimal point."""
     return dialect == "fanuc"
 
 
 def has_path_control(dialect: DialectName) -> bool:
-    """Whether the control takes G61, G61.1 and G64."""
+    """Whether the control understands G61, G61.1 and G64."""
     return dialect != "grbl"
 
 
 def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
-    """Sentences on the words of a program that the control lacks, each with its first line."""
+    """Sentences on the words of a program that the control does not understand, each with the first line."""
     code = _without_comments(content)
     sentences = []
     for pattern, what in _LACKS[dialect]:
@@ -125,8 +125,7 @@ def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
 
 
 def gone(dialect: DialectName, content: bytes) -> tuple[str, ...]:
-    """Sentences on the words of a program that it has not any more when it is written anew for a control,
-    each with its first line."""
+    """Sentences on words that are lost when a program is written anew, each with the first line."""
     code = _without_comments(content)
     found = ((re.search(pattern, code), what) for pattern, what in _GONE + _GONE_IN[dialect])
     return tuple(
@@ -137,7 +136,7 @@ def gone(dialect: DialectName, content: bytes) -> tuple[str, ...]:
 
 
 def _without_comments(content: bytes) -> bytes:
-    """The code with blanks for comments, so that places stay."""
+    """The code with comments replaced by blanks, so that offsets stay the same."""
     return _COMMENT.sub(lambda found: b" " * len(found[0]), content)
 
 
@@ -154,5 +153,5 @@ def _long_lines(dialect: DialectName, code: bytes) -> list[str]:
 
 
 def _line_of(content: bytes, at: int) -> int:
-    """The 1-based line of a place."""
+    """The 1-based line number of an offset."""
     return len(re.findall(rb"\r\n|\n|\r", content[:at])) + 1

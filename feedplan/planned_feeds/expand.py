@@ -1,10 +1,10 @@
-"""Writes a program as plain blocks: its moves in the order in which they run, one block each.
+"""Writes a program as plain blocks: one block for each move, in the order in which the moves run.
 
-Loops, calls, cycles and compensation become the lines and arcs that they make; drawings and path files become
-G-code. Coordinates are those of the machine in millimetres, less the work offset G54 of the machine file.
-Each polynomial or rational piece of a spline becomes a block: G1 for a line, else G5.2 in X and Y for
-LinuxCNC, or G6.2 for Fanuc. Spindle, coolant, tools, outputs, dwells, stops, messages and comments keep their
-places; brackets in a text become square ones.
+Loops, calls, cycles and compensation become the resulting lines and arcs; drawings and path files become
+G-code. Coordinates are machine coordinates in millimetres minus the work offset G54 of the machine file. Each
+polynomial or rational piece of a spline becomes a block: G1 for a line, else G5.2 in X and Y for LinuxCNC, or
+G6.2 for Fanuc. Spindle, coolant, tools, outputs, dwells, stops, messages and comments keep their places;
+round brackets in a text become square ones.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _CONTROL = {PathControl.EXACT_STOP: b"G61.1", PathControl.EXACT_PATH: b"G61"}
 
 
 class _Blocks:
-    """Blocks, and the codes in force: a code is written only where it changes."""
+    """The blocks, and the codes in force: a code is written only where it changes."""
 
     def __init__(self) -> None:
         self.lines: list[bytes] = []
@@ -39,7 +39,7 @@ class _Blocks:
             self.lines.append(text)
 
     def changed(self, group: str, word: bytes) -> bytes:
-        """The word, empty if it is in force already."""
+        """The word, or nothing if it is in force already."""
         if self._force.get(group) == word:
             return b""
         self._force[group] = word
@@ -47,9 +47,9 @@ class _Blocks:
 
 
 def expanded(program: Program, machine: Machine | None, dialect: DialectName) -> tuple[bytes, Integers]:
-    """The program as plain blocks, and the move of each block that moves (k,).
+    """The program as plain blocks, and the move (k,) that each moving block belongs to.
 
-    Raises InputError for the tool's tip (G43.4, G43.5), and for splines that the dialect lacks.
+    Raises InputError for words of the tool's tip (G43.4, G43.5), and for splines that the dialect lacks.
     """
     if len(program.change_move) and program.coordinate_mode is not None and program.coordinate_mode.any():
         raise InputError(
@@ -72,7 +72,7 @@ def expanded(program: Program, machine: Machine | None, dialect: DialectName) ->
         if has_path_control(dialect):
             out.add(out.changed("control", _control(program, m)))
         rapid = not np.isfinite(program.feed[m])
-        # The feed is read back as the same number.
+        # Written so that reading gives exactly the same number.
         feed = b"" if rapid else out.changed("F", b"F" + place_text(60.0 * float(program.feed[m])))
         if m in splines:
             of += [m] * _spline(out, program, splines[m], zero, dialect, feed)
@@ -89,7 +89,7 @@ def expanded(program: Program, machine: Machine | None, dialect: DialectName) ->
             out.add(*code[:2], *moved, *code[2:], feed)
             of.append(m)
         if program.stop[m] and m + 1 < len(program) and m + 1 not in events:
-            # A stop without a word of its own, for example at a change of the tool length.
+            # A stop that no word causes, for example at a change of the tool length.
             out.add(_dwell(float(program.dwell[m]), dialect))
     for lines in events.values():
         out.lines += lines
@@ -118,7 +118,7 @@ def _control(program: Program, m: int) -> bytes:
 
 
 def _arc(out: _Blocks, program: Program, row: int, start: Floats) -> list[bytes]:
-    """Plane, code, centre and turns of an arc."""
+    """The words of an arc: plane, code, centre and number of turns."""
     normal, angle = int(program.arc_normal[row]), float(program.arc_angle[row])
     words = [out.changed("plane", _PLANES[normal]), out.changed("motion", b"G2" if angle < 0.0 else b"G3")]
     for axis in range(3):
@@ -130,7 +130,7 @@ def _arc(out: _Blocks, program: Program, row: int, start: Floats) -> list[bytes]
 
 
 def _spline(out: _Blocks, program: Program, row: int, zero: Floats, dialect: DialectName, feed: bytes) -> int:
-    """Writes the pieces of a spline; returns how many."""
+    """Writes the pieces of a spline; returns the number of blocks that move."""
     curve = program.splines
     assert curve is not None
     m = int(program.spline_move[row])
@@ -163,8 +163,8 @@ def _spline(out: _Blocks, program: Program, row: int, zero: Floats, dialect: Dia
 
 
 def _g52(out: _Blocks, points: Floats, weights: Floats, axes: tuple[str, ...], feed: bytes) -> None:
-    """A rational Bézier curve is a NURBS whose order is the number of its points; the first one is where the
-    tool is, with the weight 1."""
+    """Writes a rational Bézier curve as G5.2: a NURBS whose order is the number of its points; its first
+    point is the tool's position, with the weight 1."""
     out.add(out.changed("plane", b"G17"))
     columns = [axes.index(name) for name in "XY"]
     for k in range(1, len(points)):
@@ -179,7 +179,8 @@ def _g52(out: _Blocks, points: Floats, weights: Floats, axes: tuple[str, ...], f
 def _g62(
     out: _Blocks, points: Floats, weights: Floats, axes: tuple[str, ...], moved: list[int], feed: bytes
 ) -> None:
-    """G6.2: the order P, a knot K and a weight R a point, and the last knots in blocks of their own."""
+    """Writes a rational Bézier curve as G6.2: the order P, a knot K and a weight R for each point, and the
+    last knots in blocks of their own."""
     count = len(points)
     knots = [b"0."] * count + [b"1."] * count
     for k in range(count):
@@ -192,12 +193,12 @@ def _g62(
 
 
 def _dwell(seconds: float, dialect: DialectName) -> bytes:
-    """G4 in seconds, which are P; for Fanuc X, since its P is in milliseconds."""
+    """G4 with seconds as P; for Fanuc as X, because its P is in milliseconds."""
     return (b"G4 X" if dialect == "fanuc" else b"G4 P") + place_text(seconds)
 
 
 def _events(events: Events, dialect: DialectName) -> dict[int, list[bytes]]:
-    """The blocks before each move, by its number."""
+    """The blocks of the events before each move, by the index of the move."""
     before: dict[int, list[bytes]] = {}
     words = events.words()
     for row in range(len(events)):
@@ -224,5 +225,5 @@ def _plain(text: str) -> bytes:
 
 
 def _unbracketed(text: str) -> str:
-    """The text with square brackets: those of a comment end it."""
+    """The text with square instead of round brackets, which would end a comment."""
     return text.replace("(", "[").replace(")", "]")

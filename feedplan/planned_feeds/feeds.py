@@ -1,8 +1,8 @@
-"""The F of each line: the greatest planned speed in it, where that is below the programmed feed.
+"""Computes the F of each line: the greatest planned speed in it, where that is below the programmed feed.
 
-F is an upper limit for a control, which speeds up and brakes at the ends of a block by itself. So the F of a
-block is the greatest planned speed in it, rounded down, or the program's own F where the plan reaches that.
-It is in the program's units and feed mode: the F in force there times planned over programmed feed. An F is
+A control uses F as an upper limit, and accelerates and brakes at the ends of a block by itself. So the F of a
+block is the greatest planned speed in it, rounded down, or the program's own F where the plan reaches it. The
+new F is in the program's units and feed mode: the F in force there × planned speed / programmed feed. F is
 modal: it is written where it changes, and the program's own F is restored before a line that relies on it.
 """
 
@@ -26,10 +26,10 @@ UNKNOWN_FEED = "the F in force, by G93 or G95, is computed, or set where lines r
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """Feeds that differ from the program's, one row a block in order.
+    """Feeds that differ from the program's, one row for each block, in order.
 
-    `line` (k,) of the program, 1-based, several times where it is split; `before` (k,) the F in force in the
-    program and `after` (k,) the new F, in the program's units.
+    `line` (k,) is the 1-based line of the program, repeated where it is split; `before` (k,) is the F in
+    force in the program and `after` (k,) the new F, in the program's units.
     """
 
     line: Integers
@@ -39,11 +39,11 @@ class Changes:
 
 @dataclass(frozen=True, eq=False)
 class Feeds:
-    """Edits of lines, by their index from 0.
+    """Edits of lines, by line index from 0.
 
-    `texts`: the new F of each part of a line, which has one if it is not split; None where the F in force
-    holds. `restore`: the F in a new line before it; `modes`: lines that get G93; `left`: the reason why a
-    line keeps its F.
+    `texts`: the new F of each part of a line (one part if it is not split); None where the F in force stays.
+    `restore`: the F of a new line before the line; `modes`: lines that get G93; `left`: the reason why a line
+    keeps its F.
     """
 
     texts: dict[int, list[bytes | None]]
@@ -55,9 +55,9 @@ class Feeds:
 
 @dataclass(frozen=True, eq=False)
 class LineSpeeds:
-    """Lines with feed moves, by index from 0 in order: `line` (k,), `ratio` (k,) the greatest planned speed
-    over the programmed `feed` (k,) [mm/s, deg/s], NaN where the line has no one feed or no plan; `turns` (k,)
-    whether that is in deg/s of rotary axes."""
+    """Lines with feed moves, by index from 0 in order: `line` (k,); `ratio` (k,) is the greatest planned
+    speed over the programmed `feed` (k,) [mm/s, deg/s], NaN where the line has moves of different feeds or no
+    plan; `turns` (k,) whether this feed is in deg/s of rotary axes."""
 
     line: Integers
     ratio: Floats
@@ -66,8 +66,8 @@ class LineSpeeds:
 
 
 def line_speeds(program: Program, greatest: Floats, group: Integers) -> LineSpeeds:
-    """From the greatest planned speed in each move (m,) to that of each line; `group` (m,) is which one it is
-    along (`SpeedsAlong`)."""
+    """The greatest planned speed of each line from that of each move, `greatest` (m,); `group` (m,) is the
+    group of axes that its feed counts along (`SpeedsAlong`)."""
     ratio = greatest / program.feed
     feeds = np.flatnonzero(np.isfinite(program.feed))
     line = program.line.astype(np.int64) - 1
@@ -89,8 +89,8 @@ def planned_feeds(
 ) -> Feeds:
     """The edits of the F of each line.
 
-    `exclusion_of` (n,) is the Exclusion of each line; `parts` are the ratios, as in `speeds`, of the parts of
-    lines that are split, by index from 0; `point`: a new F has a decimal point.
+    `exclusion_of` (n,) is the Exclusion of each line; `parts` are the ratios (planned over programmed feed)
+    of the parts of split lines, by index from 0; `point`: a new F has a decimal point.
     """
     own_of = blocks.feed_at[:, 0] >= 0
     row_of = np.full(len(blocks), -1, dtype=np.int64)
@@ -99,7 +99,7 @@ def planned_feeds(
     exclusion, row = exclusion_of[lines], row_of[lines]
 
     programmed, source = _programmed_feeds(blocks, lines, exclusion, own_of[lines])
-    # An unknown F follows from the feed if F is in units a minute.
+    # If F is in units per minute, an unknown F follows from the feed of the move.
     feeds = (row >= 0) & (exclusion == Exclusion.NO)
     fed = np.flatnonzero(feeds)
     units = np.where(blocks.inches[lines[fed]] & ~speeds.turns[row[fed]], MM_PER_INCH, 1.0)
@@ -107,7 +107,7 @@ def planned_feeds(
         blocks.per_minute[lines[fed]], speeds.feed[row[fed]] * SECONDS_PER_MINUTE / units, np.nan
     )
     programmed[fed] = np.where(np.isnan(programmed[fed]), from_feed, programmed[fed])
-    # Before its first F a program has none that could stay: the feed is the user's.
+    # Before its first F, a program has no F that could stay: the feed is the user's.
     has_feed = np.cumsum(own_of[lines] & (exclusion != Exclusion.DELETED)) > 0
     none = feeds & ~has_feed & ~blocks.calls_set_feed & ~np.isnan(programmed)
     unknown = feeds & np.isnan(programmed)
@@ -127,12 +127,12 @@ def planned_feeds(
     for line, place in places.items():
         if counts[place] > 1:
             ratio[starts[place] : starts[place] + counts[place]] = parts[line]
-    # The wanted F, and the F in force before the line; 0 means the program's own F.
+    # The wanted F, and the F in force before the line; 0 stands for the program's own F.
     reached = np.abs(ratio - 1.0) <= FEED_ROUNDING
     ratio[reached] = 1.0
     other = feeds[of] & (~reached | none[of])
     wanted = np.where(other, rounded_down(np.where(other, programmed[of] * ratio, 1.0)), 0.0)
-    # No new F is in force after a block of G93, and after a change of the meaning of F.
+    # After a block with G93, and after a change of the meaning of F, no new F is in force.
     before = np.append(0.0, np.where(blocks.inverse[lines[of]], 0.0, wanted)[:-1])
     before[first & blocks.voids[lines[of]]] = 0.0
     own = own_of[lines[of]] & first
@@ -146,7 +146,7 @@ def planned_feeds(
         texts.setdefault(int(lines[place]), [None] * int(counts[place]))[k - int(starts[place])] = new
     restore: dict[int, bytes] = {}
     for k in np.flatnonzero((exclusion[of] != Exclusion.NO) & (before != 0.0)).tolist():
-        # The line before has the F that is restored.
+        # The F that is restored is that of the line before.
         last = int(of[k - 1])
         restore[int(lines[of[k]])] = _text(blocks, source[last], programmed[last])
     left = {int(lines[place]): UNKNOWN_FEED for place in np.flatnonzero(unknown)}
@@ -160,7 +160,7 @@ def planned_feeds(
 def _programmed_feeds(
     blocks: Blocks, lines: Integers, exclusion: NDArray[np.uint8], own: Flags
 ) -> tuple[Floats, Integers]:
-    """The program's F in force on lines (k,), NaN where it is not known, and the line that has it (k,)."""
+    """The program's F in force on each line (k,), NaN if unknown, and the line with this F (k,), or −1."""
     number = blocks.feed[lines]
     own = own & (exclusion != Exclusion.DELETED)
     lost = blocks.voids[lines] & ~own
@@ -172,18 +172,18 @@ def _programmed_feeds(
 
 
 def _text(blocks: Blocks, source: int, value: float) -> bytes:
-    """The program's F in force as text: that of the line `source`, if there is one, else of its number."""
+    """The program's F in force as text: as in the line `source`, or from its `value` if `source` < 0."""
     if source < 0:
         return exact_text(value)
     return blocks.content[slice(*blocks.feed_at[source])]
 
 
 def exclusions_of(blocks: Blocks, program: Program) -> NDArray[np.uint8]:
-    """The Exclusion of each line (n,): that of its text, or REPEATED by the order of the moves."""
+    """The Exclusion of each line (n,): that of its text, or REPEATED because of the order of the moves."""
     exclusion, line = blocks.exclusion.copy(), program.line.astype(np.int64) - 1
     starts = np.append(True, line[1:] != line[:-1])
     again = np.bincount(line[starts], minlength=len(blocks)) > 1
-    # A line after which earlier lines run was called.
+    # A line that runs after a later line was called.
     straight = line[exclusion[line] == Exclusion.NO]
     again[straight[straight < np.maximum.accumulate(straight)]] = True
     exclusion[again & (exclusion == Exclusion.NO)] = Exclusion.REPEATED

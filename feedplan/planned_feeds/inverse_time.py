@@ -1,7 +1,7 @@
-"""F as inverse time (G93): moves a minute, so that each block has an F of its own.
+"""Computes F as inverse time (G93) in 1/min, so that each block has its own F.
 
-A control multiplies it by the length of the block to get the feed. So F is the greatest planned speed in the
-block over that length; one over the block's planned time would limit the speed to its mean.
+A control multiplies F by the length of the block to get the feed. So F is the greatest planned speed in the
+block divided by its length; 1 / (planned time of the block) would limit the speed to its mean.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from feedplan.program.program import MoveKind, Program
 from feedplan.units import mm_per_min
 
 _REMEDY = "leave out --inverse-time, or give --expand"
-# Lines that move nothing also need an F if they have words of axes beside codes of motion only.
+# A line that moves nothing also needs an F if it has axis words and no codes other than these.
 _AXIS = re.compile(rb"[XYZABCUVWxyzabcuvw][ \t]*[-+.\d\[#]")
 _CODE = re.compile(rb"[Gg][ \t]*0*(\d*(?:\.\d+)?)")
 _MOVING = {b"1", b"2", b"3", b"17", b"18", b"19", b"20", b"21", b"90", b"91", b"90.1", b"91.1", b"93", b"94"}
 
 
 def require_no_splines(program: Program, lines: NDArray[np.int32]) -> None:
-    """Raises InputError if a feed move is a spline, which has no F as inverse time, however it is written;
-    `lines` are those of the moves in the program that the user has."""
+    """Raises InputError if a feed move is a spline, which cannot have an F as inverse time; `lines` are the
+    source lines of the moves in the user's program."""
     splines = np.flatnonzero((program.kind == MoveKind.SPLINE) & np.isfinite(program.feed))
     if len(splines):
         raise InputError(
@@ -48,10 +48,11 @@ def inverse_feeds(
     parts: Mapping[int, Parts],
     point: bool = False,
 ) -> Feeds:
-    """An F for each line with a feed move, by the greatest planned speed in it; `exclusion` (n,) is that of
-    each line, `parts` are those of moves that are split.
+    """An F for each line with a feed move, from the greatest planned speed in it; `exclusion` (n,) is that of
+    each line, `parts` are the parts of split moves.
 
-    Raises InputError where a line has no one length: in loops and cycles, and on turns of a tool.
+    Raises InputError where a line has several lengths: in loops and cycles, and where only the tool's
+    direction turns.
     """
     if not np.isfinite(program.feed).any():
         raise InputError(
@@ -85,7 +86,7 @@ def inverse_feeds(
         shares = [0.0, 1.0] if cut is None else [0.0, *cut.shares]
         tops = [greatest[m]] if cut is None else cut.speed
         sizes[line] = len(shares) - 1
-        # The F of a line may stand on one before, which moves nothing.
+        # The F of a line may be on an earlier line that moves nothing.
         last = int(np.searchsorted(given, line, side="right")) - 1
         programmed = blocks.feed[given[last]] if last >= 0 else np.nan
         for begin, end, top in zip(shares[:-1], shares[1:], tops, strict=True):
@@ -97,7 +98,7 @@ def inverse_feeds(
     texts: dict[int, list[bytes | None]] = {
         line: [next(written) for _ in range(size)] for line, size in sizes.items()
     }
-    # Where the tool does not move any number will do.
+    # Where the tool does not move, the value of F is irrelevant.
     texts |= {line: [b"1"] for line in idle.tolist()}
     modes = set(np.flatnonzero(blocks.modes[:, 0] >= 0).tolist())
     if min(modes, default=len(blocks)) > min(first):
@@ -111,7 +112,7 @@ def _refused(program: Program, line: int, why: str) -> InputError:
 
 
 def _idle(blocks: Blocks, counts: Integers) -> Integers:
-    """Lines whose moves have no length, or that do not run: they need an F as well."""
+    """Lines whose moves have no length, or that do not run: they also need an F."""
     found = []
     for line in np.flatnonzero((counts == 0) & (blocks.feed_at[:, 0] < 0)).tolist():
         text = re.sub(rb"\([^()\r\n]*\)?|;.*", b"", blocks.line(line))
@@ -121,7 +122,8 @@ def _idle(blocks: Blocks, counts: Integers) -> Integers:
 
 
 def feed_length(program: Program, motion: Motion, begin: float, end: float) -> float:
-    """The length [mm, deg] that a feed counts along on a part of a motion, between two shares of it."""
+    """The length [mm, deg] along the axes of the feed, between two shares of a motion. Raises InputError for
+    other motions."""
     first, last = motion.at(begin), motion.at(end)
     if motion.turn:
         radii = [math.hypot(*(place[motion.plane] - motion.centre)) for place in (first, last)]

@@ -1,4 +1,4 @@
-"""Numbers as text of a program: without exponents, feeds rounded down."""
+"""Writes numbers as text of a program: without exponents, feeds rounded down."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 from feedplan.arrays import Floats
 
-# Significant digits of an F word: it is below the planned speed by less than 1e-4 of it.
+# Significant digits of an F word: the relative rounding error is less than 1e-4.
 FEED_DIGITS = 5
-# The greatest share by which a feed is rounded down; an F above the plan by less stays.
+# The greatest relative error of a rounded feed; an F that exceeds the plan by less is kept.
 FEED_ROUNDING = 10.0 ** (1 - FEED_DIGITS)
-# Decimals of a coordinate [mm, inch, deg]: a thousandth of the difference that reading back allows.
+# Decimals of a coordinate [mm, inch, deg]: rounding is a thousandth of what reading back allows.
 PLACE_DECIMALS = 12
 
 
 def rounded_down(feeds: Floats) -> Floats:
-    """Feeds (k,), all positive, rounded down to FEED_DIGITS digits."""
+    """Positive feeds (k,), rounded down to FEED_DIGITS digits."""
     scale = 10.0 ** (FEED_DIGITS - 1 - np.floor(np.log10(feeds)))
     return np.floor(feeds * scale) / scale
 
@@ -39,12 +39,12 @@ def _feed_text(feed: float, point: bool) -> bytes:
 
 
 def exact_text(value: float) -> bytes:
-    """A feed as it is, but for rounding."""
+    """A feed with up to 12 decimals."""
     return f"{value:.12f}".rstrip("0").rstrip(".").encode()
 
 
 def place_text(value: float | Decimal, decimals: int = PLACE_DECIMALS) -> bytes:
-    """A coordinate, with a decimal point as controls want it, and without zeros behind."""
+    """A coordinate with the decimal point that controls need, and without trailing zeros."""
     rounded = Decimal(value).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_EVEN)
     text = f"{rounded:f}".rstrip("0") if rounded else "0."
     return text.encode()

@@ -1,4 +1,4 @@
-"""Writes the parts of a split line, with new ends and centres and the line's other words."""
+"""Writes the parts of a split line, with new ends and centres, and the line's other words."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from feedplan.units import MM_PER_INCH
 
 _WORD = re.compile(rb"([A-Za-z])([ \t]*)([-+]?[ \t]*(?:\d+\.?\d*|\.\d+))")
 _REST = re.compile(rb"[ \t]*(?:\([^()\r\n]*\))?")
-# Codes that a split line may have: they may be repeated in every part, or given in the first part only.
+# Codes that a split line may have: they may be in every part, or in the first part alone.
 _CODES = {1.0, 2.0, 3.0, 17.0, 18.0, 19.0, 20.0, 21.0, 40.0, 61.0, 90.0, 91.0, 90.1, 91.1, 94.0}
 _ROTARY = b"ABC"
 
 
 @dataclass(frozen=True)
 class Word:
-    """A word of a line: its letter, its number as written, and where word and number begin and end."""
+    """A word of a line: its letter, its number as text, and the offsets where the word starts, its number
+    begins and it ends."""
 
     letter: bytes
     text: bytes
@@ -40,19 +41,19 @@ class Word:
 
 @dataclass(frozen=True)
 class Sense:
-    """The modes of a line: whether ends and centres are absolute, and the unit of lengths."""
+    """The modes of a line: whether ends and centres are absolute, and whether lengths are in inches."""
 
     absolute: bool
     absolute_centres: bool
     inches: bool
 
     def unit(self, letter: bytes) -> float:
-        """The unit of a word of that letter [mm, deg]."""
+        """The unit of a word with that letter in mm or deg."""
         return MM_PER_INCH if self.inches and letter not in _ROTARY else 1.0
 
 
 def words_of(line: bytes) -> list[Word] | None:
-    """The words of a plain line or arc, which may be split; None for any other line."""
+    """The words of a plain line or arc, which may be split; None for other lines."""
     end, at, words = code_end(line), 0, []
     while at < end:
         rest = _REST.match(line, at)
@@ -71,7 +72,7 @@ def words_of(line: bytes) -> list[Word] | None:
 
 
 def may_be_split(line: bytes, axes: Sequence[str], moving: Sequence[bool]) -> bool:
-    """Whether a line is a plain line or arc that says where each of the `axes` goes that it moves."""
+    """Whether a line is a plain line or arc with a word for each of the `axes` that it moves."""
     words = words_of(line)
     named = {word.letter.decode() for word in words or ()}
     return words is not None and all(name in named for name, moves in zip(axes, moving, strict=True) if moves)
@@ -87,10 +88,11 @@ def part_lines(
     texts: Sequence[bytes | None],
     usual: bytes,
 ) -> bytes:
-    """The lines of the parts of a line that may be split, each with its F where `texts` has one.
+    """The lines for the parts of a line that may be split, each with its F where `texts` has one.
 
-    `start` (axes,) is where the move begins; `centre` are the coordinates of an arc's, in its plane; `usual`
-    is the blank between words of the program. The first part has the line's other words and comments.
+    `start` (axes,) is the start of the move; `centre` are the coordinates of an arc's centre in its plane, by
+    axis; `usual` is the blank between words in the program. The first part has the line's other words and
+    comments.
     """
     words = words_of(line) or []
     ends = np.concatenate([start[None, :], parts.ends])
@@ -124,7 +126,7 @@ def part_lines(
 def _end(
     word: Word, sense: Sense, axes: Sequence[str], ends: Floats, k: int, summed: dict[bytes, Decimal]
 ) -> bytes:
-    """The number of an axis in part k; increments add up to the program's exactly."""
+    """The number of an axis word in part k; increments add up exactly to the program's increment."""
     column, last = axes.index(word.letter.decode()), len(ends) - 1
     unit = sense.unit(word.letter)
     if sense.absolute:
@@ -132,7 +134,7 @@ def _end(
             return word.text
         return place_text(float(word.number) + (ends[k + 1, column] - ends[last, column]) / unit)
     before = summed.get(word.letter, Decimal(0))
-    # Positions are rounded, not increments, so that errors do not add up.
+    # Positions are rounded instead of increments, so that errors do not add up.
     if k + 1 == last:
         return place_text(word.number - before)
     done = place_text((ends[k + 1, column] - ends[0, column]) / unit)
@@ -143,14 +145,14 @@ def _end(
 def _first(
     body: bytes, words: Sequence[Word], row: dict[bytes, bytes], text: bytes | None, blank: bytes
 ) -> bytes:
-    """The line itself with the numbers of the first part; radii and numbers of turns become centres."""
+    """The line itself with the first part's numbers; radii and numbers of turns are replaced by centres."""
     rest, pieces, at = dict(row), [], 0
     if text is not None:
         rest[b"F"] = text
     for word in words:
         number = rest.pop(word.letter, None)
         if word.letter in (b"R", b"P"):
-            # The word goes, with the blanks before it.
+            # The word is removed, with the blanks before it.
             before = body[at : word.start]
             pieces.append(before.rstrip(b" \t") if blank else before)
             at = word.end

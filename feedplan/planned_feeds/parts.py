@@ -1,8 +1,9 @@
-"""Splits lines and arcs where the planned speed varies by more than a step: each part has an F near the plan.
+"""Splits lines and arcs where the planned speed varies by more than a step, so that the F of each part is
+close to the plan.
 
-A cut is at a place where the path follows one move alone, at least twice as far from the ends of the move as
-the blends of its corners reach: so the blends stay the same. The parts are lines, or arcs about the same
-centre, with ends on the move: the geometry is the same.
+A cut is at a place where the path follows only one move, at least twice as far from the ends of the move as
+the blends of its corners reach: so the blends do not change. The parts are lines, or arcs about the same
+centre, with ends on the move: the geometry does not change.
 """
 
 from __future__ import annotations
@@ -21,20 +22,21 @@ from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_at
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
-# The least time of a part in servo periods: a control needs time for each block.
+# The least duration of a part in servo periods: a control needs time for each block.
 _LEAST_PERIODS = 10
-# Samples of the speed in a step.
+# Number of samples of the speed in one step.
 _WITHIN_STEP = 4
-# Most samples of a program: some 20 GB.
+# The greatest number of samples of a program: about 20 GB.
 _MOST_SAMPLES = 100_000_000
-# The least turn of a part of an arc [rad], which could be read as a full turn, and the greatest.
+# The least turn of a part of an arc [rad] (a smaller one could be read as a full turn), and the greatest.
 _LEAST_TURN, _GREATEST_TURN = 1e-4, math.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Parts of a move: `ends` (k, axes) [mm, deg] in the program's axes, the last one is the move's own;
-    `shares` (k,) of the move up to each end; `speed` (k,) the greatest planned one in each [mm/s, deg/s]."""
+    """The parts of a move: `ends` (k, axes) [mm, deg] in the program's axes, the last one the end of the
+    move; `shares` (k,) of the move up to each end; `speed` (k,) the greatest planned speed in each part
+    [mm/s, deg/s]."""
 
     ends: Floats
     shares: Floats
@@ -54,7 +56,7 @@ def parts_of(
 ) -> dict[int, Parts]:
     """The parts of those `candidates` (moves) whose planned speed varies by more than `step` [mm/s].
 
-    Raises InputError for a step that makes too many samples.
+    Raises InputError for a step that is so small that there would be too many samples.
     """
     moves = [
         m
@@ -81,10 +83,10 @@ def parts_of(
         turns = np.abs(np.diff(edges) * motion.turn)
         if not cuts or (np.diff(edges) <= 0.0).any() or (motion.turn and turns.min() < _LEAST_TURN):
             continue
-        # A place of a cut belongs to both parts.
+        # The sample at a cut belongs to both parts.
         bounds = [0, *cuts, len(speed) - 1]
         tops = [float(speed[a : b + 1].max()) for a, b in pairwise(bounds)]
-        # An arc of more than half a turn is cut evenly.
+        # An arc of more than half a turn is divided equally.
         counts = np.maximum(np.ceil(turns / _GREATEST_TURN), 1).astype(int)
         shares = np.concatenate(
             [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
@@ -95,7 +97,8 @@ def parts_of(
 
 
 def _cuts(speed: Floats, time: Floats, free: Flags, step: float, least: float) -> list[int]:
-    """Indices of samples at which to cut: the speed varies by at most a step, and parts take `least` [s]."""
+    """Indices of samples at which to cut, so that the speed varies by at most about a step and each part
+    takes at least `least` [s]."""
     cuts: list[int] = []
     values, clock, may = speed.tolist(), time.tolist(), free.tolist()
     low = high = values[0]
@@ -113,7 +116,7 @@ def _cuts(speed: Floats, time: Floats, free: Flags, step: float, least: float) -
 def _samples(
     problem: Problem, profile: SpeedProfile, along: SpeedsAlong, moves: list[int], step: float
 ) -> list[tuple[Floats, Floats, Floats, Flags]]:
-    """Samples of each move in order: points, speeds, times, and whether the path follows it alone there."""
+    """Samples of each move in order: points, speeds, times, and whether the path follows only this move."""
     pieces, parameters, sizes = [], [], []
     varied = sum(float(np.abs(np.diff(along.of(m))).sum()) for m in moves)
     if _WITHIN_STEP * varied > _MOST_SAMPLES * step:
@@ -125,7 +128,7 @@ def _samples(
     for m in moves:
         places = slice(int(along.first[m]), int(along.last[m]) + 1)
         piece, u, speed = along.piece[places], along.u[places], along.of(m)
-        # Between two samples the speed changes by less than a step; its square is about linear in u.
+        # Between two samples the speed changes by less than a step; its square is nearly linear in u.
         counts = np.where(piece[1:] == piece[:-1], np.ceil(_WITHIN_STEP * np.abs(np.diff(speed)) / step), 1)
         counts = np.maximum(counts, 1).astype(np.int64)
         owner = np.repeat(np.arange(len(counts)), counts)
@@ -149,13 +152,13 @@ def _samples(
 
 
 def motions(program: Program) -> Callable[[int], Motion]:
-    """A function from the index of a line or an arc to its motion."""
+    """Returns a function that makes the motion of a line or an arc from its index."""
     starts, arcs = program.starts(), {int(m): row for row, m in enumerate(program.arc_move)}
     return lambda m: Motion(program, m, starts[m], arcs.get(m))
 
 
 class Motion:
-    """A line or an arc of a program: positions as a function of the share of it that is done."""
+    """A line or an arc of a program: positions as a function of the finished share of it."""
 
     def __init__(self, program: Program, move: int, start: Floats, arc: int | None) -> None:
         self.start, self._way = start, program.target[move] - start
@@ -173,7 +176,7 @@ class Motion:
         self._radii = math.hypot(*spoke), math.hypot(*last)
 
     def at(self, share: float) -> Floats:
-        """The place (axes,) where that share is done."""
+        """The position (axes,) at a share of the motion."""
         place = self.start + share * self._way
         if self.turn:
             angle, (first, last) = self._angle + share * self.turn, self._radii
@@ -182,7 +185,8 @@ class Motion:
         return np.asarray(place)
 
     def shares(self, points: Floats) -> Floats:
-        """The shares (n,) that are nearest to places (n, axes) in the order of the motion."""
+        """The shares (n,) of the motion at the positions nearest to `points` (n, axes), which are in the
+        order of the motion."""
         if not self.turn:
             return np.asarray((points - self.start) @ self._way / (self._way @ self._way))
         spokes = points[:, self.plane] - self.centre

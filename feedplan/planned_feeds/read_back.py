@@ -1,4 +1,5 @@
-"""Reads a rewritten program back and compares it: the same moves, and no block above its allowed feed."""
+"""Reads a rewritten program back and compares it with the original: the same moves, and no block above its
+allowed feed."""
 
 from __future__ import annotations
 
@@ -15,15 +16,16 @@ from feedplan.planned_feeds.parts import Parts
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 
-# The greatest difference of coordinates where lines are split [mm, deg].
+# The greatest allowed difference of coordinates where lines are split [mm, deg].
 SAME = 1e-9
 
 
 def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], feed: Floats) -> None:
-    """Raises ProgramError unless the text `content`, read as `program` was, is the same moves at these feeds.
+    """Raises ProgramError unless the text `content`, read with the arguments of `program`, has the same moves
+    and these feeds.
 
-    `parts` are those of moves that were split; `feed` (m,) [mm/s, deg/s] is what each move of `program` asks
-    for, to the rounding of feeds and never more.
+    `parts` are the parts of split moves; `feed` (m,) [mm/s, deg/s] is the wanted feed of each move of
+    `program`, which may be lower by the rounding of feeds, never higher.
     """
     try:
         again = read_program(content, name=program.name, **(program.reading or {}))
@@ -43,16 +45,16 @@ def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], f
     for move, own in parts.items():
         rows = slice(last[move] - len(own) + 1, last[move] + 1)
         target[rows], share[rows] = own.ends, np.diff([0.0, *own.shares])
-        # A part keeps the program's F where the plan reaches it, to rounding.
+        # A part keeps the program's F where the plan reaches it within rounding.
         kept = np.abs(own.speed / program.feed[move] - 1.0) <= FEED_ROUNDING
         wanted[rows] = np.where(kept, program.feed[move], own.speed)
     arc = np.searchsorted(program.arc_move, of[arc_of])
-    # The coordinate of a centre along the arc's axis is that of the start of the arc.
+    # Along its axis, the centre of a part has the coordinate of the start of the part.
     centre, normal = program.arc_centre[arc], program.arc_normal[arc].astype(np.int64)
     split = share[arc_of] < 1.0
     if again.arc_centre.shape == centre.shape:
         centre[split, normal[split]] = again.arc_centre[split, normal[split]]
-    # Without split lines all numbers are equal; the ends of parts are rounded.
+    # Without split lines all numbers are exactly equal; the ends of parts are rounded.
     within = SAME if parts else 0.0
     _compare(program, "kinds of moves", again.kind, program.kind[of])
     _compare(program, "places", again.target, target, within)
@@ -86,7 +88,7 @@ def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], f
 def _compare(
     program: Program, what: str, found: NDArray[Any], wanted: NDArray[Any], within: float = 0.0
 ) -> None:
-    """Raises ProgramError where numbers differ by more than `within`; NaN equals NaN."""
+    """Raises ProgramError where arrays differ in shape or by more than `within`; NaN equals NaN."""
     if found.shape != wanted.shape:
         raise _differs(program, f"it has other {what}")
     apart = np.abs(found.astype(np.float64) - wanted.astype(np.float64))

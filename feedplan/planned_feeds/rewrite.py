@@ -1,4 +1,4 @@
-"""The program of a plan with planned feeds, as an object and as a file."""
+"""Makes the program of a plan with planned feeds, as an object and as a file."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from feedplan.program.read import read_program
 from feedplan.program.source import MAX_BYTES, content_of, require_other
 from feedplan.units import counted, duration_text
 
-# Lines of a summary that are shown one by one.
+# Number of lines that a summary shows one by one.
 _SHOWN = 20
 
 
@@ -39,9 +39,10 @@ _SHOWN = 20
 class PlannedProgram:
     """A program with planned feeds.
 
-    `content` is its text; `lines` how many lines the program has; `changes` those with another F; `split` how
-    many became several; `left` (line, reason) those whose F could not be changed; `notes` what the control of
-    the `dialect` lacks, and what a program written anew leaves out; `time` [s] the plan's.
+    `content` is its text; `lines` is the number of lines of the program; `changes` are the lines with another
+    F; `split` is the number of lines that were split; `left` (line, reason) are the lines whose F could not
+    be changed; `notes` are words that the control of the `dialect` does not understand, and words that are
+    lost when a program is written anew; `time` [s] is that of the plan.
     """
 
     name: str
@@ -59,7 +60,7 @@ class PlannedProgram:
 
     @property
     def changed(self) -> int:
-        """How many lines have another F."""
+        """The number of lines with another F."""
         return len(np.unique(self.changes.line))
 
     @property
@@ -68,13 +69,13 @@ class PlannedProgram:
         return hashlib.sha256(self.content).hexdigest()
 
     def write(self, file: str | os.PathLike[str]) -> None:
-        """Writes the text to a file, whole or not at all; a device or a pipe gets it as it is.
+        """Writes the text to a file, completely or not at all; to a device or a pipe it is written directly.
 
-        Raises InputError where it cannot be written.
+        Raises InputError where the file cannot be written.
         """
         given = file_path(file, "the file", "the path of a file")
         try:
-            # A link stays, and what it points to is replaced.
+            # A symbolic link stays; the file that it points to is replaced.
             place = given.resolve()
             if place.exists() and not place.is_file():
                 place.write_bytes(self.content)
@@ -85,12 +86,12 @@ class PlannedProgram:
                 os.replace(beside, place)
             finally:
                 beside.unlink(missing_ok=True)
-        except (OSError, RuntimeError, ValueError) as error:  # also a ring of links, a name no file can have
+        except (OSError, RuntimeError, ValueError) as error:  # also circular links, impossible names
             reason = (getattr(error, "strerror", None) or str(error)).lower()
             raise InputError(f"{given} cannot be written ({reason}): choose another file") from error
 
     def to_json(self) -> dict[str, Any]:
-        """Its entry in plan.json."""
+        """The program's entry in plan.json."""
         return {
             "sha256": self.sha256,
             "dialect": self.dialect,
@@ -137,12 +138,11 @@ def planned_program(
     """The program of a plan, in which no block asks for more than the plan's greatest speed in it.
 
     `feed_step` [mm/s, deg/s]: lines and arcs are split where the planned speed varies by more. `inverse_time`
-    gives every block an F in 1/min (G93). `dialect` is that of its control: `linuxcnc`, `grbl` or `fanuc`;
-    `notes` name the words that the control lacks. `expand` writes the moves as plain blocks in the order in
-    which they run. The text is read back: its moves are the same bit for bit, or within 1e-9 mm where lines
-    are split.
-    Raises InputError for a plan without a program, for a program that was changed since, and for moves that
-    cannot be written.
+    gives every block an F in 1/min (G93). `dialect` is the dialect of the control: `linuxcnc`, `grbl` or
+    `fanuc`; `notes` name the words that the control does not understand. `expand` writes the moves as plain
+    blocks in the order in which they run. The text is read back to verify that its moves are the same bit for
+    bit, or within 1e-9 mm where lines are split. Raises InputError for a plan without a program, for a
+    program that was changed since, and for moves that cannot be written.
     """
     program = plan.program if isinstance(plan, Plan) else None
     if feed_step is not None:
@@ -162,7 +162,7 @@ def planned_program(
     if inverse_time:
         require_no_splines(program, source_lines)
     blocks = blocks_of(content, bool((program.reading or {}).get("block_delete", True)))
-    # A plan exceeds the requested feed only by rounding.
+    # Only rounding can make a plan exceed the requested feed.
     greatest = np.fmin(along.greatest(), plan.problem.request.of(program.feed))
     speeds, exclusion = line_speeds(program, greatest, along.group), exclusions_of(blocks, program)
     parts: dict[int, Parts] = {}
@@ -210,9 +210,9 @@ def write_program(
     dialect: DialectName = "linuxcnc",
     expand: bool = False,
 ) -> PlannedProgram:
-    """Writes the program of a plan with planned feeds to a file, whole or not at all; see `planned_program`.
+    """Writes the program with planned feeds to a file, completely or not at all; see `planned_program`.
 
-    Raises InputError also where the file cannot be written, or is the program or tool table that was read.
+    Raises InputError also if the file cannot be written, or is the program or tool table that was read.
     """
     place = file_path(file, "the file", "the path of a file")
     if isinstance(plan, Plan) and plan.program is not None:
@@ -226,7 +226,7 @@ def write_program(
 
 
 def _text_of(program: Program) -> bytes:
-    """The text of a program; raises InputError if it was not read from a text, or the text has changed."""
+    """The text of a program; raises InputError if it was not read from a text, or has changed since."""
     if program.reading is None or program.text is None:
         raise InputError(
             f"{program.name} is no G-code that was read from a text: "
@@ -241,13 +241,14 @@ def _text_of(program: Program) -> bytes:
 def _expanded(
     program: Program, along: SpeedsAlong, dialect: DialectName
 ) -> tuple[bytes, Program, SpeedsAlong, NDArray[np.int32]]:
-    """The program written anew, read back, the speeds of its moves, and the lines that they had before.
+    """The program written anew, the result of reading it back, the speeds of its moves, and their lines in
+    the original program.
 
-    Raises InputError as `expanded`.
+    Raises InputError as `expanded` does, and where the moves are not the same.
     """
     machine = (program.reading or {}).get("machine")
     content, of = expanded(program, machine, dialect)
-    # Its text is G-code, whatever the name of a drawing or a path file ends with.
+    # Its text is G-code, so it must not have the ending of a drawing or a path file.
     name = program.name if program.reading is not None else f"{program.name}.ngc"
     again = read_program(content, machine, name=name)
     again = again.with_others(reading={"machine": machine})
@@ -295,7 +296,7 @@ def _curved(program: Program) -> Floats:
 
 
 def _candidates(blocks: Blocks, program: Program, exclusion: NDArray[np.uint8]) -> Integers:
-    """Moves that may be split: lines and arcs at a feed, each alone in a line that runs once."""
+    """Moves that may be split: lines and arcs with a feed, each the only move of a line that runs once."""
     line = program.line.astype(np.int64) - 1
     alone = np.bincount(line, minlength=len(blocks))[line] == 1
     plain = (exclusion == Exclusion.NO) & blocks.plain & ~blocks.inverse
@@ -304,7 +305,7 @@ def _candidates(blocks: Blocks, program: Program, exclusion: NDArray[np.uint8]) 
 
 
 def _split(blocks: Blocks, program: Program, parts: Mapping[int, Parts], feeds: Feeds) -> dict[int, bytes]:
-    """The lines that are split, by index, written anew."""
+    """The split lines, written anew, by index."""
     motion_of = motions(program)
     replaced: dict[int, bytes] = {}
     usual = usual_blank(blocks.content)
@@ -324,7 +325,7 @@ def _split(blocks: Blocks, program: Program, parts: Mapping[int, Parts], feeds: 
 
 
 def _most(blocks: Blocks, program: Program, feeds: Feeds, speeds: LineSpeeds) -> Floats:
-    """The greatest feed that each move may ask for (m,): that of the plan in its line, else its own."""
+    """The greatest feed of each move (m,): that of the plan in its line, or the program's own."""
     ratio = np.ones(len(blocks))
     own = np.isin(speeds.line, feeds.changes.line - 1) & ~np.isnan(speeds.ratio)
     ratio[speeds.line[own]] = speeds.ratio[own]

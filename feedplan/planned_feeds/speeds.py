@@ -1,9 +1,9 @@
-"""The greatest planned speed in each move of a program, along the axes that its feed counts along.
+"""Computes the greatest planned speed in each move of a program, along the axes that its feed counts along.
 
 Each move owns the part of the path that is nearest to it. A piece that follows two moves, such as the blend
-of a corner, belongs to both, since both feeds hold on all of it. A piece that follows more moves, such as a
-fitted one, is cut at the places nearest to the ends of the moves, where a change of feed would cut it too. A
-move that is shorter than twice the tolerance may have both ends nearest to one place: all pieces that follow
+of a corner, belongs to both, because both feeds hold on all of it. A piece that follows more moves, such as a
+fitted piece, is cut at the places nearest to the ends of the moves, where a change of feed would also cut it.
+A move shorter than twice the tolerance may have the same nearest place for both ends: all pieces that follow
 it belong to it.
 """
 
@@ -21,16 +21,16 @@ from feedplan.machine.axis import DIRECTION
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
-# Places within each phase of the profile at which the speed is taken, beside both ends.
+# Fractions of each phase of the profile at which the speed is evaluated, besides its ends.
 _WITHIN = (0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True, eq=False)
 class SpeedsAlong:
     """Speeds at places in the order of the path: `piece` (k,), `u` (k,), `speed` (k, 3) along X, Y, Z, along
-    U, V, W [mm/s] and of all other axes [deg/s]. Those in move m are `first[m]` to `last[m]`, both included;
-    `first` > `last` where no piece follows it. `group` (m,) is which of the three its feed counts along, −1
-    where it moves nothing."""
+    U, V, W [mm/s] and along all other axes [deg/s]. The places of move m are `first[m]` to `last[m]`, both
+    included; `first` > `last` where no piece follows it. `group` (m,) is the index of the speed that its feed
+    counts along, −1 where it moves nothing."""
 
     piece: Integers
     u: Floats
@@ -40,11 +40,11 @@ class SpeedsAlong:
     group: Integers
 
     def of(self, move: int) -> Floats:
-        """The speeds in a move."""
+        """The speeds in a move along the axes of its feed."""
         return self.speed[self.first[move] : self.last[move] + 1, self.group[move]]
 
     def greatest(self) -> Floats:
-        """The greatest planned speed in each move (m,); NaN where nothing follows it."""
+        """The greatest planned speed in each move (m,); NaN for a move that no piece follows."""
         greatest = np.full(len(self.first), np.nan)
         own = np.flatnonzero((self.first <= self.last) & (self.group >= 0))
         for group in np.unique(self.group[own]):
@@ -68,7 +68,7 @@ def speeds_along(problem: Problem, profile: SpeedProfile, program: Program) -> S
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     count = len(program)
-    # Places equal to an end of a move belong to the move.
+    # Places equal to an end of a move belong to that move.
     first, last = rank[len(piece) - 2 * count : len(piece) - count], rank[len(piece) - count :]
     piece, u = piece[order], u[order]
     return SpeedsAlong(
@@ -84,7 +84,7 @@ def speeds_along(problem: Problem, profile: SpeedProfile, program: Program) -> S
 def _ends_of_moves(
     problem: Problem, program: Program
 ) -> tuple[tuple[Integers, Floats], tuple[Integers, Floats]]:
-    """Where the path of each move begins and ends: pieces (m,) and parameters (m,)."""
+    """The places where the path of each move begins and ends: pieces (m,) and parameters (m,)."""
     path = problem.path
     first, last = np.maximum.accumulate(path.move[:, 0]), np.maximum.accumulate(path.move[:, 1])
     moves = np.arange(len(program))
@@ -95,7 +95,7 @@ def _ends_of_moves(
     ends = shared[end] & (last[end] > moves)
     u_end[ends] = nearest(path, program.target[ends], end[ends], end[ends] + 1)[1]
     begins = shared[begin] & (first[begin] < moves)
-    # Usually the move before ends at the same place.
+    # Usually the move before ends at the same place, which then is not searched again.
     same = begins & np.append(False, ends[:-1] & (end[:-1] == begin[1:]))
     u_begin[same] = u_end[:-1][same[1:]]
     begins &= ~same
@@ -107,9 +107,11 @@ def _ends_of_moves(
 
 
 def speeds_at(problem: Problem, profile: SpeedProfile, piece: Integers, u: Floats) -> tuple[Floats, Floats]:
-    """The planned speed along each group of axes (k, 3) at places (k,), and when the tool is there (k,) [s].
+    """The planned speed along each group of axes (k, 3) at places (k,), and the time at which the tool is
+    there (k,) [s].
 
-    Speeds are 0 where the curve stands still."""
+    Speeds are 0 where the curve's tangent vector is 0.
+    """
     path = problem.path
     time, _, velocity, *_ = profile.sampler(problem).along(piece.astype(np.uint32), u)
     slope = problem.curve.evaluate(piece, u, 1)[1]
@@ -125,7 +127,7 @@ def speeds_at(problem: Problem, profile: SpeedProfile, piece: Integers, u: Float
         columns = [path.axes.index(name) for name in DIRECTION]
         vector, change = place[:, columns], words[:, columns]
         length = np.linalg.norm(vector, axis=1)
-        # The turn of a direction is its change across it over its length.
+        # A direction turns at the rate |component of its derivative across it| / |direction|.
         across = np.linalg.norm(np.cross(vector, change), axis=1) / np.where(length > 0.0, length, 1.0) ** 2
         squares[:, GROUPS - 1] += np.degrees(across) ** 2
     return np.sqrt(squares) * rate[:, None], time

@@ -1,4 +1,4 @@
-"""Puts F words into the text of a program; every other byte stays."""
+"""Inserts F words into the text of a program; every other byte stays the same."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from feedplan.planned_feeds.blocks import Blocks
 from feedplan.planned_feeds.feeds import Feeds
 
-# Comments, and texts for the operator, which take the rest of their line.
+# Comments, and texts for the operator, which extend to the end of the line.
 _COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*|[Mm][ \t]*0*11[78](?![\d.])[^\r\n]*")
 _LETTER = re.compile(rb"[A-Za-z]")
 _TWO_WORDS = re.compile(rb"(?<![^\r\n])[ \t]*[GXYZgxyz][ \t]*[-+.\d]+([ \t]*)[A-Za-z]")
@@ -18,7 +18,7 @@ _BLANKS = b" \t\r\n\x1a"
 
 
 def code_end(line: bytes) -> int:
-    """The end of the words of a line: after it are only blanks and comments."""
+    """The offset of the end of a line's words: after it there are only blanks and comments."""
     if b"(" not in line and b";" not in line and b"11" not in line:
         return len(line.rstrip(_BLANKS))
     return len(_COMMENT.sub(lambda found: b" " * len(found[0]), line).rstrip(_BLANKS))
@@ -30,7 +30,7 @@ def line_end(line: bytes) -> bytes:
 
 
 def blank_of(code: bytes, usual: bytes) -> bytes:
-    """The blank between the words of a line; `usual` if it has only one word."""
+    """The blank between the words of a line (possibly empty); `usual` if it has only one word."""
     words = code.strip(_BLANKS)
     if b" " in words:
         return b" "
@@ -40,13 +40,13 @@ def blank_of(code: bytes, usual: bytes) -> bytes:
 
 
 def usual_blank(content: bytes) -> bytes:
-    """The blank between the words of a program, from its first line of several words."""
+    """The blank between the words of a program (possibly empty), from its first line with several words."""
     found = _TWO_WORDS.search(content)
     return b"" if found is None or not found[1] else b" "
 
 
 def with_word(line: bytes, letter: bytes, number: bytes, usual: bytes) -> bytes:
-    """A line with one more word after its words, in the line's own style of blanks and letters."""
+    """A line with one more word after its words, with the line's own blanks and letter case."""
     end = code_end(line)
     code = line[:end]
     word = (letter.lower() if code.islower() else letter) + number
@@ -54,7 +54,7 @@ def with_word(line: bytes, letter: bytes, number: bytes, usual: bytes) -> bytes:
 
 
 def rewritten(blocks: Blocks, feeds: Feeds, replaced: Mapping[int, bytes]) -> bytes:
-    """The text with these F words; `replaced` are the new lines of split ones, by index."""
+    """The text with these F words; `replaced` are the new texts of split lines, by index."""
     content = blocks.content
     usual = usual_blank(content)
     touched = sorted(feeds.texts.keys() | feeds.restore.keys() | feeds.modes | replaced.keys())
@@ -85,7 +85,7 @@ def rewritten(blocks: Blocks, feeds: Feeds, replaced: Mapping[int, bytes]) -> by
 
 
 def _with_mode(blocks: Blocks, line: int, feed: bytes | None, replaced: bytes | None, usual: bytes) -> bytes:
-    """A line with its F and with G93, which replaces its own code of a feed mode."""
+    """A line with its F and with G93, which replaces a feed mode code of the line."""
     text, begin = blocks.line(line), int(blocks.start[line])
     if replaced is not None:
         first, stop, rest = replaced.partition(line_end(text) or b"\n")

@@ -1,15 +1,15 @@
-"""Planners: from a problem to a speed profile; one file a method, found by its name.
+"""Planners compute a speed profile from a problem. Each method is one file, found by its name.
 
 The method `bang-bang` is the module `bang_bang`; modules that begin with an underscore are shared by methods.
 `MethodName` lists the names, and the documentation of `feedplan.plan` the options. A module has
 
 - `plan(problem: Problem, …) -> SpeedProfile`; options are keyword arguments, each with a default.
-- `CORNERS`, a `feedplan.geometry.corners.Corners`, if the method is for another path than the rounded one.
+- `CORNERS`, a `feedplan.geometry.corners.Corners`, if the method needs another path than the rounded one.
 - `LIMITS_JERK = True` if its profiles keep the jerk limits of the axes; the audit then checks them.
-- `GRID_ERROR` if its profiles come with a lower bound of their own (`SpeedProfile.lower_bound`): finer grids
-  may gain this many times the accuracy.
+- `GRID_ERROR` if its profiles have a lower bound of their own (`SpeedProfile.lower_bound`): finer grids may
+  reduce the time by this many times the accuracy.
 
-`plan` may take more keyword arguments: `PROGRESS` to report how far it is, `RESERVE` to announce the work
+`plan` may take more keyword arguments: `PROGRESS` to report its progress, `RESERVE` to announce the work
 after the plan (`planners.jerk_limited`), `ELSEWHERE` to plan runs on other computers.
 """
 
@@ -44,11 +44,11 @@ MethodName = Literal[
     "toppra",
 ]
 
-# Keeps time for the work that follows a plan; it is given by `feedplan.plan`, and no option of users.
+# Reserves time for the work after a plan; `feedplan.plan` gives it, users cannot.
 RESERVE = "reserve"
-# A function that gets the part of the plan that is done; an argument of `feedplan.plan` too.
+# A function that is called with the finished share of the plan; also an argument of `feedplan.plan`.
 PROGRESS = "progress"
-# Does parts of the work; given by `feedplan.plan` too.
+# An executor for parts of the work (`planners._parts.Elsewhere`); `feedplan.plan` gives it too.
 ELSEWHERE = "elsewhere"
 
 
@@ -60,17 +60,17 @@ def methods() -> tuple[MethodName, ...]:
 def planner(method: str, **options: Any) -> Callable[[Problem], SpeedProfile]:
     """The planning function of a method, with those `options` that are not None.
 
-    Raises InputError naming the methods there are, or the options that the method has.
+    Raises InputError that names the known methods, or the method's options.
     """
     plan: Callable[..., SpeedProfile] = _module(method).plan
     return partial(plan, **given_options(method, options))
 
 
 def given_options(method: str, options: Mapping[str, Any], others: Iterable[str] = ()) -> dict[str, Any]:
-    """Those options of a method that are not None; one that only other methods take may be None.
+    """Those of the `options` that are not None. An option that only other methods take must be None.
 
-    Raises as `planner`, naming the methods that take the option if there are any; `others` may be given as
-    well.
+    Raises as `planner` does, and names the methods that take the option, if any; names of `others` appear in
+    the message as allowed too.
     """
     known = options_of(method)
     for name, value in options.items():
@@ -85,30 +85,31 @@ def given_options(method: str, options: Mapping[str, Any], others: Iterable[str]
 
 
 def grid_error(method: str) -> float:
-    """How many times the accuracy finer grids would gain on a method's own bound, 0 without one."""
+    """`GRID_ERROR` of a method: finer grids may reduce the time by this many times the accuracy; 0 without a
+    lower bound of its own."""
     return float(getattr(_module(method), "GRID_ERROR", 0.0))
 
 
 def options_of(method: str) -> dict[str, Any]:
-    """A method's options by name, with their defaults; raises as `planner`."""
+    """A method's options with their defaults; raises as `planner` does."""
     parameters = inspect.signature(_module(method).plan).parameters.values()
     others = ("problem", RESERVE, PROGRESS, ELSEWHERE)
     return {own.name: own.default for own in parameters if own.name not in others}
 
 
 def takes(method: str, argument: str) -> bool:
-    """Whether a method takes `RESERVE`, `PROGRESS` or `ELSEWHERE`; raises as `planner`."""
+    """Whether a method takes `argument`: `RESERVE`, `PROGRESS` or `ELSEWHERE`; raises as `planner` does."""
     return argument in inspect.signature(_module(method).plan).parameters
 
 
 def corners(method: str) -> Corners:
-    """The corners of the path that a method is made for; raises as `planner`."""
+    """The treatment of corners that a method needs; raises as `planner` does."""
     choice: Corners = getattr(_module(method), "CORNERS", Corners.ROUNDED)
     return choice
 
 
 def limits_jerk(method: str | None) -> bool:
-    """Whether a method claims to keep the axes' jerk limits, which are judged then; an unknown one: no."""
+    """Whether a method keeps jerk limits, which the audit then checks; False for an unknown method."""
     return method in methods() and getattr(_module(str(method)), "LIMITS_JERK", False)
 
 

@@ -1,4 +1,4 @@
-"""The arcs between the stations of a mesh: from p in the stations to a profile and its use of every limit."""
+"""Computes from p at the stations the arcs (phases) between them, their use of limits, and the profile."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
 from feedplan.profile import NO_AXIS, OF_PHASES, PhaseLaw, SpeedProfile
 
-# The joint of an arc of constant joint acceleration has a q' that varies by at most this factor.
+# A joint may be chosen for an arc of constant joint acceleration only if its |q'| varies by less than this
+# factor in the cell,
 _VARIES = 1e3
-# Its q' is at least this part of the greatest of all joints: of such a q' less than 1e-9 is rounding, and the
-# duration follows from it.
+# and if it exceeds this share of the greatest |q'| of all joints: then the relative rounding error of q',
+# from which the duration is computed, is below 1e-9.
 _MOVES = 1e-6
 
 
 @dataclass(frozen=True)
 class Arcs:
-    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n) and `duration` (n,).
+    """One arc for each cell: `kind`, `axis`, `value`, p at both `ends` (2, n) and `duration` (n,) [s].
 
-    `acceleration` (n, joints) and `speed` (n,) are upper bounds of the used shares of limits, that of the
-    speed squared. `used` (n,) is the mean over the cell of the greatest used share at each place.
+    `acceleration` (n, joints) and `speed` (n,) are upper bounds of the use of the acceleration limits and of
+    the squared use of the speed limits. `used` (n,) is the mean over the cell of the greatest use at each
+    place.
     """
 
     kind: NDArray[np.uint8]
@@ -40,16 +42,16 @@ class Arcs:
 
     @property
     def worst(self) -> Floats:
-        """By how much p must fall to keep every limit of a cell (n,)."""
+        """Divisor of p that keeps every limit in each cell (n,); at most 1 if the limits hold already."""
         return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
 
     @property
     def feasible_time(self) -> float:
-        """The time if p were scaled so far [s]."""
+        """The duration if the greatest factor `worst` scaled all p down [s]."""
         return float(self.duration.sum()) * math.sqrt(max(float(self.worst.max()), 1.0))
 
     def scaled(self, factor: float) -> Arcs:
-        """The same with p times a factor."""
+        """These arcs with p multiplied by a factor."""
         return Arcs(
             self.kind,
             self.axis,
@@ -63,9 +65,10 @@ class Arcs:
 
 
 def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs:
-    """The arcs through p in the stations (n + 1,): p linear in u, or one joint's acceleration constant.
+    """The arcs through p at the stations (n + 1,): p linear in u, or the acceleration of one joint constant.
 
-    Where `by_axis` allows it, of all such arcs of a cell the one that uses the limits least is taken.
+    If `by_axis` is true, each cell takes the arc with the least greatest use of a limit; else p is linear in
+    u in all cells.
     """
     start, end = mesh.gain * p[:-1], p[1:]
     own = start + (end - start) * PLACES[:, None]
@@ -98,7 +101,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs
     ends = np.stack([start, end])
     acceleration, speed = motion.acceleration(mesh), motion.speed(mesh)
     used = np.maximum(problem.use("acceleration", acceleration).max(axis=2), speed.max(axis=2))
-    # Each direction by itself, because the used share of a limit has a kink where the sign changes.
+    # Each direction separately, because the use of a limit has a kink where the acceleration changes sign.
     peaks = [_peak(acceleration / limit) for limit in (problem.max_acceleration, problem.min_acceleration)]
     return Arcs(
         kind,
@@ -113,9 +116,10 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs
 
 
 def _peak(values: Floats) -> Floats:
-    """The greatest values in the cells (n, …), from values at the places (places, n, …).
+    """The greatest value in each cell (n, …), estimated from values at the places (places, n, …).
 
-    It is that of parabolas through even places, and an estimate of the error between the places.
+    It is the greatest value at the places or of parabolas through equally spaced places, plus an error
+    estimate from the last two Legendre coefficients.
     """
     even = np.einsum("ij,jck->ick", EVEN, values)
     bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
@@ -136,11 +140,11 @@ class _Motion:
         return mesh.slope * self.s[..., None] + mesh.bend * self.p[..., None]
 
     def speed(self, mesh: Mesh) -> Floats:
-        """The share of every limit of a speed, squared (places, n, limits)."""
+        """The squared use of every speed limit (places, n, limits)."""
         return np.asarray(mesh.speed * self.p[..., None])
 
     def worst(self, problem: Problem, mesh: Mesh) -> Floats:
-        """The greatest of all at the places (n,)."""
+        """The greatest use of any limit at the places of each cell (n,)."""
         acceleration = problem.use("acceleration", self.acceleration(mesh)).max(axis=(0, 2))
         return np.asarray(np.maximum(acceleration, self.speed(mesh).max(axis=(0, 2))))
 
@@ -149,7 +153,7 @@ class _Motion:
 
 
 def profile(parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
-    """The arcs of all subruns as one profile; `runs` are the arcs' offsets of the runs."""
+    """The arcs of all subruns as one profile; `runs` are the offsets of the runs in the arcs."""
     rows = (
         (mesh.piece, arcs.kind, arcs.axis, arcs.value, *mesh.ends, *arcs.ends, arcs.duration)
         for mesh, arcs in parts

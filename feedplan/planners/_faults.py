@@ -1,4 +1,4 @@
-"""Faults of the native planners as errors of the package."""
+"""Turns faults of the native planners into errors of the package."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from feedplan.errors import InfeasibleError, InputError, SolverError, at_line
 
 
 def error_of(problem: Problem, fault: PlanError) -> InfeasibleError | InputError | SolverError:
-    """The planner's fault in our words: with the source line, and a speed that will do."""
+    """The error for a planner's fault: with the source line, and a speed that is possible."""
     kind, piece, reachable, sentence = fault.args
     line = 0 if piece is None else int(problem.path.line[piece])
     if reachable is not None:
@@ -33,15 +33,14 @@ def end_error(
     reachable: float | None = None,
     what: str = "no profile",
 ) -> InfeasibleError:
-    """The error that no profile has the speed given at the start or at the end of the path; `why` ends with
-    a colon."""
+    """The error that no profile has the given speed at the path's start or end; `why` ends with a colon."""
     verb, speed = ("starts", problem.start_speed) if at_start else ("ends", problem.end_speed)
     sentence = f"{what} {verb} at {speed:g} {problem.unit}/s: {why}give a lower speed"
     return InfeasibleError(f"{at_line(line)}{sentence}", line, reachable)
 
 
 def _rounded_down(speed: float) -> str:
-    """Six digits of a speed, never above it."""
+    """A speed rounded down to six digits."""
     if speed <= 0.0:
         return "0"
     scale = 10.0 ** (5 - math.floor(math.log10(speed)))

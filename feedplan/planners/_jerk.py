@@ -1,4 +1,4 @@
-"""The limits of jerk of a problem, lowered where the interpolants of joints miss the joints' jerk."""
+"""The jerk limits of a problem, lowered by the jerk error of the joints' interpolants."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from feedplan.constraints.problem import Problem
 from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
 
-# Third derivatives of joints are compared at the ends of arcs: inside, the error may be this factor greater.
+# Third derivatives of joints are compared only at the ends of phases; inside, the error may be this factor
+# greater.
 INSIDE = 1.5
-# The share by which limits may be exceeded without another plan.
+# Limits may be exceeded by this share without another plan.
 HELD = 2e-7
 
 
 def jerk_limits(problem: Problem) -> Floats:
-    """The jerk limits (axes,) [mm/s³]; 1 for an axis without one that does not move.
+    """The jerk limits (axes,) [mm/s³]; 1 for an axis that has no limit and does not move.
 
-    Raises SolverError for an axis that moves without one.
+    Raises SolverError for an axis that moves and has no jerk limit.
     """
     limits = problem.max_jerk.copy()
     for column in np.flatnonzero(~np.isfinite(limits)):
@@ -32,10 +33,11 @@ def jerk_limits(problem: Problem) -> Floats:
 
 
 def lowered_limits(problem: Problem, limits: Floats, profile: SpeedProfile) -> Floats | None:
-    """`limits` of jerk less the error of jerk of the joints' interpolants (`Problem.joints`) on a profile.
+    """Jerk `limits` (axes,) [mm/s³] minus the jerk error of the joints' interpolants (`Problem.joints`) on a
+    profile, at least half the limits.
 
-    None where that error is below the share `HELD` of the limits. The interpolants have exact accelerations;
-    their error of jerk is that of the third derivative times the third power of the parameter's speed.
+    None if that error is at most the share `HELD` of the limits. The interpolants' error in jerk is |error of
+    the third derivative| × u̇³; their error in acceleration is negligible.
     """
     if not problem.words:
         return None

@@ -1,10 +1,10 @@
-"""Trapezoids with look-ahead over whole runs: what the methods of controllers share.
+"""Trapezoidal speed profiles with look-ahead over whole runs, shared by the methods of controllers.
 
-A method says how fast corners are passed and which accelerations it allows; speed rises at one tangential
-acceleration on each segment (`_segments`) and falls at one. On a line that is the greatest of its direction,
-min over the axes of A_k/|t_k|, with the limit A_k of the way that axis k is pulled, and the profile is exact.
-On a part of a curved piece v² is linear in the parameter, with the greatest slope that keeps the tangential
-acceleration all over the part.
+A method gives the speeds at corners and the allowed accelerations. On each segment (`_segments`) speed rises
+with one constant tangential acceleration and falls with another. On a line each is the greatest possible, min
+over the axes of A_k/|t_k|, with the limit A_k for the direction in which axis k accelerates, and the profile
+is exact. On a part of a curved piece v² is linear in the parameter, with the greatest slope that keeps the
+tangential acceleration everywhere on the part.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from feedplan.planners._queue import Queue
 from feedplan.planners._segments import CurvePlaces, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, PhaseLaw, SpeedProfile
 
-# Parts of a segment shorter than this many roundings of its parameter and of v² are left out.
+# Phases of a segment shorter than this many rounding errors of its parameter and of v² are left out.
 ROUNDINGS = 4.0
 
-# A reached speed may be below the given one by this share (rounding).
+# A reached speed may be smaller than the given one by this share (rounding).
 ROUNDING = 1e-12
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
-# Whether the speed is constant between two of the six places of a segment, and whether it falls there.
+# For the phases between the six places of a segment: whether the speed is constant, and whether it falls (1).
 _CONSTANT = np.array([True, False, True, False, True])
 _SLOWS = np.array([0, 0, 0, 1, 0])
 
@@ -41,13 +41,13 @@ def look_ahead(
     hold: Floats | None = None,
     queue: Queue | None = None,
 ) -> SpeedProfile:
-    """The fastest trapezoids.
+    """The fastest profile of trapezoids.
 
-    `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at
-    the problem's speeds. `hold` (n + 1,) [s]: the speed is constant for this time before and after the end of
-    a piece; beside a curve the tool stops instead. `queue` is the part of the path that the controller knows,
-    and its limits along it; by default it knows all, without limits.
-    Raises SolverError (see `segments`) and InfeasibleError where the start or end speed is not possible.
+    `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path with
+    the problem's speeds. `hold` (n + 1,) [s] is the time for which the speed stays constant before and after
+    the end of a piece; next to a curve the tool stops instead. `queue` is the part of the path that the
+    controller knows, with its limits along the path; by default it knows everything and has no limits. Raises
+    SolverError (see `segments`) and InfeasibleError where the start or end speed is not possible.
     """
     queue = queue or Queue()
     parts = segments(problem, rule, queue.velocity, queue.acceleration)
@@ -67,7 +67,8 @@ def look_ahead(
 def _speed_at_ends(
     problem: Problem, parts: Segments, corner_speed: Floats, hold: Floats | None
 ) -> tuple[Floats, Floats]:
-    """Greatest speeds at the ends of the segments, and how long each is held (m + 1,)."""
+    """The greatest speed at each end of a segment [mm/s], and the time for which it is held on each side [s],
+    both (m + 1,)."""
     first = np.searchsorted(parts.piece, np.arange(len(problem.path) + 1))
     limit = np.concatenate([parts.speed, [np.inf]])
     limit[1:] = np.minimum(limit[1:], parts.speed)
@@ -82,7 +83,7 @@ def _speed_at_ends(
     curved = np.concatenate([[False], np.isnan(parts.rate), [False]])
     limit[(held > 0.0) & (curved[:-1] | curved[1:])] = 0.0
     held[limit == 0.0] = 0.0
-    # A segment takes as long as both its ends are held.
+    # A segment must last at least as long as the speeds at both its ends are held.
     time = held[:-1] + held[1:]
     with np.errstate(divide="ignore"):
         whole = np.where(time > 0.0, parts.rate * (parts.u1 - parts.u0) / time, np.inf)
@@ -102,7 +103,7 @@ def _check_ends(problem: Problem, speed: Floats) -> None:
 
 
 def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> SpeedProfile:
-    """The arcs between the speeds at the ends of the segments."""
+    """The profile's phases between the speeds at the ends of the segments."""
     whole = parts.u1 - parts.u0
     start_sq, end_sq = speed[:-1] ** 2, speed[1:] ** 2
     still = np.where(room > 0.0, room * np.stack([speed[:-1], speed[1:]], axis=1) / parts.rate[:, None], 0.0)
@@ -114,7 +115,7 @@ def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> 
     triangle = meet < parts.speed**2
     peak_sq = np.maximum(np.minimum(meet, parts.speed**2), least)
 
-    # Held, speeding up, cruising, slowing down, held.
+    # The six places of a segment bound its phases: held, speeding up, cruising, slowing down, held.
     rise, fall = (peak_sq - start_sq) / faster, (peak_sq - end_sq) / slower
     top, end = still[:, 0] + rise, whole - still[:, 1]
     down = np.where(triangle, top, end - fall)
@@ -134,7 +135,7 @@ def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> 
     from_sq, to_sq = speed_sq[segment, phase], speed_sq[segment, phase + 1]
     piece, line = parts.piece[segment], ~np.isnan(parts.rate[segment])
     constant = _CONSTANT[phase]
-    # The speed in all axes is constant; on lines the speed that the feed limits is then constant too.
+    # The speed of all axes together is constant; on lines the speed that the feed limits is so too.
     counted, by_shares = _counted(problem, piece, u0)
     even = np.where(by_shares & ~line, PhaseLaw.SPEED_LINE, PhaseLaw.FEED)
     ramp_kind = np.where(line, PhaseLaw.AXIS_ACCELERATION, PhaseLaw.SPEED_LINE)
@@ -146,7 +147,7 @@ def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> 
     length[curved] = _weighted_length(
         problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
     )
-    # The speeds at the ends of the segments hold where a ramp is left out as well.
+    # The first and last phase of a segment get exactly its end speeds, also where a ramp is left out.
     by_law = ~constant | (even == PhaseLaw.FEED)
     first = np.flatnonzero(np.diff(segment, prepend=-1) * by_law)
     last = np.flatnonzero(np.diff(segment, append=len(parts)) * by_law)
@@ -172,7 +173,7 @@ def _profile(problem: Problem, parts: Segments, speed: Floats, room: Floats) -> 
 
 
 def _counted(problem: Problem, piece: Integers, u: Floats) -> tuple[Floats, Flags]:
-    """The square of the speed that the feed limits over that in all axes (n,), and where they differ."""
+    """(speed that the feed limits)² / (speed of all axes)² (n,), and where both speeds differ."""
     if problem.feed_share is None:
         return np.ones(len(piece)), np.zeros(len(piece), dtype=np.bool_)
     by_shares = np.logical_or.reduce(problem.feed_share[piece] != 1.0, axis=1)
@@ -183,11 +184,11 @@ def _counted(problem: Problem, piece: Integers, u: Floats) -> tuple[Floats, Flag
 def _weighted_length(
     problem: Problem, piece: Integers, u0: Floats, u1: Floats, from_sq: Floats, to_sq: Floats
 ) -> Floats:
-    """The mean of |C'| over v, times u1 − u0: v grows evenly with time where |C'| is constant."""
+    """The mean of |C'| over v, times u1 − u0; divided by the mean speed it is the duration."""
     start, end = np.sqrt(from_sq), np.sqrt(to_sq)
     total = np.zeros(len(piece))
     for node, weight in zip(0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS, strict=True):
-        # v² is linear in u: the share of the parameter at which v is this share of the way from start to end.
+        # v² is linear in u; this is the share of the parameter at which v = start + node·(end − start).
         share = node * ((2.0 - node) * start + node * end) / (start + end)
         u = np.minimum(u0 + share * (u1 - u0), u1)
         total += weight * np.linalg.norm(problem.curve.evaluate(piece, u, 1)[1], axis=1)
@@ -195,11 +196,12 @@ def _weighted_length(
 
 
 def shared_acceleration(at: CurvePlaces) -> tuple[Floats, Floats]:
-    """Half along the path and √3/2 across it of the acceleration that every direction in their plane allows.
+    """Tangential (1/2) and normal (√3/2) shares of the acceleration that all directions in the plane allow.
 
-    No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a
-    tangential ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
-    A_k/√(t_k² + n_k²). Among all directions are an axis's both ones: A_k is the lesser of its two limits.
+    The sum of both never exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`:
+    a tangential ratio of 0.5; the normal one completes the circle); the whole acceleration is min over the
+    axes of A_k/√(t_k² + n_k²). A_k is the smaller limit of both directions, because the directions of the
+    plane include both.
     """
     with np.errstate(divide="ignore"):
         whole = (at.limits.min(axis=0) / np.hypot(at.tangent, at.normal)).min(axis=1)

@@ -1,10 +1,10 @@
-"""The mesh of planners that discretise: subruns between stops, cut into cells, with every limit at places.
+"""The mesh of planners that discretise: subruns between stops are divided into cells, and the limits are
+evaluated at places of each cell.
 
-A subrun is a part of a run without a stop inside. Its cells never reach over the end of a piece, because q''
-has two values at a knot: each side has cells of its own. Each cell has q', q'' and the greatest p at
-`PLACES`, which include both ends.
+A subrun is a part of a run without a stop inside. A cell never crosses the end of a piece, because q'' may
+jump there. Each cell has q', q'' and the greatest p at `PLACES`, which include both ends.
 
-A piece is meshed over its own parameter u. In a cusp (q' = 0) the tool stops, and the subrun ends.
+The mesh of a piece uses its own parameter u. At a cusp (q' = 0) the tool stops, and the subrun ends.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ PLACES = np.concatenate(
     [[0.0], 0.5 + 0.5 * np.sort(legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))), [1.0]]
 )
 
-# q' below this share of its size on the piece is a cusp.
+# Where |q'| is at most this share of its size on the piece, there is a cusp.
 _CUSP = 1e-9
 
 
 def _integration() -> Floats:
-    """The matrix from values at `PLACES` to integrals from 0 to each of them, exact to the tenth degree."""
+    """The matrix from values at `PLACES` to integrals from 0 to each place, exact up to degree 10."""
     powers = np.arange(_DEGREE + 1)
     values = PLACES[:, None] ** powers
     integrals = PLACES[:, None] ** (powers + 1) / (powers + 1)
@@ -40,11 +40,11 @@ def _integration() -> Floats:
 
 INTEGRATION = _integration()
 
-# From values at `PLACES` to the last two Legendre coefficients of the polynomial through them: an estimate of
-# the error between the places.
+# Matrix from values at `PLACES` to the last two Legendre coefficients of the polynomial through them, which
+# estimate the error between the places.
 TAIL = np.linalg.inv(legendre.legvander(2.0 * PLACES - 1.0, _DEGREE))[-2:]
 
-# From values at `PLACES` to values at even places, which show peaks between them.
+# Matrix from values at `PLACES` to values at 33 equally spaced places, which show peaks between them.
 EVEN = (np.arange(33) / 32)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
     PLACES[:, None] ** np.arange(_DEGREE + 1)
 )
@@ -52,10 +52,10 @@ EVEN = (np.arange(33) / 32)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
 
 @dataclass(frozen=True)
 class Subrun:
-    """Pieces `first` to before `last` of a problem, without a stop inside.
+    """The pieces from `first` up to (not including) `last` of a problem, without a stop inside.
 
     `start` and `end` are the squares of the speeds at its ends [mm²/s²]; None at a cusp, where the speed is 0
-    whatever p is.
+    for every p.
     """
 
     first: int
@@ -68,12 +68,12 @@ class Subrun:
 class Mesh:
     """The n cells of a subrun.
 
-    Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,). At PLACES: `slope` q' and
-    `bend` q'' (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's
-    and the chord error's limit that is used, squared, per p, `way` (places, n, joints) of the joints from the
-    start of the cell. `gain` (n,) is p at the start of the cell over p at the end of the cell before, and
-    `cap` (n + 1,) the greatest p in the stations, at the end of the cell before (of the cell after in the
-    first station). `fixed` holds p at both ends of the subrun where it is given.
+    For each cell: `piece`; `ends` (2, n) its parameter u at both ends; `width` (n,) their difference. At
+    PLACES: `slope` q' and `bend` q'' (places, n, joints), `speed` (places, n, joints + 2) the squared use per
+    p of the limits of velocity, feed and chord error, `way` (places, n, joints) the displacement of the
+    joints from the start of the cell. `gain` (n,) is p at the start of the cell divided by p at the end of
+    the cell before. `cap` (n + 1,) is the greatest p at the stations, in the parameter of the cell before (at
+    the first station: of the cell after). `fixed` is the given p at both ends of the subrun, or None.
     """
 
     piece: Integers
@@ -92,7 +92,7 @@ class Mesh:
 
     @property
     def turn(self) -> Floats:
-        """The change of q' within each cell over its greatest size there (n,)."""
+        """The change of q' within each cell divided by the greatest |q'| there (n,)."""
         change = np.linalg.norm(self.slope[-1] - self.slope[0], axis=1)
         return np.asarray(change / np.linalg.norm(self.slope, axis=2).max(axis=0))
 
@@ -125,7 +125,7 @@ def subruns(problem: Problem) -> Iterator[list[Subrun]]:
 
 @dataclass(frozen=True)
 class Cuts:
-    """The cells of a subrun: `piece` of each (n,), and the shares of it where the cell begins and ends."""
+    """The cells of a subrun: `piece` of each (n,), and its fractions at which the cell begins and ends."""
 
     piece: Integers
     lower: Floats
@@ -135,7 +135,7 @@ class Cuts:
         return len(self.piece)
 
     def bisected(self, marked: Flags) -> Cuts:
-        """The same with the `marked` cells (n,) cut in two."""
+        """These cells, with the `marked` ones (n,) cut in two."""
         count = 1 + marked.astype(np.int64)
         lower, upper = np.repeat(self.lower, count), np.repeat(self.upper, count)
         second = (np.cumsum(count) - 1)[marked]
@@ -144,9 +144,9 @@ class Cuts:
 
 
 def even_cuts(subrun: Subrun, cells: int) -> Cuts:
-    """The same number of `cells` in each piece, of one width but for pieces next to a stop.
+    """The given number of `cells` in each piece, of equal width except in pieces next to a stop.
 
-    There the width of cells grows with the distance from the stop, because the time is least smooth there.
+    There the width of cells grows with the distance from the stop, where the speed is least smooth.
     """
     pieces = np.arange(subrun.first, subrun.last)
     even = np.arange(cells + 1) / cells
@@ -164,9 +164,9 @@ def even_cuts(subrun: Subrun, cells: int) -> Cuts:
 
 
 def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
-    """The cells of a subrun with the limits in them.
+    """The mesh of a subrun, with the limits at the places of its cells.
 
-    Raises InfeasibleError where a given end speed is above what holds at that place.
+    Raises InfeasibleError where a given speed at an end exceeds the limits at that place.
     """
     piece, lower, upper = cuts.piece, cuts.lower, cuts.upper
     local = lower + (upper - lower) * PLACES[:, None]
@@ -204,7 +204,7 @@ def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
 
 
 def _chord_speed_square(problem: Problem, piece: Integers, u: Floats) -> Floats:
-    """(2/T)²·(2ρδ − δ²) at places (m,), ρ being the radius of curvature of the tool's path, at least δ."""
+    """(2/T)²·(2ρδ − δ²) at places (m,) [mm²/s²]; ρ ≥ δ is the radius of curvature of the tool's path."""
     if not np.isfinite(problem.chord_tolerance):
         return np.full(len(u), np.inf)
     _, tangent, second = (problem.tip_curve or problem.path.curve).evaluate(piece, u, 2)
@@ -213,6 +213,6 @@ def _chord_speed_square(problem: Problem, piece: Integers, u: Floats) -> Floats:
     across = np.linalg.norm(second - along[:, None] * tangent, axis=1)
     tolerance = problem.chord_tolerance
     radius = np.where(across > 0.0, square / np.where(across > 0.0, across, 1.0), np.inf)
-    # Where the tool stands still, while other axes turn, it has no chord.
+    # Where the tool stands still while other axes turn, there is no chord error.
     radius = np.where(square > 0.0, np.maximum(radius, tolerance), np.inf)
     return np.asarray((2.0 / problem.period) ** 2 * tolerance * (2.0 * radius - tolerance))

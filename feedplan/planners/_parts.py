@@ -1,6 +1,6 @@
-"""A problem in parts that are planned apart: every run begins and ends at rest, so runs do not interact.
+"""Divides a problem into parts that are planned apart: runs begin and end at rest, and do not interact.
 
-The joined profiles of the parts are equal to the profile of the whole bit for bit.
+The joined profiles of the parts equal the profile of the whole problem bit for bit.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ class Elsewhere(Protocol):
     """An executor that does parts of the work in place of this process."""
 
     def count(self) -> int:
-        """The number of parts that keeps the executor busy."""
+        """The number of parts that keeps all workers of the executor busy."""
 
     def map(
         self, work: Callable[..., Any], given: Sequence[tuple[Any, ...]], progress: Listener | None
     ) -> list[Any]:
-        """What `work(*arguments, progress)` returns for each of the arguments that are given."""
+        """The results of `work(*arguments, progress)` for each element of `given`."""
 
 
-# The fields of a problem that kernels take: with a value for each piece, and those that all parts share.
+# The fields of a problem that kernels take: with a value for each piece, and common to all parts.
 _OF_EACH_PIECE = ("curve", "tip_speed", "way_speed", "tip_curve", "feed_share", "feed")
 _SHARED = (
     "max_velocity",
@@ -49,9 +49,9 @@ _SHARED = (
 
 @dataclass(frozen=True)
 class Part:
-    """The runs of a problem from the `run`-th to before the `end_run`-th; the `first` is their first piece.
+    """The runs `run` to before `end_run` of a problem; `first` is the index of their first piece.
 
-    `given` has the fields of a `Problem` that kernels take, for these runs alone.
+    `given` has the fields of a `Problem` that kernels take, only for these runs.
     """
 
     run: int
@@ -61,12 +61,12 @@ class Part:
 
     @cached_property
     def native(self) -> NativeProblem:
-        """The part as kernels take it."""
+        """The part in the form that the native kernels take."""
         return NativeProblem(self.given)
 
 
 def parts(problem: Problem, count: int) -> list[Part]:
-    """The problem in at most `count` parts of about equally many pieces; a run stays whole."""
+    """The problem in at most `count` parts with about equal numbers of pieces; runs are not divided."""
     runs = problem.path.runs
     wanted = np.linspace(0, runs[-1], count + 1)[1:-1]
     cuts = np.unique([0, *np.searchsorted(runs, wanted), len(runs) - 1])
@@ -94,7 +94,7 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
 
 
 def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, Floats]]) -> SpeedProfile:
-    """The profile of the whole from those of the parts, and the excess of their runs."""
+    """The profile of the whole problem from the profiles of the parts and the excess of their runs."""
     profiles, excess = zip(*planned, strict=True)
     whole = [slice(0, len(profile.runs) - 1) for profile in profiles]
     return joined_runs(
@@ -105,6 +105,6 @@ def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, Floats]]) 
 
 
 def fault_of(part: Part, arguments: tuple[Any, ...]) -> PlanError:
-    """The fault of a part with the piece of the whole, from the arguments of a PlanError."""
+    """A part's PlanError, from its arguments, with the index of the piece in the whole problem."""
     kind, piece, reachable, sentence = arguments
     return PlanError(kind, None if piece is None else piece + part.first, reachable, sentence)

@@ -1,9 +1,9 @@
-"""The blocks that a controller knows ahead of the tool, and its own limits along the path.
+"""The blocks that a controller knows ahead of the tool, and the controller's own limits along the path.
 
-Controllers hold some blocks, lines that arcs are chopped into as well, and can stop at the end of the last
-one. With the blocks behind the one in motion, of lengths L and accelerations a, that is v² ≤ Σ 2 a L at its
-end (grbl, `planner.c`: the last block is planned to a stop; LinuxCNC, `tp.c`: `tpRunOptimization` goes back
-by ARC_BLEND_OPTIMIZATION_DEPTH segments).
+Controllers hold a number of blocks (also the lines into which arcs are divided), and must be able to stop at
+the end of the last one. If the blocks after the one in motion have lengths L and accelerations a, the speed
+at the end of the one in motion is limited to v² ≤ Σ 2 a L (grbl, `planner.c`: the last block is planned to a
+stop; LinuxCNC, `tp.c`: `tpRunOptimization` goes back by ARC_BLEND_OPTIMIZATION_DEPTH segments).
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from feedplan.planners._segments import Segments
 
 @dataclass(frozen=True)
 class Chords:
-    """How arcs are chopped into lines: `tolerance` [mm] off the arc, or of `length` [mm]."""
+    """How arcs are divided into lines: `tolerance` [mm] from the arc, or of `length` [mm] each."""
 
     tolerance: float | None = None
     length: float | None = None
 
-    # The largest turn from chord to chord is a right angle.
+    # The direction turns by at most a right angle from chord to chord.
     _HALF_TURN = 0.25 * math.pi
 
     def half_turn(self, radius: Floats) -> Floats:
-        """Half the angle that a chord takes of a circle of `radius` (m,) [mm]."""
+        """Half the angle [rad] of a chord on a circle of `radius` (m,) [mm]."""
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.tolerance is not None:
                 half = 2.0 * np.arcsin(np.minimum(np.sqrt(0.5 * self.tolerance / radius), 1.0))
@@ -39,7 +39,8 @@ class Chords:
         return np.minimum(half, self._HALF_TURN)
 
     def count(self, parts: Segments) -> Floats:
-        """How many chords each part has (m,), 1 on a line."""
+        """The number of chords of each part (m,), not rounded; 1 on a line, 0 on parts of curves without
+        curvature."""
         bent = np.isfinite(parts.radius)
         each = np.full(len(parts), np.inf)
         each[bent] = 2.0 * parts.radius[bent] * self.half_turn(parts.radius[bent])
@@ -48,13 +49,13 @@ class Chords:
 
 @dataclass(frozen=True)
 class Queue:
-    """The path as one controller has it.
+    """The blocks that a controller knows, and its limits along the path.
 
-    `ahead`: blocks known behind the one in motion (None: all). `chords` are the blocks of curves; without
-    them a whole piece is a block. `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the
-    path. `part` (pieces,) is the share of the acceleration along the path that each piece has (None: all).
-    `least_time` [s]: no block of the program takes less. `cruise`: the part of the way between speeding up
-    and slowing down that has one speed (Klipper's minimum_cruise_ratio).
+    `ahead`: number of blocks known after the one in motion (None: all). `chords` divides curves into blocks;
+    without it a whole piece is a block. `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along
+    the path. `part` (pieces,) is the share of the acceleration along the path that each piece may use (None:
+    all of it). `least_time` [s]: the least duration of a block of the program. `cruise`: the share of the
+    distance between speeding up and slowing down that has constant speed (Klipper's minimum_cruise_ratio).
     """
 
     ahead: int | None = None
@@ -66,8 +67,8 @@ class Queue:
     part: Floats | None = None
 
     def limited(self, parts: Segments, block: Integers) -> Segments:
-        """The segments with the speeds that `least_time` and the accelerations that `part` leave; `block`
-        (pieces,) are a piece's own."""
+        """The segments with speeds lowered by `least_time` and accelerations lowered by `part`; `block`
+        (pieces,) is the block that each piece belongs to."""
         if self.part is not None:
             share = self.part[parts.piece]
             parts = replace(parts, slope=share * parts.slope, value=share * parts.value)
@@ -78,7 +79,8 @@ class Queue:
         return replace(parts, speed=np.minimum(parts.speed, length / self.least_time))
 
     def known(self, parts: Segments, at_end: Floats) -> tuple[Segments, Floats]:
-        """Segments and speeds at their ends (m + 1,) [mm/s] that let the tool stop in what is known."""
+        """Segments and speeds at their ends (m + 1,) [mm/s] with which the tool can stop within known
+        blocks."""
         gain = parts.slope * (parts.u1 - parts.u0)
         braking = gain[1]
         if self.ahead is not None:
@@ -107,10 +109,10 @@ class Queue:
         return np.where((whole > 0.0)[parts.piece], scaled, share)
 
     def _smoothed(self, gain: Floats, at_end: Floats) -> Floats:
-        """The greatest speed of each part (m,) where less acceleration leaves room for an even speed.
+        """The greatest speed of each part (m,) [mm/s] that leaves room for a constant speed (`cruise`).
 
-        Klipper (`toolhead.py`): with accelerations of (1 − cruise) of the real ones, each hill between two
-        least speeds has a peak, and nothing in the hill is faster.
+        Klipper (`toolhead.py`): with accelerations multiplied by 1 − cruise, each hill between two minima of
+        the speed has a peak; this peak is the greatest speed in the hill.
         """
         up, down = (1.0 - self.cruise) * gain
         columns = (np.stack([way, 0.0 * way, 0.0 * way], axis=1) for way in (up, down))
@@ -126,8 +128,8 @@ class Queue:
 
 
 def along_path(name: str, given: float | None, unit: str) -> float:
-    """The greatest velocity or acceleration along the path, infinite where none is given; raises InputError
-    unless it is positive."""
+    """The greatest velocity or acceleration along the path; None: infinite. Raises InputError unless
+    positive."""
     if given is None:
         return math.inf
     return number(given, f"the greatest {name} along the path", f"a positive number [{unit}]", positive, unit)

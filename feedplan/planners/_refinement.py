@@ -1,11 +1,12 @@
-"""Planning by a solver on meshes: each subrun on finer and finer meshes until the time is accurate enough.
+"""Plans with a solver: each subrun is solved on finer and finer meshes until its time is accurate enough.
 
-The fastest profile is at some limit everywhere. Cells whose arcs are below all limits, or whose rows are
-stricter than the limits, lose the most time: these cells are cut in two.
+The fastest profile reaches some limit everywhere. Most time is lost in cells whose arcs reach no limit, or
+whose rows are stricter than the limits: these cells are bisected.
 
-On each mesh the solution is checked between the stations. Where an arc exceeds a limit that its rows keep,
-the limit is lowered by the excess and the subrun is solved again. After some rounds p is scaled down by the
-rest, which keeps every limit. So the result is feasible, and its time approaches the least time from above.
+On each mesh the solution is checked between the stations. Where an arc exceeds a limit although its rows keep
+it, the limit is lowered by the excess and the subrun is solved again. After some rounds p is scaled down by
+the remaining excess, so that every limit holds. So the result is feasible, and its time approaches the least
+time from above.
 """
 
 from __future__ import annotations
@@ -29,53 +30,53 @@ from feedplan.planners._mesh import Cuts, Mesh, Subrun, even_cuts, mesh, subruns
 from feedplan.planners._transcription import Rows, Transcription, transcribe
 from feedplan.profile import SpeedProfile
 
-# The least numbers of cells of the first mesh in a piece, and in a subrun.
+# The least number of cells of the first mesh in a piece (`_LEAST`), and in a subrun (`_FIRST`).
 _LEAST, _FIRST = 4, 32
 # The greatest number of cells of a subrun: solvers need about 10 kB for each.
 MAX_CELLS = 400_000
-# The greatest number of cells a piece that a user may ask for.
+# The greatest number of cells for each piece that a user may request.
 _MOST_CELLS = 1_000_000_000
-# How many times limits are lowered where arcs exceed them, more times where given speeds at the ends forbid
-# scaling; and the excess that scaling may remove. The audit allows 1e-6.
+# How many times limits are lowered where arcs exceed them: `_ROUNDS`, or `_MOVING_ROUNDS` if given speeds at
+# the ends forbid scaling. `_EXCESS` is the excess that scaling may remove; the audit allows 1e-6.
 _ROUNDS = 3
 _MOVING_ROUNDS = 8
 _EXCESS = 5e-7
-# A cell that exceeds a lowered limit by more than this share has its limits at both ends instead.
+# A cell that exceeds a lowered limit by more than this share gets rows at both its ends instead.
 _STUBBORN = 1e-4
-# A limit that holds at both ends of a cell costs time where more than this share of it is used.
+# Rows at both ends of a cell cost time where more than this share of the limit is used.
 _NEAR = 0.9
-# The cells that make this share of the error are cut.
+# The cells that cause this share of the error are bisected.
 _SHARE = 0.9
-# The factor of the error from one mesh to the next, at best and at worst.
+# The error of a mesh over that of the mesh before it, at best and at worst.
 _FALLS = 0.25, 0.7
-# The estimate of the error may be half the error.
+# The estimated error may be this share of the true error.
 _SAFETY = 0.5
-# The error is at most about this share of the time in which no limit is used in full.
+# The error is at most about this share of the time in which no limit is fully used.
 _TRUE = 0.35
-# Covers rounding, and excess between the places that are checked.
+# Margin for rounding, and for excess between the places that are checked.
 _MARGIN = 1e-9
 
 
 class Refusal(Exception):  # noqa: N818 (its handler makes the error of it)
-    """A solver ended without a solution: its own word, and whether it proved that no solution exists."""
+    """A solver ended without a solution: its own word, and whether it proved that there is none."""
 
     def __init__(self, word: str, infeasible: bool = False) -> None:
         super().__init__(word)
         self.infeasible = infeasible
 
 
-# From a transcription and a time limit [s] to x in its stations; raises Refusal.
+# Returns x at the stations for a transcription and a time limit [s]; raises Refusal.
 Solve = Callable[[Transcription, float], Floats]
 
 
 @dataclass(frozen=True)
 class Method:
-    """A solver of a package.
+    """A solver from a package.
 
-    `rows` gives the rows of a mesh from limits (n, joints) and from the cells whose limits hold at both ends
-    (n,). `by_axis`: arcs may have a constant joint acceleration. `feasible`: the result keeps limits between
-    the stations. `platform`: the only one that the package exists for, if any. `others`: packages that it
-    needs besides.
+    `rows` makes the rows of a mesh from limits (n, joints) and from the cells whose limits hold at both ends
+    (n,). `by_axis`: arcs may have a constant joint acceleration. `feasible`: the result must keep limits
+    between the stations. `platform`: the only platform with this package, if any. `others`: further packages
+    that it needs.
     """
 
     name: str
@@ -87,14 +88,14 @@ class Method:
     others: tuple[str, ...] = ()
 
     def require(self) -> None:
-        """Raises MissingPackageError where its packages cannot be imported."""
+        """Raises MissingPackageError if one of its packages cannot be imported."""
         for package in (self.name, *self.others):
             self._require(package)
 
     def _require(self, package: str) -> None:
         try:
             with warnings.catch_warnings():
-                # The docstrings of toppra hold escapes that Python warns of.
+                # The docstrings of toppra contain escapes that cause Python warnings.
                 warnings.simplefilter("ignore")
                 importlib.import_module(package)
         except ImportError:
@@ -111,7 +112,7 @@ def plan_on_meshes(
     cells: int | None,
     time_limit: float | None,
 ) -> SpeedProfile:
-    """The profile of all runs: on `cells` cells a piece, or on meshes refined to the relative `accuracy`."""
+    """The profile of all runs: with `cells` cells a piece, or on meshes refined to relative `accuracy`."""
     remedy = "a part of the time between 0 and 1, as 1e-4"
     accuracy = number(accuracy, "the accuracy", remedy, lambda part: 0.0 < part < 1.0)
     if cells is not None and not is_whole(cells, most=_MOST_CELLS):
@@ -133,8 +134,9 @@ def plan_on_meshes(
 
 @dataclass(frozen=True)
 class _Strictness:
-    """How much stricter than the limits the rows are: parts of the `acceleration` (n, joints) and of p in the
-    stations, `speed` (n + 1,); and which cells are held `at_ends` (n,). `repeated` after the first time."""
+    """How much stricter than the limits the rows are: factors of the `acceleration` limits (n, joints) and of
+    p at the stations, `speed` (n + 1,); and which cells have rows at both ends, `at_ends` (n,). `repeated` is
+    true from the second time on."""
 
     acceleration: Floats
     speed: Floats
@@ -147,7 +149,7 @@ class _Strictness:
         return cls(np.ones((cells, len(problem.axes))), np.ones(cells + 1), np.zeros(cells, dtype=bool))
 
     def tightened(self, arcs: Arcs) -> _Strictness:
-        """Lower limits where arcs exceed them; a cell that exceeds them again has limits at its ends."""
+        """Lowers limits where arcs exceed them; a cell that exceeds them again gets rows at its ends."""
         stubborn = self.repeated & (arcs.acceleration.max(axis=1) > 1.0 + _STUBBORN) & ~self.at_ends
         acceleration = self.acceleration / _excess(arcs.acceleration)
         acceleration[stubborn] = 1.0
@@ -157,12 +159,12 @@ class _Strictness:
 
     @property
     def share(self) -> Floats:
-        """The share of the accelerations that is not used (n,)."""
+        """The greatest share of an acceleration limit that the rows leave unused in each cell (n,)."""
         return np.asarray(1.0 - self.acceleration.min(axis=1))
 
 
 def _excess(used: Floats) -> Floats:
-    """The factor by which a limit has to be lowered, 1 where it is kept."""
+    """The divisor that lowers a limit, 1 where it is kept."""
     return np.where(used > 1.0, used * (1.0 + _EXCESS), 1.0)
 
 
@@ -211,7 +213,7 @@ class _Planner:
             )
 
     def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Floats]:
-        """The solution on one mesh, and the time (n,) lost by keeping the limits between the stations."""
+        """The mesh, its solution, and the time (n,) [s] lost by keeping the limits between the stations."""
         grid = mesh(self.problem, self.subrun, cuts)
         moving = any(p is not None and p > 0.0 for p in grid.fixed)
         strict = _Strictness.none(grid, self.problem)
@@ -226,7 +228,7 @@ class _Planner:
             try:
                 arcs, rows = self._under(strict, grid)
             except InfeasibleError:
-                break  # the given speeds at the ends need the whole limits
+                break  # the given speeds at the ends need the full limits
             if arcs.feasible_time < best[0].feasible_time:
                 best = arcs, rows, strict
         arcs, rows, strict = best
@@ -234,7 +236,7 @@ class _Planner:
         held = (rows.held & (arcs.acceleration > _NEAR)).any(axis=1)
         lost = arcs.duration * (strict.share + np.where(held, grid.turn, 0.0))
         lost += arcs.duration.sum() * np.maximum(arcs.worst - (1.0 + _EXCESS), 0.0)
-        # Speeds given at the ends cannot be scaled: a finer mesh has to remove the excess.
+        # Given speeds at the ends cannot be scaled: a finer mesh has to remove the excess.
         return grid, arcs if moving else arcs.scaled((1.0 - _MARGIN) / max(worst, 1.0)), lost
 
     def _under(self, strict: _Strictness, grid: Mesh) -> tuple[Arcs, Rows]:
@@ -272,7 +274,7 @@ class _Planner:
 
 
 def _greatest(parts: Floats) -> Flags:
-    """The greatest of the parts (n,) that together are the share `_SHARE` of the sum."""
+    """Marks the greatest of the `parts` (n,), as many as make the share `_SHARE` of the sum."""
     order = np.argsort(-parts)
     enough = int(np.searchsorted(np.cumsum(parts[order]), _SHARE * parts.sum())) + 1
     marked = np.zeros(len(parts), dtype=bool)
@@ -281,9 +283,9 @@ def _greatest(parts: Floats) -> Flags:
 
 
 def _left(times: list[float]) -> float:
-    """The estimated fall of the time on all finer meshes.
+    """Estimates by how much all finer meshes together reduce the time [s].
 
-    The ratio of the last two falls gives the sum of a geometric series.
+    It is the sum of a geometric series with the ratio of the last two reductions.
     """
     before, last = (abs(times[-i] - times[-i - 1]) for i in (2, 1))
     ratio = min(max(last / before, _FALLS[0]), _FALLS[1]) if before > 0.0 else _FALLS[1]

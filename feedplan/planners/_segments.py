@@ -1,4 +1,5 @@
-"""A path in segments as controllers see it: each has one greatest speed and one acceleration each way."""
+"""Divides a path into segments as controllers see it: each has one greatest speed and one acceleration in
+each direction."""
 
 from __future__ import annotations
 
@@ -21,9 +22,9 @@ from feedplan.profile import NO_AXIS
 
 class CurvePlaces(NamedTuple):
     """Places of a curved path: unit `tangent` and unit `normal` (m, axes), the normal 0 where the path is
-    straight; the `limits` of the axes' accelerations (2, axes) [mm/s²], upward and downward as sizes; the
-    `radius` (m,) [mm], infinite where the path is straight; the `speed` (m,) [mm/s] that feed and axis
-    velocities allow."""
+    straight; the `limits` of the axes' accelerations (2, axes) [mm/s²] in positive and negative direction, as
+    absolute values; the `radius` of curvature (m,) [mm], infinite where the path is straight; the `speed`
+    (m,) [mm/s] that feed and axis velocities allow."""
 
     tangent: Floats
     normal: Floats
@@ -32,48 +33,50 @@ class CurvePlaces(NamedTuple):
     speed: Floats
 
 
-# The greatest accelerations along the path, of speeding up and of slowing down (2, m), and across it (m,)
-# [mm/s²].
+# Returns the greatest accelerations along the path for speeding up and slowing down (2, m), and across it
+# (m,) [mm/s²].
 Rule = Callable[[CurvePlaces], tuple[Floats, Floats]]
 
-# A curved piece is cut into even parts: on each the direction, and ln |C'|, change by STEP in the mean. Parts
-# on which one of them changes by more than 2 STEP, as beside a cusp, are cut again, CUTS times at most.
+# A curved piece is cut into equal parts, so that direction and ln |C'| change by STEP on average in each.
+# Parts in which one of them changes by more than 2 STEP, as next to a cusp, are cut again, at most CUTS
+# times.
 STEP, CUTS = 0.1, 20
 
-# Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
-# limits of acceleration and chord error between two places differ from theirs by the order of STEP²/16 of
-# themselves. Those of the velocity are followed between the places (`_between`).
+# Places of a part at which its limits are evaluated, as fractions of it. On a circle this is exact; elsewhere
+# the limits of acceleration and chord error between two places differ from those at the places by a relative
+# error of about STEP²/16. Velocity limits are also followed between the places (`_between`).
 PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-# Those of Boole's rule, for a mean over a part.
+# The weights of Boole's rule, for the mean over a part.
 WEIGHTS = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0
 
-# Values at finer places of the polynomial through the values at PLACES, and the least share by which a speed
-# is lowered for what happens between the places: rounding of the polynomial on a circle is less.
+# FINER: matrix from values at PLACES to values of their polynomial at 17 places. LOWERED: speeds are lowered
+# for values between the places only by more than this share; on a circle, rounding of the polynomial is less.
 FINER = np.vander(np.linspace(0.0, 1.0, 17), 5) @ np.linalg.inv(np.vander(PLACES, 5))
 LOWERED = 2e-7
 
-# Places at which the turn of a whole piece is measured.
+# Places at which the change of direction over a whole piece is measured.
 SURVEY = np.linspace(0.0, 1.0, 9)
 
-# Greatest speeds of parts of a piece that differ by less than this share are made equal.
+# Speed limits of parts of a piece that differ by less than this share are made equal.
 ONE_SPEED = 1e-9
 
 # A place is a cusp where |C'| is at most this share of its greatest value on the piece.
 CUSP = 1e-9
 
-# On a line edges between control points differ by at most this share of an edge, and this many roundings.
+# On a line, edges between control points differ by at most UNEVEN times an edge plus ROUNDINGS units in the
+# last place.
 UNEVEN, ROUNDINGS = 1e-9, 8.0
 
 
 @dataclass(frozen=True)
 class Segments:
-    """Lines, and parts of curved pieces, in the order of the path.
+    """The segments (lines, and parts of curved pieces) in the order of the path.
 
-    `piece`, `u0`, `u1` (m,) say which; `rate` (m,) is |C'|, constant on lines, NaN on curves. `speed`
-    (m,) [mm/s] is the greatest; `slope` (2, m) the greatest change of v² by u [mm/s²·|C'|] where the path
-    speeds up and where it slows down. On lines `axis` (2, m) is the one whose acceleration limit that is,
-    `value` (2, m) [mm/s²] its acceleration then; NO_AXIS and 0 on curves. `length` (m,) [mm], of curves to
-    some digits, and `radius` (m,) [mm] the least, infinite on lines.
+    `piece`, `u0`, `u1` (m,) are the range of each segment; `rate` (m,) is |C'|, constant on lines, NaN on
+    curves. `speed` (m,) [mm/s] is the greatest speed; `slope` (2, m) the greatest d(v²)/du [mm/s²·|C'|] for
+    speeding up and slowing down. On lines `axis` (2, m) is the axis that limits the acceleration, `value` (2,
+    m) [mm/s²] its acceleration then; on curves NO_AXIS and 0. `length` (m,) [mm] is approximate on curves,
+    and `radius` (m,) [mm] the least radius of curvature, infinite on lines.
     """
 
     piece: Integers
@@ -94,11 +97,11 @@ class Segments:
 def segments(
     problem: Problem, rule: Rule, velocity: float = math.inf, acceleration: float = math.inf
 ) -> Segments:
-    """The path of a problem in segments, accelerations by `rule`.
+    """The segments of a problem's path, with accelerations by `rule`.
 
-    `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the path, whatever the axes allow.
-    Speeds are limited by feed, axis velocities and, on curves, chord error and the acceleration across.
-    Raises SolverError at cusps, and where the joints move in another way than the path's axes.
+    `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the path, in addition to the limits of
+    the axes. Speeds are limited by feed, axis velocities and, on curves, chord error and the acceleration
+    across. Raises SolverError at cusps, and where the joints are not the path's axes.
     """
     if problem.joints is not None:
         raise SolverError(
@@ -119,14 +122,14 @@ def segments(
 
 
 def is_line(curve: CompositeCurve) -> Flags:
-    """(n,) which pieces are lines at constant |C'|, as the path builder makes them."""
+    """Whether each piece (n,) is a line with constant |C'|, as the path builder makes them."""
     control, first = curve.control_points, curve.offsets[:-1]
     edge = np.diff(control, axis=0)
     own = np.repeat(np.arange(len(curve)), curve.degree + 1)[:-1]
     uneven = np.abs(edge - edge[first][own]).max(axis=1, initial=0.0)
     size = UNEVEN * np.abs(edge[first]).max(axis=1)
     size += ROUNDINGS * np.finfo(float).eps * np.abs(control[first]).max(axis=1)
-    # The step from one piece to the next is no edge.
+    # The difference from one piece to the next is no edge.
     uneven[curve.offsets[1:-1] - 1] = 0.0
     line = np.maximum.reduceat(np.append(uneven, 0.0), first) <= size
     return np.asarray(line & ~curve.rational)
@@ -138,7 +141,7 @@ def _lines(problem: Problem, piece: Integers, acceleration: float) -> Segments:
     length = np.linalg.norm(way, axis=1)
     _refuse(problem, piece[length == 0.0], "the piece has no length: leave it out")
     tangent = way / length[:, None]
-    # Speeding up and slowing down.
+    # Rows: speeding up, slowing down.
     change = np.stack([tangent, -tangent])
     by_axis = _over(problem.limit("acceleration", change), np.abs(change))
     axis = by_axis.argmin(axis=2)[..., None]
@@ -187,9 +190,9 @@ def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float)
     shape = (-1, len(PLACES))
     speed = _between(problem, tangent.reshape(*shape, tangent.shape[1]), _least(speed.reshape(shape)))
     if problem.feed_share is not None:
-        # Between the places the axes that the feed counts along may have more of the speed.
+        # Between the places, the axes along which the feed counts may have a larger share of the speed.
         speed = np.minimum(speed, feed_between(problem, piece, u0, u1))
-    # On a circle the parts differ by rounding only: they get one speed.
+    # On a circle the speed limits of the parts differ only by rounding: they get one value.
     first = np.flatnonzero(np.diff(piece, prepend=-1))
     least = np.repeat(np.minimum.reduceat(speed, first), np.diff(first, append=len(piece)))
     speed = np.where(speed <= least * (1.0 + ONE_SPEED), least, speed)
@@ -208,14 +211,14 @@ def _curves(problem: Problem, pieces: Integers, rule: Rule, acceleration: float)
 
 
 def in_direction(limits: Floats, direction: Floats) -> Floats:
-    """The greatest multiples (m,) of directions (m, axes) that the limits (2, axes) allow."""
+    """The greatest factors (m,) of directions (m, axes) that the limits (2, axes) allow."""
     with np.errstate(divide="ignore"):
         by_axis = np.where(direction < 0.0, limits[1], limits[0]) / np.abs(direction)
     return _least(by_axis)
 
 
 def both_ways(limits: Floats, direction: Floats) -> Floats:
-    """The greatest multiples (2, m) that the limits allow of directions (m, axes), and of their opposites."""
+    """The greatest factors (2, m) that the limits allow of directions (m, axes), and of their opposites."""
     size, back = np.abs(direction), direction < 0.0
     with np.errstate(divide="ignore"):
         high, low = limits[0] / size, limits[1] / size
@@ -223,7 +226,7 @@ def both_ways(limits: Floats, direction: Floats) -> Floats:
 
 
 def _least(values: Floats) -> Floats:
-    """The least along the last axis, which is short: faster one by one."""
+    """The least along the last axis, which is short: column by column it is faster in NumPy."""
     return reduce(np.minimum, np.moveaxis(values, -1, 0))
 
 
@@ -237,7 +240,7 @@ def _at(
 ) -> tuple[Floats, Floats]:
     """|C'| and unit tangents at places of parts (m, places).
 
-    Raises SolverError at cusps, where |C'| is 0 or far below `fastest` (n,), that of each piece.
+    Raises SolverError at cusps, where |C'| is 0 or far below `fastest` (n,), the greatest |C'| of each piece.
     """
     piece, u0, u1 = parts
     _, first = problem.curve.evaluate(np.repeat(piece, len(places)), _places(u0, u1, places).ravel(), 1)
@@ -249,14 +252,15 @@ def _at(
 
 
 def _counts(rate: Floats, tangent: Floats, most: float) -> Integers:
-    """Into how many parts each part is to be cut: 1 where it changes by no more than `most`."""
+    """The number of parts into which each part is to be cut: 1 where its direction and ln |C'| change by at
+    most `most`."""
     turn = np.linalg.norm(np.diff(tangent, axis=1), axis=2).sum(axis=1)
     change = np.maximum(turn, np.abs(np.diff(np.log(rate), axis=1)).sum(axis=1))
     return np.where(change > most, np.ceil(change / STEP), 1.0).astype(np.int64)
 
 
 def _cut(piece: Integers, u0: Floats, u1: Floats, count: Integers) -> tuple[Integers, Floats, Floats]:
-    """Parts cut evenly. The end of a part is the start of the next to the last digit."""
+    """Parts cut into equal parts. The end of a part equals the start of the next exactly."""
     number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     start, end, parts = np.repeat(u0, count), np.repeat(u1, count), np.repeat(count, count)
     at = start + np.stack([number, number + 1]) / parts * (end - start)
@@ -264,7 +268,7 @@ def _cut(piece: Integers, u0: Floats, u1: Floats, count: Integers) -> tuple[Inte
 
 
 def _speed(problem: Problem, piece: Integers, tangent: Floats) -> Floats:
-    """The least of feed and what the axis velocities allow in a direction."""
+    """The smaller of the feed and the speed that the axis velocities allow in a direction [mm/s]."""
     by_axis = in_direction(problem.limits("velocity"), tangent)
     feed = problem.feed[piece]
     if problem.feed_share is not None:
@@ -273,7 +277,7 @@ def _speed(problem: Problem, piece: Integers, tangent: Floats) -> Floats:
 
 
 def _chord_speed(problem: Problem, radius: Floats) -> Floats:
-    """(2/T)·√(2ρδ − δ²), below ρ = δ as there: no shorter way can leave its chord by δ."""
+    """(2/T)·√(2ρδ − δ²) [mm/s]; for ρ < δ as for δ: no shorter step can be δ away from its chord."""
     tolerance = problem.chord_tolerance
     if not np.isfinite(tolerance):
         return np.full(len(radius), np.inf)
@@ -282,10 +286,10 @@ def _chord_speed(problem: Problem, radius: Floats) -> Floats:
 
 
 def _between(problem: Problem, tangent: Floats, speed: Floats) -> Floats:
-    """The speeds (m,) of parts, lower where a velocity of an axis is greatest between the places.
+    """The speeds (m,) of parts, lowered where a velocity of an axis has its maximum between the places.
 
-    `tangent` (m, places, axes) has the directions at the places. The greatest part of a direction along an
-    axis is that of parabolas through three finer places.
+    `tangent` (m, places, axes) are the directions at the places. The greatest component of a direction along
+    an axis is the peak of parabolas through three finer places.
     """
     limits = problem.limits("velocity")
     with np.errstate(divide="ignore"):

@@ -1,12 +1,13 @@
-"""The planning problem of one subrun as numbers: p in the stations of a mesh, rows that hold in its cells.
+"""The planning problem of one subrun as a program in p at the stations of a mesh, with rows for its cells.
 
-In a cell whose joint k keeps its direction the mean of a_k over the way of joint k is exactly
+In a cell in which joint k keeps its direction, the mean of its acceleration a_k over its displacement Δq_k is
+exactly
 
     (q'_k(end)² p_end − q'_k(start)² p_start) / (2 Δq_k),
 
-linear in p, and a_k itself where the cell is passed with a_k constant. Limiting it gives second order in the
-width of the cells; limiting a_k at both ends of a cell with p linear in between loses an order, and is done
-only where a joint turns round inside the cell.
+which is linear in p, and equals a_k if a_k is constant in the cell. Limiting this mean is accurate to second
+order in the width of the cells. Limiting a_k at both ends of a cell, with p linear in between, is accurate
+only to first order; it is used only where a joint reverses inside the cell.
 """
 
 from __future__ import annotations
@@ -19,15 +20,17 @@ from feedplan.arrays import Flags, Floats, Integers
 from feedplan.lazy import cached_property
 from feedplan.planners._mesh import Mesh
 
-# A joint slower than this share of all joints together has its limits at both ends: its way may be rounding.
+# A joint slower than this share of the norm of all joints' speeds gets rows at both ends: its displacement
+# may be rounding.
 _SLOW = 1e-6
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows (r,) −`low` ≤ `near`·p_start + `far`·p_end ≤ 1 on the p of `cell` at its ends.
+    """Rows (r,) −`low` ≤ `near`·p_start + `far`·p_end ≤ 1, with p at the start and end of `cell`.
 
-    `held` (n, joints): the limit of a joint holds at both ends of the cell, which loses an order of accuracy.
+    `held` (n, joints): whether the limit of a joint is imposed at both ends of the cell, which loses an order
+    of accuracy.
     """
 
     cell: Integers
@@ -39,11 +42,11 @@ class Rows:
 
 @dataclass(frozen=True)
 class Transcription:
-    """Minimise Σ 2 width/(√p_start + √p_end) over the cells, with p = `scale`·x in the stations (n + 1,).
+    """Minimise Σ 2 width/(√p_start + √p_end) over the cells, with p = `scale`·x at the stations (n + 1,).
 
-    x is about 1 where p is greatest. `most` is the greatest x, `fixed` x at both ends of the
-    subrun where it is given. Per cell: `near`, `far` are √p_start and √p_end over √x, `width`.
-    `rows` are of x.
+    x is about 1 where p is greatest. `most` is the greatest x allowed, `fixed` the given x at both ends of
+    the subrun, or None. For each cell: `near` and `far` are √p_start/√x_start and √p_end/√x_end, `width` is
+    its width. `rows` are in x.
     """
 
     scale: Floats
@@ -61,21 +64,21 @@ class Transcription:
 
     @cached_property
     def free(self) -> Flags:
-        """The stations whose x the solver finds (n + 1,)."""
+        """Whether the solver has to find x at each station (n + 1,)."""
         free = np.ones(self.cells + 1, dtype=bool)
         free[[0, -1]] = [x is None for x in self.fixed]
         return free
 
     @cached_property
     def known(self) -> Floats:
-        """x in the stations where it is given, 0 elsewhere (n + 1,)."""
+        """x at the stations where it is given, 0 elsewhere (n + 1,)."""
         known = np.zeros(self.cells + 1)
         for station, x in zip((0, -1), self.fixed, strict=True):
             known[station] = x or 0.0
         return known
 
     def completed(self, found: Floats) -> Floats:
-        """x in all stations (n + 1,) from that in the free ones."""
+        """x at all stations (n + 1,) from x at the free ones."""
         x = self.known.copy()
         x[self.free] = found
         return x
@@ -84,16 +87,17 @@ class Transcription:
 def transcribe(
     mesh: Mesh, rows: Rows, acceleration: Floats, share: Floats, feasible: bool = True
 ) -> Transcription:
-    """The problem on a mesh; `acceleration` (2, joints) are the limits backward and forward as sizes, `share`
-    (n + 1,) of the greatest p is allowed in the stations.
+    """The problem on a mesh; `acceleration` (2, joints) are the limits in negative and positive direction as
+    absolute values, `share` (n + 1,) is the allowed share of the greatest p at the stations.
 
-    A `feasible` profile is nowhere faster in the stations than some acceleration of the parameter allows on
-    both sides.
+    If `feasible`, p at each station is at most the limit curve on both sides: the greatest p that some
+    acceleration of the parameter allows.
     """
     limit = np.append(_limit_curve(mesh, acceleration, 0)[:1], _limit_curve(mesh, acceleration, -1))
     limit[:-1] = np.minimum(limit[:-1], _limit_curve(mesh, acceleration, 0) / mesh.gain)
     scale = _reachable(mesh, rows, np.minimum(limit, mesh.cap))
-    # Where no limit holds, because all joints rest, and where p is 0 the scale is that of the neighbours.
+    # Where no limit holds, because all joints rest, and where p is 0, the scale is interpolated from the
+    # neighbours.
     endless = ~(np.isfinite(scale) & (scale > 0.0))
     if endless.any():
         where = np.flatnonzero(~endless)
@@ -113,16 +117,16 @@ def transcribe(
 
 
 def _reachable(mesh: Mesh, rows: Rows, greatest: Floats) -> Floats:
-    """The greatest p in the stations that the rows allow, one pass from each end of the subrun (n + 1,).
+    """The greatest p at the stations that the rows allow, by one pass from each end of the subrun (n + 1,).
 
-    A row with coefficients of both signs limits the growth of p from station to station, as near a stop.
+    A row with coefficients of opposite signs limits the growth of p from station to station, as near a stop.
     """
     bounds = np.flatnonzero((rows.near * rows.far <= 0.0) & (rows.near != 0.0) & (rows.far != 0.0))
     bounds = bounds[np.argsort(rows.cell[bounds], kind="stable")]
     first = np.searchsorted(rows.cell[bounds], np.arange(len(mesh) + 1)).tolist()
     near = np.abs(rows.near[bounds] * mesh.gain[rows.cell[bounds]]).tolist()
     far = np.abs(rows.far[bounds]).tolist()
-    # The bounds of a row as p grows, and as p falls.
+    # The right-hand sides of a row for growing p, and for falling p.
     low = rows.low[bounds]
     rise = np.where(rows.far[bounds] > 0.0, 1.0, low).tolist()
     fall = np.where(rows.near[bounds] > 0.0, 1.0, low).tolist()
@@ -139,9 +143,11 @@ def _reachable(mesh: Mesh, rows: Rows, greatest: Floats) -> Floats:
 
 
 def mean_rows(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
-    """The mean acceleration of every joint over its way, within ∓`limit` (2, n, joints) [mm/s²].
+    """Rows that keep the mean acceleration of every joint over its displacement within −`limit[0]` and
+    `limit[1]` (2, n, joints) [mm/s²].
 
-    In the cells `at_ends` (n,), and where a joint does not keep its direction, that at both ends.
+    In the cells `at_ends` (n,), and where a joint does not keep its direction, the acceleration at both ends
+    is limited instead.
     """
     size = np.linalg.norm(mesh.slope, axis=2).max(axis=0)
     sign = np.sign(mesh.way[-1])
@@ -163,8 +169,8 @@ def mean_rows(mesh: Mesh, limit: Floats, at_ends: Flags) -> Rows:
 
 
 def end_rows(mesh: Mesh, limit: Floats, chosen: Flags | None = None, ends: tuple[int, ...] = (0, -1)) -> Rows:
-    """a_k at `ends` of the cells with p linear in between, within ∓`limit` (2, n, joints), of `chosen`
-    joints."""
+    """Rows that keep a_k at the `ends` of the cells, with p linear in between, within −`limit[0]` and
+    `limit[1]` (2, n, joints), for the `chosen` joints (n, joints), by default all."""
     if chosen is None:
         chosen = np.ones(limit.shape[1:], dtype=bool)
     cell, joint = np.nonzero(chosen)
@@ -182,13 +188,13 @@ def end_rows(mesh: Mesh, limit: Floats, chosen: Flags | None = None, ends: tuple
 
 
 def _limit_curve(mesh: Mesh, acceleration: Floats, place: int) -> Floats:
-    """The greatest p that some acceleration of the parameter leaves within all limits, at one place of the
-    cells."""
+    """The limit curve at one place of the cells (n,): the greatest p for which some acceleration of the
+    parameter keeps all limits."""
     bend, tangent = mesh.bend[place], mesh.slope[place]
     best = np.full(len(mesh), np.inf)
 
     def most(k: int, factor: Floats) -> Floats:
-        """The greatest acceleration of a joint times a factor."""
+        """The greatest value of a_k·factor within the limits of joint k."""
         return np.asarray(np.where(factor < 0.0, acceleration[0, k], acceleration[1, k]) * np.abs(factor))
 
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -196,7 +202,7 @@ def _limit_curve(mesh: Mesh, acceleration: Floats, place: int) -> Floats:
             alone = most(j, np.sign(bend[:, j])) / np.abs(bend[:, j])
             best = np.fmin(best, np.where(tangent[:, j] == 0.0, alone, np.inf))
             for k in range(j):
-                # Without s: turn · p = a_j q'_k − a_k q'_j.
+                # Eliminating the parameter's acceleration s gives turn · p = a_j q'_k − a_k q'_j.
                 turn = bend[:, j] * tangent[:, k] - bend[:, k] * tangent[:, j]
                 room = most(j, np.sign(turn) * tangent[:, k]) + most(k, -np.sign(turn) * tangent[:, j])
                 best = np.fmin(best, np.where(turn != 0.0, room / np.abs(turn), np.inf))

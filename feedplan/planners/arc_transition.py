@@ -1,13 +1,13 @@
-"""Arc transition: an arc that touches both lines, within the tolerance, takes the place of each corner.
+"""Arc transition: trapezoids on a path where an arc within the tolerance replaces each corner of two lines.
 
 Source: Lv, Zhang, Yang & Ye, Study on the method of increasing turning velocity during CNC continuous
-machining, Manufacturing Technology & Machine Tool 2008(7), 79–83, known here by what Zhang et al. 2010
-say of it (sections 1 and 5). With the turn θ and the tolerance d the radius is d/(1/cos(θ/2) − 1), less
-where the lines are too short. On the arc the centripetal acceleration v²/r limits the speed, so that the
-axes keep their limits in every direction, the lesser ones of both where they differ by direction, and some
-tangential acceleration remains (`shared_acceleration`).
+machining, Manufacturing Technology & Machine Tool 2008(7), 79–83, as described by Zhang et al. 2010 (sections
+1 and 5). With the turn θ and the tolerance d the radius r is d/(1/cos(θ/2) − 1), less where the lines are too
+short. On the arc the centripetal acceleration v²/r limits the speed v, so that the axes keep their limits in
+every direction (the smaller one where they differ by direction) and a tangential acceleration remains
+possible (`shared_acceleration`).
 
-The arcs belong to the path (`Corners.ARCS`): other curves of a path are planned by the same rule.
+The arcs are part of the path (`Corners.ARCS`); other curves of the path are planned by the same rule.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The time-optimal profile by direct transcription: a nonlinear program in p at stations, solved by IPOPT.
 
-CasADi derives the Hessian of the time. The rows are linear in p, so the program is convex, and IPOPT finds
+CasADi computes the Hessian of the time. The rows are linear in p, so the program is convex, and IPOPT finds
 the optimum of the mesh.
 """
 
@@ -32,11 +32,11 @@ def plan(
     cells: int | None = None,
     time_limit: float | None = None,
 ) -> SpeedProfile:
-    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
-    piece.
+    """The fastest profile on a mesh: refined until the time has about the relative `accuracy`, or with
+    `cells` cells in each piece.
 
-    `time_limit` [s]. Raises SolverError with IPOPT's status, InfeasibleError where a given speed at an end
-    is not possible, MissingPackageError.
+    `time_limit` [s] limits the whole plan. Raises SolverError with IPOPT's status, InfeasibleError where a
+    given speed at an end is not possible, MissingPackageError.
     """
     return plan_on_meshes(problem, Method("casadi", _solve, mean_rows), accuracy, cells, time_limit)
 
@@ -51,7 +51,8 @@ def _solve(task: Transcription, seconds: float) -> Floats:
     root = casadi.sqrt(everywhere)
     n = task.cells
     pace = casadi.DM(task.near) * root[:n] + casadi.DM(task.far) * root[1:]
-    # About 1 a cell: IPOPT's tolerance is that of a single row's share in the time.
+    # The objective is scaled so that each cell contributes about 1: IPOPT's tolerance is then relative to the
+    # time of one cell.
     mean = (2.0 * task.width / (task.near + task.far)).mean()
     time = casadi.sum1(casadi.DM(2.0 * task.width / mean) / pace)
     near, far = task.rows.cell.tolist(), (task.rows.cell + 1).tolist()

@@ -1,8 +1,9 @@
 """The time-optimal profile as a second-order cone program, solved by Clarabel.
 
 After Verscheure, Demeulenaere, Swevers, De Schutter and Diehl, "Time-optimal path tracking for robots: a
-convex optimization approach", IEEE Transactions on Automatic Control 54 (2009). With x = p, c ≤ √x in the
-stations and d ≥ 1/(√p_start + √p_end) in the cells the time Σ 2 h d is linear, and both bounds are cones.
+convex optimization approach", IEEE Transactions on Automatic Control 54 (2009). With x = p, c ≤ √x at the
+stations and d ≥ 1/(c_start + c_end) in the cells of width h, the time Σ 2 h d is linear, and both
+inequalities are second-order cones.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
 
 ACCURACY = 1e-4
-# Tolerances of the solver for the time, far below the error of any mesh, and for the rows; in the end p is
-# scaled so that all limits hold.
+# Tolerances of the solver: GAP for the time, far below the error of any mesh, and ROWS for the rows; p is
+# finally scaled so that all limits hold.
 GAP, ROWS = 1e-6, 1e-7
 
 
@@ -32,11 +33,11 @@ def plan(
     cells: int | None = None,
     time_limit: float | None = None,
 ) -> SpeedProfile:
-    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
-    piece.
+    """The fastest profile on a mesh: refined until the time has about the relative `accuracy`, or with
+    `cells` cells in each piece.
 
-    `time_limit` [s]. Raises SolverError with Clarabel's status, InfeasibleError where a given speed at an end
-    is not possible, MissingPackageError.
+    `time_limit` [s] limits the whole plan. Raises SolverError with Clarabel's status, InfeasibleError where a
+    given speed at an end is not possible, MissingPackageError.
     """
     return plan_on_meshes(
         problem, Method("clarabel", _solve, mean_rows, others=("scipy",)), accuracy, cells, time_limit
@@ -50,7 +51,8 @@ def _solve(task: Transcription, seconds: float) -> Floats:
     deadline = time.monotonic() + seconds
     matrix, bound, cones, cost = _program(task)
     none = sparse.csc_matrix((matrix.shape[1], matrix.shape[1]))
-    # The program is scaled by the greatest p already: equilibration mostly loses digits, and rarely helps.
+    # The program is already scaled by the greatest p, so equilibration mostly increases rounding errors; it
+    # is the second attempt.
     for equilibrate in (False, True):
         settings = clarabel.DefaultSettings()
         settings.verbose = False
@@ -70,9 +72,9 @@ def _solve(task: Transcription, seconds: float) -> Floats:
 
 
 def _program(task: Transcription) -> tuple[Any, Floats, list[Any], Floats]:
-    """A z + s = b, s in cones, minimise cost·z, z being x and c in the free stations and d in the cells.
+    """Minimise cost·z with A z + s = b, s in cones; z holds x and c at the free stations and d in the cells.
 
-    d is counted in parts of 1/(near + far), so that all of z is about 1.
+    d is in units of 1/(near + far), so that all of z is about 1.
     """
     import clarabel
     from scipy import sparse

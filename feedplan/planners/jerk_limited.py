@@ -24,24 +24,24 @@ from feedplan.planners._runs import fastest_runs
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part
 
-# The profile keeps the limits of jerk, best where curvature does not jump.
+# The profile keeps the jerk limits; only where the curvature of the path jumps, its acceleration may jump.
 LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
-# What finer grids may gain, in accuracies.
+# Finer grids may reduce the time by this many times the accuracy.
 GRID_ERROR = 2.0
-# The gap of complementarity at which the interior point stops, in accuracies.
+# The complementarity gap at which the interior-point method stops, in units of the accuracy.
 GAP = 0.01
-# Accuracies the grid is made for: on finer ones smooth changes of speed drown in what keeps the matrix
-# of the interior point definite.
+# The range of accuracies that the grid is made for: on finer grids, the regularisation of the interior-point
+# matrix is larger than smooth changes of speed.
 FINEST, COARSEST = 1e-5, 0.1
-# Intervals, in the time in which an axis can reach its full acceleration, at the accuracy 1e-4 and at least;
-# errors fall with their square.
+# Number of grid intervals per A/J, the time in which an axis can reach its full acceleration: at the accuracy
+# 1e-4, and at least. Errors fall with its square.
 RESOLUTION, LEAST_RESOLUTION = 16.0, 6.0
-# Those of the first plan, and its gap of complementarity: it is some tenths of a percent slower than the
-# best in a fifth to a third of the time.
+# Resolution and complementarity gap of the first plan: it is some tenths of a percent slower than the best,
+# and takes a fifth to a third of the computing time.
 FIRST_RESOLUTION, FIRST_GAP = 3.0, 3e-4
-# How far a plan with a time limit is after its first plan, and before that of the other method, for the
-# progress shown.
+# With a time limit, the share of progress reached after the first plan, and before the plan of the method
+# s-curve.
 FIRST, OTHER = 0.2, 0.9
 
 
@@ -54,15 +54,17 @@ def plan(
     progress: Listener | None = None,
     elsewhere: Elsewhere | None = None,
 ) -> SpeedProfile:
-    """The fastest profile, its time within about `accuracy` of the least, as a part of it.
+    """The fastest profile; its time is within about the relative `accuracy` of the least time.
 
-    It is planned by the length of the tool's way (`solvers/jerk/src/jerk_limited/on_path.rs`). With a
-    `time_limit` [s] there is a first plan, on a coarse grid, whatever the limit. `reserve` tells from it what
-    is to be kept of the limit for other work [s]. If the rest does not suffice, each run takes the fastest of
-    the first plan, of the one that was stopped, if that came to the run, and of the method s-curve; the
-    profile says `stopped`. It keeps all limits too. Without a time limit runs are planned `elsewhere`, if
-    that is given. Raises SolverError for an axis without a limit of jerk, InfeasibleError where the start or
-    end speed cannot be had, with the speed that can.
+    It is planned over the length of the tool's path (`solvers/jerk/src/jerk_limited/on_path.rs`). With a
+    `time_limit` [s] a first plan on a coarse grid is always made. `reserve` returns, from the first plan, the
+    part of the limit to keep for other work [s]. If the rest of the limit does not suffice, each run takes
+    the fastest of the first plan, of the unfinished plan (if it reached the run) and of the method s-curve,
+    and the profile has `stopped` set; it still keeps all limits. Without a time limit runs are planned by
+    `elsewhere`, if given.
+
+    Raises SolverError for an axis without a jerk limit, and InfeasibleError, with the possible speed, where
+    the start or end speed is not possible.
     """
     accuracy = number(
         accuracy, "the accuracy", f"{FINEST:g} to {COARSEST:g}", lambda part: FINEST <= part <= COARSEST
@@ -80,7 +82,7 @@ def plan(
         coarse = _Task(problem, limits, FIRST_RESOLUTION, FIRST_GAP, 0.0, None)
         first = coarse.plan(None, part(progress, 0.0, FIRST))
     except InfeasibleError:
-        # A coarse grid may miss a speed at an end that can just be had.
+        # A coarse grid may fail at a given end speed that is only just possible.
         return whole.plan(None, part(progress, FIRST, 1.0))
     if reserve is not None and time.perf_counter() < end:
         end -= reserve(first)
@@ -98,11 +100,11 @@ def plan(
 
 @dataclass(frozen=True)
 class _Task:
-    """A plan within `limits` of jerk [mm/s³] on a grid of a `resolution` (see `RESOLUTION`), by an interior
-    point that stops at a `gap` of complementarity.
+    """A plan within jerk `limits` (axes,) [mm/s³] on a grid of a `resolution` (see `RESOLUTION`), by an
+    interior-point method that stops at the complementarity `gap`.
 
-    Its lower bounds are the part `proven` of those on its grid; without that part it has none. Without a time
-    limit runs are planned `elsewhere`, if that is given.
+    Its lower bounds are the lower bounds on its grid times `proven`; with `proven` 0 it has none. Without a
+    time limit runs are planned by `elsewhere`, if given.
     """
 
     problem: Problem
@@ -113,20 +115,21 @@ class _Task:
     elsewhere: Elsewhere | None
 
     def plan(self, end: float | None, progress: Listener | None) -> SpeedProfile:
-        """The plan by a time of the clock; again with lower limits where the joints miss those of jerk."""
+        """The plan, to be ready at the time `end` of the clock; planned again with lower limits where the
+        interpolants' jerk error exceeds `HELD`."""
         once = 0.5 if self.problem.words else 1.0
         profile = self._once(end, part(progress, 0.0, once))
         lowered = lowered_limits(self.problem, self.limits, profile)
         if lowered is None:
             return profile
         again = replace(self, limits=lowered, proven=0.0)._once(end, part(progress, once, 1.0))
-        # What no plan within the limits can beat, no plan within lower ones can.
+        # A lower bound within the original limits is also one within lower limits.
         return again.with_others(run_bounds=profile.run_bounds)
 
     def _once(self, end: float | None, progress: Listener | None) -> SpeedProfile:
         problem, settings = self.problem, (self.limits, self.resolution, self.gap, self.proven > 0)
         elsewhere = self.elsewhere if end is None else None
-        # Fewer than two parts: there is nothing to share.
+        # With fewer than two parts there is nothing to share.
         own = [] if elsewhere is None else parts(problem, elsewhere.count())
         if elsewhere is not None and len(own) > 1:
             planned = elsewhere.map(plan_part, [(each, *settings) for each in own], progress)
@@ -149,7 +152,7 @@ class _Task:
 def plan_part(
     part: Part, limits: Floats, resolution: float, gap: float, proves: bool, progress: Listener
 ) -> tuple[tuple[SpeedProfile, Floats] | None, tuple[Any, ...]]:
-    """The profile of a part and the excess of each of its runs, or None and the arguments of the fault."""
+    """The profile of a part and the excess of each of its runs; or None and the PlanError's arguments."""
     try:
         native, _, excess, bounds = plan_jerk_limited(part, limits, resolution, gap, proves, None, progress)
         return (SpeedProfile.of(native, run_bounds=bounds), excess), ()

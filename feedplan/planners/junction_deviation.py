@@ -1,21 +1,22 @@
 """Trapezoids with look-ahead and junction deviation, as grbl, Klipper and Marlin plan.
 
 Sources: grbl 1.1, `planner.c` (S. K. Jeon); Klipper, `toolhead.py` (K. O'Connor); Marlin 2.1, `planner.cpp`.
-A corner is passed at the speed of a circle that touches both lines and comes within δ of the corner, though
-the tool follows the lines: v² = a δ s/(1 − s), s = cos(turn/2), with a = min over the axes of A_k/|j_k| in
-the direction j of the jump, A_k being the limit of axis k towards j_k. δ is grbl's setting $11, 0.010 mm by
-default. Klipper's `square_corner_velocity` is the same formula by the speed v₉₀ at right angles:
-a δ = v₉₀² (√2 − 1). By Marlin's classic jerk no axis jumps by more than `axis_jumps`; one that turns back
-counts by the greater of its speeds before and after.
+The tool follows the lines, and passes a corner at the speed that is possible on a circle that touches both
+lines and comes within δ of the corner: v² = a δ s/(1 − s), s = cos(turn/2), with a = min over the axes of
+A_k/|j_k|, where j is the direction of the velocity jump and A_k the acceleration limit of axis k in the
+direction of j_k. δ is grbl's setting $11, 0.010 mm by default. Klipper's `square_corner_velocity` gives the
+same formula by the speed v₉₀ at right angles: a δ = v₉₀² (√2 − 1). With Marlin's classic jerk, no axis
+velocity jumps by more than `axis_jumps`; for an axis that reverses, the greater of its speeds before and
+after counts.
 
-Klipper's circle touches lines of the length L no further than in their middle, v² ≤ a L cot(turn/2)/2; in
-Marlin lines shorter than 1 mm that turn by less than 45° are chords of an arc, v² ≤ a L/turn.
+In Klipper the circle touches a line of length L at most in its middle: v² ≤ a L cot(turn/2)/2. In Marlin
+lines shorter than 1 mm that turn by less than 45° are chords of an arc: v² ≤ a L/turn.
 
-Controllers chop arcs into lines, and pass from line to line by the same formula. Without an `arc_tolerance`
-or `arc_segment` the speed on curves is √(a/κ), with the acceleration in the direction of the normal. The
-tangential one comes on top of it. They know some blocks ahead (`_queue`).
+Controllers divide arcs into lines, and pass from line to line by the same formula. Without `arc_tolerance` or
+`arc_segment` the speed on curves is √(a/κ), with the acceleration limit a in the direction of the normal; the
+tangential acceleration is added to it. They know a number of blocks ahead (`_queue`).
 
-The velocity jumps at the corner, by more than the axes can change in a period: the audit names the lines.
+At a corner axis velocities jump by more than the axes can change in a period; the audit names the lines.
 """
 
 from __future__ import annotations
@@ -56,16 +57,17 @@ def plan(
     max_velocity: float | None = None,
     max_acceleration: float | None = None,
 ) -> SpeedProfile:
-    """The fastest trapezoids with corners by `square_corner_velocity` [mm/s] or by `axis_jumps` [mm/s] of X,
-    Y and Z if one of these is given, else by `deviation` [mm].
+    """The fastest trapezoids, with corner speeds by `square_corner_velocity` [mm/s] or by `axis_jumps` [mm/s]
+    of X, Y and Z if one of these is given, else by `deviation` [mm].
 
-    `blocks` are held at once, the one in motion among them (None: all). Arcs are chopped into lines within
-    `arc_tolerance` [mm], or of the length `arc_segment` [mm]. `short_lines` is the limit of speed
-    between short lines: none ("free"), by "half" of each line as in Klipper, or by the "arc" of which they
-    are chords as in Marlin. `cruise_ratio` is the part of the way between speeding up and slowing down that
-    has one speed. `max_velocity` [mm/s] and `max_acceleration` [mm/s²] are those along the path.
+    `blocks` is the number of blocks that the controller holds, including the one in motion (None: all). Arcs
+    are divided into lines within `arc_tolerance` [mm], or of the length `arc_segment` [mm]. `short_lines` is
+    the speed limit between short lines: none ("free"), by "half" of each line as in Klipper, or by the "arc"
+    of which they are chords as in Marlin. `cruise_ratio` is the share of the distance between speeding up and
+    slowing down that has constant speed. `max_velocity` [mm/s] and `max_acceleration` [mm/s²] are limits
+    along the path.
 
-    Raises InputError for those, SolverError and InfeasibleError, all as sentences.
+    Raises InputError for wrong values of these, SolverError and InfeasibleError, all as sentences.
     """
     for name, value, unit in (
         ("junction deviation", deviation, "mm"),
@@ -96,7 +98,7 @@ def plan(
 
 
 def corner_speed(problem: Problem, junctions: Junctions) -> Floats:
-    """Speed (n + 1,) [mm/s] at the ends of the pieces, infinite where there is no corner."""
+    """The greatest speed (n + 1,) [mm/s] at the ends of the pieces, infinite where there is no corner."""
     speed = np.full(len(problem.path) + 1, np.inf)
     curve = problem.curve
     corner = np.flatnonzero((tangent_jumps(curve) > 0.0).any(axis=1))
@@ -110,12 +112,13 @@ def corner_speed(problem: Problem, junctions: Junctions) -> Floats:
 
 
 def each_direction(at: CurvePlaces) -> tuple[Floats, Floats]:
-    """The greatest acceleration along the tangent alone, and along the normal alone."""
+    """The greatest acceleration along the tangent and along the normal, each as if the other were 0."""
     return both_ways(at.limits, at.tangent), in_direction(at.limits, at.normal)
 
 
 def _from_chord_to_chord(junctions: Junctions, chords: Chords) -> Rule:
-    """The rule on curves that are chopped: the speed from chord to chord, as an acceleration across."""
+    """The rule on curves that are divided into lines: the speed from chord to chord, as an acceleration
+    across the path."""
 
     def rule(at: CurvePlaces) -> tuple[Floats, Floats]:
         half = chords.half_turn(at.radius)
@@ -130,7 +133,8 @@ def _from_chord_to_chord(junctions: Junctions, chords: Chords) -> Rule:
 
 
 def _of_axes(problem: Problem, jumps: Sequence[float]) -> list[float]:
-    """The jumps of X, Y and Z for the axes of the problem, no limit for others."""
+    """The jumps of X, Y and Z in the order of the problem's axes, infinite for other axes. Raises InputError
+    for wrong values."""
     good = isinstance(jumps, (list, tuple)) and len(jumps) == 3
     if not good:
         raise refuse("axis_jumps", jumps, "three positive numbers [mm/s], for X, Y and Z")

@@ -1,19 +1,21 @@
-"""LinuxCNC's trajectory planner: points on lines joined, arcs at corners, one acceleration along the path.
+"""LinuxCNC's trajectory planner: trapezoids over lines with joined points and arcs at corners, with one
+acceleration along the path.
 
 Source: LinuxCNC 2.9, `emccanon.cc` (points of G1 moves that are within G64's Q of a line are left out: the
-naive CAM detector), `tp.c`, `tc.c` and `blendmath.c` (R. W. Ellenberg). Each corner of lines within G64's P
-becomes an arc that touches both and takes half of each at most. It has half of the acceleration along it and
-√3/2 across it, and so have the program's arcs (`on_arcs`). Speeds let the tool stop in the
-`depth` segments behind the one in motion ([TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH), and no block takes less than
-1.02 servo periods. `max_velocity` and `max_acceleration` are those along the path ([TRAJ]
-MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION).
+naive CAM detector), `tp.c`, `tc.c` and `blendmath.c` (R. W. Ellenberg). Each corner of two lines becomes an
+arc within G64's P that touches both lines and takes at most half of each. On it, half of the acceleration is
+for the direction along the path and √3/2 across it, as on the program's arcs (`on_arcs`). The speed allows
+the tool to stop within the `depth` segments after the one in motion ([TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH),
+and no block takes less than 1.02 servo periods. `max_velocity` and `max_acceleration` are limits along the
+path ([TRAJ] MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION).
 
-A segment that may overlap the next one has half of the acceleration, all along it (`tc.c`:
-`tcGetTangentialMaxAccel`): so has the last one before a stop, unless a rapid and another move meet there.
+A segment that may overlap the next one has half of the acceleration over its whole length (`tc.c`:
+`tcGetTangentialMaxAccel`). Here this is the last segment before a stop, unless a rapid and another move meet
+there.
 
-Differences: corners of arcs and splines are rounded as the path builder does. Other corners are stops where
-LinuxCNC overlaps segments, as on rotary axes. G64 without P keeps the tolerance of the plan, where LinuxCNC
-leaves the path by up to a quarter of a line.
+Differences from LinuxCNC: corners of arcs and splines are rounded as the path builder does. Other corners are
+stops where LinuxCNC overlaps segments, as on rotary axes. G64 without P uses the tolerance of the plan, where
+LinuxCNC leaves the path by up to a quarter of a line.
 """
 
 from __future__ import annotations
@@ -40,9 +42,9 @@ def plan(
     max_velocity: float | None = None,
     max_acceleration: float | None = None,
 ) -> SpeedProfile:
-    """Trapezoids over lines and arcs, `depth` segments known ahead, limits along the path [mm/s], [mm/s²].
+    """Trapezoids over lines and arcs; `depth` segments are known ahead; limits along the path.
 
-    Raises InputError for those, SolverError and InfeasibleError, all as sentences.
+    Raises InputError for wrong values of these, SolverError and InfeasibleError, all as sentences.
     """
     whole(depth, "the depth", "a whole number from 1")
     queue = Queue(
@@ -67,10 +69,11 @@ def _part(problem: Problem) -> Floats:
 
 
 def on_arcs(at: CurvePlaces) -> tuple[Floats, Floats]:
-    """√3/2 of the acceleration of every direction across the path; along it the rest at the greatest speed.
+    """Across the path √3/2 of the acceleration that every direction allows; along the path what remains at
+    the greatest speed.
 
-    The rest is half of it (`shared_acceleration`) where the bend limits the speed, more where the feed does
-    (`tc.c`: `tcUpdateCircleAccRatio`).
+    This is half of it (`shared_acceleration`) where the curvature limits the speed, and more where the feed
+    limits it (`tc.c`: `tcUpdateCircleAccRatio`).
     """
     along, across = shared_acceleration(at)
     with np.errstate(divide="ignore"):

@@ -1,12 +1,13 @@
-"""State-to-state profiles along the path: states where segments meet, and the fastest motions between them.
+"""State-to-state profiles along the path: optimises speed and acceleration where segments meet, with the
+fastest motions between these states.
 
 The segments are those of the S-curve, with its limits along the path: one acceleration for speeding up and
-slowing down, by the lesser limit where those of an axis differ by direction. At first segments meet
-without acceleration, at the greatest speeds that look-ahead over the whole subrun allows. Then speed and
-acceleration are improved at one joint after the other, forward and backward, with the fastest motions to
-both neighbours, which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time trajectory
-generation with arbitrary target states" (2021). No step makes the profile slower: it is at least as fast as
-the S-curve.
+slowing down, by the smaller limit where those of an axis differ by direction. At first the acceleration is 0
+where segments meet, and the speeds there are the greatest that look-ahead over the whole subrun allows. Then
+speed and acceleration are improved at one joint after the other, forward and backward, with the fastest
+motions to both neighbours, which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time
+trajectory generation with arbitrary target states" (2021). No step makes the profile slower, so it is at
+least as fast as the S-curve.
 """
 
 from __future__ import annotations
@@ -33,23 +34,25 @@ from feedplan.profile import SpeedProfile
 
 # Speed [mm/s] and acceleration [mm/s²] along the path.
 State = tuple[float, float]
-# A section of constant jerk: duration; at its start position along the subrun, speed, acceleration; jerk.
+# A section of constant jerk: duration; position along the subrun, speed and acceleration at its start; jerk.
 Section = tuple[float, float, float, float, float]
 
-# The profile keeps the limits of jerk, best where curvature does not jump.
+# The profile keeps the jerk limits; only where the curvature of the path jumps, its acceleration may jump.
 LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
-# The greatest number of rounds over all joints, and the gain of a round below which steps are halved.
+# The greatest number of rounds over all joints; steps are halved if a round saves less than the share GAIN of
+# the time.
 ROUNDS, GAIN = 24, 3e-4
-# Steps of speed and acceleration as shares of their limits: the first, and the least. All are multiples of
-# GRID, so that rounding does not decide between states.
+# First and least step of speed and acceleration as shares of their limits. All steps are multiples of GRID,
+# so that rounding does not decide between states.
 STEP, LEAST_STEP, GRID = 0.25, 0.002, 2.0**-30
-# The first speeds are lower than the greatest ones by the first of these shares with which all motions are
-# found: the package ruckig misses some motions that are only just possible.
+# The first speeds are reduced by the first of these shares for which all motions are found: the package
+# ruckig misses some motions that are only just possible.
 MARGINS = [2.0**-k for k in range(24, -1, -1)]
-# A motion may exceed its limits by this share (rounding). One motion is faster than another only by more.
+# A motion may exceed its limits by this share (rounding), and counts as faster than another one only by more
+# than this share.
 ROUNDING = 1e-9
-# Number of halvings that find a reachable speed to the last digit.
+# Number of bisections that find a reachable speed to the last digit.
 HALVINGS = 60
 
 
@@ -63,21 +66,22 @@ class Segment:
     jerk: float
 
     def stands(self, speed: float, change: float) -> bool:
-        """Whether an acceleration of `change` can be reached from or left to `speed` within the limits."""
+        """Whether, at the speed `speed`, an acceleration `change` can be built up from 0 or reduced to 0
+        within the speed limits."""
         beyond = change * abs(change) / (2 * self.jerk)
         return 0 <= speed + beyond <= self.speed
 
     @cached_property
     def unit(self) -> float:
-        """A unit of time [s] in which no limit is below 1, if the unit of length is the segment's length.
+        """A unit of time [s] in which no limit is below 1, with the segment's length as the unit of length.
 
-        The package ruckig takes numbers below its own least ones for 0.
+        The package ruckig treats very small numbers as 0.
         """
         by_acceleration, by_jerk = self.length / self.acceleration, self.length / self.jerk
         return max(self.length / self.speed, math.sqrt(by_acceleration), math.pow(by_jerk, 1 / 3))
 
     def highest(self, speed: float) -> float:
-        """The greatest speed that the segment can reach from `speed`, without acceleration at both ends."""
+        """The greatest speed that can be reached from `speed`, with acceleration 0 at both ends."""
 
         def way(high: float) -> float:
             change = high - speed
@@ -102,19 +106,19 @@ class Segment:
 
 @dataclass(frozen=True)
 class Subrun:
-    """Segments from rest to rest, and the greatest speeds (n + 1,) at their ends."""
+    """Segments from rest to rest, and the greatest speeds (n + 1,) [mm/s] at their ends."""
 
     segments: list[Segment]
     speeds: list[float]
 
     def state(self, i: int, share: State) -> State:
-        """Speed and acceleration where segment i begins, from their parts of the limits there."""
+        """Speed and acceleration at the start of segment i, from their shares of the limits there."""
         before, after = self.segments[i - 1], self.segments[i]
         return share[0] * self.speeds[i], share[1] * min(before.acceleration, after.acceleration)
 
     def first_shares(self, margin: float) -> list[State]:
-        """The greatest speeds without acceleration that lead from one to the next, as parts of the limits,
-        each lower by a part of it."""
+        """The first states as shares of the limits: the greatest speeds that can be reached from each other
+        with acceleration 0, reduced by the share `margin`."""
         v = list(self.speeds)
         for i, segment in enumerate(self.segments):
             v[i + 1] = min(v[i + 1], segment.highest(v[i]))
@@ -125,7 +129,7 @@ class Subrun:
 
 
 class Motions:
-    """The quickest motions on segments between states at their ends."""
+    """The fastest motions on segments between states at their ends."""
 
     def __init__(self) -> None:
         try:
@@ -139,7 +143,7 @@ class Motions:
         self._input.current_position, self._input.target_position = [0.0], [1.0]
 
     def duration(self, segment: Segment, start: State, end: State) -> float:
-        """The time [s]; infinite where there is no motion within the limits."""
+        """The least time [s]; infinite where no motion keeps the limits."""
         if not (
             segment.stands(start[0], start[1]) and segment.stands(end[0], -end[1])
         ) or not self._calculate(segment, start, end):
@@ -156,7 +160,7 @@ class Motions:
         return segment.unit * float(self._trajectory.duration) if profile.brake.duration == 0 else math.inf
 
     def sections(self, segment: Segment, start: State, end: State, position: float) -> list[Section]:
-        """The sections of a motion that exists, the first at `position`."""
+        """The sections of a motion that is known to exist; the first begins at `position`."""
         self._calculate(segment, start, end)
         profile = self._trajectory.profiles[0][0]
         length, unit = segment.length, segment.unit
@@ -187,9 +191,9 @@ class Motions:
 
 
 def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
-    """The profile; after `time_limit` [s] the best so far.
+    """The profile; after `time_limit` [s] the best one so far.
 
-    Raises SolverError for an axis without a limit of jerk, MissingPackageError.
+    Raises SolverError for an axis without a jerk limit, MissingPackageError.
     """
     if time_limit is not None:
         time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
@@ -214,7 +218,7 @@ def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:
 
 
 def _subruns(problem: Problem, limits: Floats) -> list[Subrun]:
-    """The subruns of the path; those for the jerk-limited planner have no segments."""
+    """The subruns of the path. Subruns that are left to the jerk-limited planner have no segments."""
     subruns = []
     for rows in path_segments(problem, limits, s_curve.CUTTINGS, s_curve.LOOK_AHEAD):
         speed, junction = rows[:, 1], rows[:, 4]
@@ -225,7 +229,7 @@ def _subruns(problem: Problem, limits: Floats) -> list[Subrun]:
 
 
 def _improved(subrun: Subrun, motions: Motions, deadline: float) -> list[Section]:
-    """The sections of the fastest profile found; empty without segments, and where no profile is found."""
+    """The sections of the fastest profile found; empty without segments, or if none is found."""
     segments, inner = subrun.segments, range(1, len(subrun.segments))
     for margin in MARGINS:
         shares = subrun.first_shares(margin)
@@ -267,7 +271,7 @@ def _improve(
     i: int,
     step: float,
 ) -> None:
-    """Changes the state between segments i − 1 and i by a step that makes both together faster."""
+    """Changes the state between segments i − 1 and i by the first step that makes both faster together."""
     before, after = subrun.segments[i - 1], subrun.segments[i]
     speed, acceleration = shares[i]
     for dv, da in ((1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1), (-1, 0)):

@@ -1,10 +1,11 @@
-"""Speed limits as usual, acceleration limited along the path only, whatever a curve does to the axes.
+"""Trapezoids with the acceleration limited only along the path; the acceleration of the axes by curvature is
+ignored.
 
-The methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with a
-tangential acceleration. Here it is the greatest that the direction of motion allows, min over the axes
-of A_k/|t_k|, so that the axes keep their limits on lines and break them on curves, where v²/ρ comes on
-top of it. The audit says where. Speeding up and slowing down pull an axis to opposite sides: each has the
-limits A_k of those.
+These are the methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with
+a tangential acceleration. Here it is the greatest that the direction of motion allows, min over the axes of
+A_k/|t_k|. So the axes keep their limits on lines and exceed them on curves, where v²/ρ is added; the audit
+names these places. Speeding up and slowing down accelerate an axis in opposite directions, so each uses the
+limits A_k of its direction.
 """
 
 from __future__ import annotations
@@ -24,5 +25,5 @@ def plan(problem: Problem) -> SpeedProfile:
 
 
 def along_only(at: CurvePlaces) -> tuple[Floats, Floats]:
-    """No limit across the path."""
+    """The acceleration along the path, and no limit across it."""
     return both_ways(at.limits, at.tangent), np.full(len(at.tangent), np.inf)

@@ -2,11 +2,11 @@
 programs.
 
 After Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis",
-IEEE Transactions on Robotics 34 (2018), in the package toppra. Its own scheme asks one path acceleration to
-serve both values of q'' at a knot and does not converge on C1 splines; here every cell has rows of its own.
-They hold at both ends of the cell (`one-sided`), so that the result is feasible and its time falls to the
-least one as the cells get smaller; or at its start alone (`collocation`), which breaks limits between the
-stations and whose time rises to it. Both are of first order.
+IEEE Transactions on Robotics 34 (2018), in the package toppra. toppra's own scheme uses one path acceleration
+for both values of q'' at a knot and does not converge on C1 splines; here every cell has rows of its own.
+They hold at both ends of the cell (`one-sided`): the result is feasible, and its time falls to the least time
+as the cells get smaller. Or they hold only at its start (`collocation`): the result breaks limits between the
+stations, and its time rises to the least time. Both are of first order.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from feedplan.planners._transcription import Rows, Transcription, end_rows
 from feedplan.profile import SpeedProfile
 
 ACCURACY = 1e-3
-# Bound of x where no other bound holds, in parts of the median of x.
+# Upper bound of x, which is about 1 where p is greatest, if no other bound holds.
 _FASTEST = 1e6
 Scheme = Literal["one-sided", "collocation"]
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
@@ -38,8 +38,8 @@ def plan(
     time_limit: float | None = None,
     scheme: Scheme = "one-sided",
 ) -> SpeedProfile:
-    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
-    piece.
+    """The fastest profile on a mesh: refined until the time has about the relative `accuracy`, or with
+    `cells` cells in each piece.
 
     `time_limit` [s] ends the refinement; toppra itself cannot be interrupted. `scheme` is `one-sided`, or
     `collocation`, whose profile is faster than the limits allow. Raises SolverError where toppra fails,
@@ -61,8 +61,9 @@ def _solve(task: Transcription, seconds: float) -> Floats:
 
     from toppra.algorithm import TOPPRA
 
-    # toppra's path has one parameter, whose speed is continuous: that of the pieces, stretched from one to
-    # the next, with cells about 1 wide and squared speeds about 1.
+    # toppra's path has one parameter with continuous speed. It is made from the parameters of the pieces,
+    # each scaled to continue the speed of the one before, so that cells are about 1 wide and squared speeds
+    # are about 1.
     factor = np.concatenate([[0.0], np.cumsum(np.log(task.near[1:] / task.far[:-1]))])
     factor = np.exp(-factor) / np.median(task.width * np.exp(-factor))
     unit = np.median((factor * task.near) ** 2)
@@ -75,7 +76,7 @@ def _solve(task: Transcription, seconds: float) -> Floats:
     log.setLevel(logging.CRITICAL + 1)
     try:
         solver = TOPPRA([constraint], _path(grid), gridpoints=grid, solver_wrapper="seidel")
-        # In a cusp the tool stands whatever p is.
+        # At a cusp the tool stands still for every p.
         ends = [np.sqrt((x or 0.0) * squares[side]) for side, x in zip((0, -1), task.fixed, strict=True)]
         _, speed, _ = solver.compute_parameterization(*ends)
     finally:
@@ -87,7 +88,7 @@ def _solve(task: Transcription, seconds: float) -> Floats:
 
 
 def _constraint(task: Transcription, start: Floats, end: Floats, grid: Floats, squares: Floats) -> Any:
-    """−low ≤ (near + far) x + 2 Δ far u ≤ 1 for the rows of each cell, as toppra has them; 0 ≤ x ≤ most."""
+    """The rows of each cell in toppra's form, −low ≤ (near + far) x + 2 Δ far u ≤ 1, and 0 ≤ x ≤ most."""
     from toppra.constraint import LinearConstraint
 
     rows, n = task.rows, task.cells
@@ -95,7 +96,7 @@ def _constraint(task: Transcription, start: Floats, end: Floats, grid: Floats, s
     cell = rows.cell[order]
     place = np.arange(len(cell)) - np.searchsorted(cell, cell)
     count = int(place.max()) + 1
-    # Every row twice: at most 1, and over −low at most 1.
+    # Every row appears twice: row ≤ 1, and row/(−low) ≤ 1.
     near, far = np.zeros((2, n + 1, 2 * count))
     for side, scale in ((place, 1.0), (count + place, -1.0 / rows.low[order])):
         near[cell, side] = (rows.near * start[rows.cell])[order] * scale
@@ -117,7 +118,7 @@ def _constraint(task: Transcription, start: Floats, end: Floats, grid: Floats, s
 
 
 def _path(grid: Floats) -> Any:
-    """A path for toppra, which uses only the ends of its parameter."""
+    """A path for toppra; only the ends of its parameter interval are used."""
     from toppra.interpolator import AbstractGeometricPath
 
     class Line(AbstractGeometricPath):  # type: ignore[misc]

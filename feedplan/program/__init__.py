@@ -1,1 +1,1 @@
-"""Part programs: text in, moves in millimetres and seconds out."""
+"""Part programs: reads text, and makes moves in millimetres and seconds."""

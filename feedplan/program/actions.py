@@ -1,4 +1,4 @@
-"""What each event of a program does, in terms of a machine instead of words.
+"""Computes from the words of a program's events what each event does on a machine.
 
 | kind | words | channel | value |
 |---|---|---|---|
@@ -14,10 +14,9 @@
 | message, comment | (MSG, …) M117, ( ) ; | | |
 | other | other M codes | | number of the code |
 
-The program stops the tool for all of them but S, T, M61, messages, comments and the outputs that are
-synchronised with the motion, M62, M63 and M67: these happen as the tool passes by. Cycles that turn the
-spindle back or stop it (G33.1, G74, G84, G86) have their own M3, M4, M5. Laser power is either
-that of M67 or S with the spindle on.
+All events stop the tool except S, T, M61, messages, comments and the outputs that are synchronised with the
+motion, M62, M63 and M67: these happen while the tool moves. Cycles that reverse or stop the spindle (G33.1,
+G74, G84, G86) have their own M3, M4, M5. Laser power is given by M67, or by S with the spindle on.
 """
 
 from __future__ import annotations
@@ -35,15 +34,15 @@ KINDS = (
     "comment", "other",
 )  # fmt: skip
 
-# M codes that act while the tool moves on, and those that stop the program.
+# M codes that act without stopping the tool, and those that stop the program.
 _PASSING = (61, 62, 63, 67)
 _STOPS = (0, 1, 2, 30, 60)
 
 
 @dataclass(frozen=True, eq=False)
 class Actions:
-    """What m events do: `kind`, `channel` and `value` (m,), NaN where they have none; `stops` (m,): the tool
-    stands still for the event."""
+    """The effect of m events: `kind`, `channel` and `value` (m,), NaN where they have none; `stops` (m,): the
+    tool stands still for the event."""
 
     kind: NDArray[np.str_]
     channel: Floats
@@ -52,7 +51,7 @@ class Actions:
 
 
 def actions(events: Events) -> Actions:
-    """What each event does, in their order."""
+    """The effect of each event, in their order."""
     p, q, number = events.p, events.q, events.number
     letter = {name: events.letter == ord(name) for name in ("M", "S", "T", "G", MESSAGE, COMMENT)}
 
@@ -67,7 +66,7 @@ def actions(events: Events) -> Actions:
     flows = (_last(code(7)) > off) + 2.0 * (_last(code(8)) > off)
     outputs = code(62, 63, 64, 65)
     analog = code(67, 68)
-    # The first kind that fits a row counts.
+    # The first kind that matches a row is taken.
     cases: list[tuple[str, Flags, Floats]] = [
         ("spindle", spindle, speed),
         ("coolant", coolant, flows),
@@ -92,11 +91,11 @@ def actions(events: Events) -> Actions:
 
 
 def _last(marks: Flags) -> Integers:
-    """The last marked row up to each row; −1 before the first."""
+    """Index of the last marked row at or before each row; −1 before the first."""
     return np.maximum.accumulate(np.where(marks, np.arange(len(marks)), -1))
 
 
 def _latest(values: Floats, marks: Flags) -> Floats:
-    """The value of the last marked row up to each row; 0 before the first."""
+    """The value of the last marked row at or before each row; 0 before the first."""
     last = _last(marks)
     return np.where(last >= 0, values[last], 0.0)

@@ -8,11 +8,11 @@
 | ELLIPSE | an exact rational curve |
 | SPLINE | its NURBS curve; through its fit points as CAD systems do, where it has no control points |
 
-The model space is followed in drawing order. An open entity is followed backwards where its end touches the
-position of the tool; where entities do not touch, a rapid goes from one to the next. Coordinates are the
-drawing's, with its units ($INSUNITS). Other entities, those on layers that are off or frozen, and arcs and
-polylines in a tilted plane are left out with a warning. A drawing has no feed: the limits of the machine set
-the speed.
+The entities of the model space are followed in drawing order. An open entity is followed backwards if its
+end, not its start, touches the position of the tool; between entities that do not touch there is a rapid.
+Coordinates are those of the drawing, in its units ($INSUNITS). Other entities, entities on layers that are
+off or frozen, and arcs and polylines in a tilted plane are left out with a warning. A drawing has no feed:
+the limits of the machine set the speed.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from feedplan.program.program import Program
 Point = Floats
 
 MAX_ENTITIES = 5_000_000
-_FARTHEST = 1e6  # [mm]; beyond is a mistake
-# Errors of the package for an entity with missing entries or entries of another type.
+_FARTHEST = 1e6  # [mm]; larger coordinates are a mistake
+# Errors that the package raises for an entity with missing entries or entries of a wrong type.
 _DAMAGED = (ValueError, ArithmeticError, TypeError, LookupError, AttributeError)
 
 
@@ -59,7 +59,7 @@ class _Line:
 
 @dataclass(frozen=True)
 class _Arc:
-    """`angle` [rad] from `start`, positive counter-clockwise, in a plane parallel to XY."""
+    """An arc through `angle` [rad] from `start`, positive counter-clockwise, in a plane parallel to XY."""
 
     start: Point
     end: Point
@@ -107,14 +107,14 @@ _Segment = _Line | _Arc | _Curve
 
 
 class _UnsupportedError(Exception):
-    """Why an entity is left out."""
+    """The reason why an entity is left out."""
 
 
 def read_dxf(content: bytes, name: str = "drawing.dxf", feed: float | None = None) -> Program:
     """The moves of a drawing; `line` is the number of the entity in its model space, from 1.
 
     All moves have the `feed` [mm/s]; without one, only the machine limits them. Raises ProgramError in one
-    sentence, MissingPackageError without ezdxf.
+    sentence, and MissingPackageError without ezdxf.
     """
     try:
         from ezdxf import recover
@@ -128,11 +128,11 @@ def read_dxf(content: bytes, name: str = "drawing.dxf", feed: float | None = Non
     try:
         document: Any = recover.read(io.BytesIO(content))[0]
         units = int(document.header.get("$INSUNITS", 0))
-        # The package rounds its factors: 25.400000000102.
+        # The package's factors are rounded, such as 25.400000000102.
         factor = conversion_factor(InsertUnits(units), InsertUnits.Millimeters) if units else 1.0
         scale = float(f"{factor:.9g}")
         entities = list(document.modelspace())
-    except Exception as error:  # a broken file makes the package raise errors of any type
+    except Exception as error:  # for broken files the package raises errors of any type
         what = " ".join(str(error).split()) or type(error).__name__
         raise ProgramError(f"{name} cannot be read as DXF ({what}): save the drawing anew") from None
     if len(entities) > MAX_ENTITIES:
@@ -166,7 +166,7 @@ def read_dxf(content: bytes, name: str = "drawing.dxf", feed: float | None = Non
 
 
 def _add(moves: Moves, segments: Sequence[_Segment], number: int) -> None:
-    """Follows an entity, backwards where its end is nearer to the tool and touches it."""
+    """Adds an entity's moves, in reverse if its end touches the tool's position and its start does not."""
     if not segments:
         return
     ahead, back = moves.gap(segments[0].start), moves.gap(segments[-1].end)
@@ -178,7 +178,7 @@ def _add(moves: Moves, segments: Sequence[_Segment], number: int) -> None:
 
 
 def _hidden(document: Any, entity: Any) -> bool:
-    # Kinds that the package does not know have no such attribute.
+    # Entities of kinds that the package does not know have no such attribute.
     layer = entity.dxf.layer if entity.dxf.hasattr("layer") else "0"
     if layer not in document.layers:
         return False
@@ -211,7 +211,7 @@ def _segments(entity: Any, scale: float) -> list[_Segment]:
         if kind == "ELLIPSE":
             from ezdxf.math import BSpline
 
-            # Equal parameters mean the whole ellipse.
+            # Equal start and end parameters mean the whole ellipse.
             span = (spline.end_param - spline.start_param) % math.tau or math.tau
             spline.end_param = spline.start_param + span
             spline = BSpline.from_ellipse(spline)
@@ -252,7 +252,7 @@ def _arc(entity: Any, scale: float) -> _Arc:
 
 
 def _on_side(point: Sequence[float], side: float) -> Point:
-    """A point in the drawing's coordinates; seen from below X and Z of an entity count backwards."""
+    """A point in the drawing's coordinates; seen from below, an entity's X and Z have the opposite sign."""
     x, y, z = (*point, 0.0)[:3]
     return np.array([side * x, y, side * z], dtype=np.float64)
 
@@ -274,7 +274,7 @@ def _polyline(
 
 
 def _bulge(start: Point, end: Point, bulge: float) -> _Arc:
-    """The arc whose bulge is the tangent of a quarter of its sweep, positive counter-clockwise."""
+    """The arc of a `bulge`, which is tan(sweep/4), positive counter-clockwise."""
     x, y = 0.5 * (end - start)[:2]
     height = (1.0 - bulge * bulge) / (2.0 * bulge)
     centre = 0.5 * (start + end) + height * np.array([-y, x, 0.0])

@@ -1,4 +1,4 @@
-"""Events between the moves of a program: spindle, coolant, tools, outputs, dwells, stops, remarks."""
+"""Events between a program's moves: spindle, coolant, tools, outputs, dwells, stops, messages, comments."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 from feedplan.arrays import Floats, Integers
 
 MESSAGE, COMMENT = "(", ";"
-# The M codes whose output has the letter E.
+# The M codes whose channel is given by the letter E.
 _ANALOG = (67, 68)
 
 
 @dataclass(frozen=True, eq=False)
 class Events:
-    """Words that switch something, in the order of the program, one row each.
+    """The words that cause events, in the order of the program, one row each.
 
-    `move` (m,) is how many moves come before it, `line` (m,) its 1-based source line, `letter` (m,) and
-    `number` (m,) the word: M3, S1000, T5, M62, M0, G4. `p` and `q` (m,) are the words that belong to it, NaN
-    where it has none: of M6 `p` is the tool's number, of G4 the seconds, of M66 to M68 the word E. A
-    message (MSG, DEBUG, PRINT and LOG of LinuxCNC, M117) has the letter `(`, a comment `;`, and as its number
-    the place of its text in `texts`.
+    `move` (m,) is the number of moves before the event, `line` (m,) its 1-based source line; `letter` (m,)
+    and `number` (m,) are the word: M3, S1000, T5, M62, M0, G4. `p` and `q` (m,) are the values of the words
+    that belong to it, NaN without one; `p` is the tool's number for M6, the seconds for G4, and the word E
+    for M66 to M68. A message (MSG, DEBUG, PRINT and LOG of LinuxCNC, M117) has the letter `(`, a comment `;`;
+    its number is the index of its text in `texts`.
     """
 
     move: Integers
@@ -47,8 +47,7 @@ class Events:
         return len(self.move)
 
     def words(self) -> tuple[str, ...]:
-        """Each event as it would be written, such as `M62 P3`; messages and comments as their text in
-        brackets."""
+        """Each event as words, such as `M62 P3`; messages and comments as their text in brackets."""
         return tuple(f"({text})" if said else text for text, said in zip(*self.said(), strict=True))
 
     def said(self) -> tuple[list[str], list[bool]]:
@@ -68,15 +67,15 @@ class Events:
 
 
 def _word(letter: float, number: float, p: float, q: float) -> str:
-    """A word with the words that belong to it."""
+    """An event's word with the words that belong to it."""
     first = "E" if letter == ord("M") and number in _ANALOG else "P"
     others = "".join(f" {name}{value:g}" for name, value in ((first, p), ("Q", q)) if not math.isnan(value))
     return f"{chr(int(letter))}{number:g}{others}"
 
 
 def _different(*columns: NDArray[Any]) -> tuple[Integers, Integers]:
-    """The first of each kind of row, and the kind of each row (m,), by the bits of columns (m,): no NaN is
-    equal to another."""
+    """The first row of each kind, and the kind of each row (m,). Rows are of one kind if all their `columns`
+    (m,) are equal bit by bit, so NaN equals the same NaN."""
     kind = np.zeros(len(columns[0]), np.int64)
     for column in columns:
         _, own = np.unique(column.astype(np.float64).view(np.int64), return_inverse=True)

@@ -1,4 +1,4 @@
-"""Reads G-code (RS-274/NGC, as CAM systems post it) into a Program: as LinuxCNC's interpreter reads it.
+"""Reads G-code (RS-274/NGC, as CAM systems post it) into a Program, as LinuxCNC's interpreter does.
 
 | words | meaning |
 |---|---|
@@ -44,13 +44,14 @@
 | F, N, O1234 or :1234 at the start, %, ( ) and ; comments | as usual |
 | / at the start of a block | left out, with a warning, unless `block_delete=False` |
 
-Parameters: #1 to #30 and #<name> belong to their call, #31 to #5602, #7001 to #8980 and #<_name> to all;
-#5161 to #5390 hold home and offsets, #5400 to #5428 are tool and position, #<_x>, #<_metric> and others like
-them the modes. What is not set is 0, with a warning; names must be set. In a macro of G65 words of arguments
-that are not given are left out; values of the control (#1000 to #5160) that nothing sets and alarms (#3000)
-are errors. Loops and calls are bounded: by `max_moves`, four lines a move beside the text, and 100 calls
-deep. Subprograms in files are looked for beside the program, then in `subprograms`; their moves have the
-line of the call.
+Parameters: #1 to #30 and #<name> belong to one call; #31 to #5602, #7001 to #8980 and #<_name> are global.
+#5161 to #5390 are home and offsets, #5400 to #5428 tool and position, #<_x>, #<_metric> and similar ones the
+modes. A numbered parameter that is not set is 0, with a warning; a named one must be set. In a macro called
+by G65, words that use an argument which is not given are left out; values of the control (#1000 to #5160)
+that nothing sets, and alarms (#3000), are errors. Loops and calls are limited by `max_moves`, by four
+executed lines for each of `max_moves` in addition to the lines of the text, and by 100 nested calls. Files of
+subprograms are looked for in the folder of the program, then in `subprograms`; their moves have the line of
+the call.
 
 These words are refused; the message has the word, the line and the remedy:
 
@@ -71,26 +72,27 @@ These words are refused; the message has the word, the line and the remedy:
 | a word that no code of its block uses | it would mean something else than is planned |
 | Heidenhain, Siemens, other languages | another language, named |
 
-Programs read beside LinuxCNC's interpreter: `python -m tests.program.readings FOLDER...` prints a table. Sums
-that differ by less than 1e-6 are equal to LE and GE, as in LinuxCNC 2.9, and not in interpreters before it.
+To compare with LinuxCNC's interpreter, `python -m tests.program.readings FOLDER...` prints a table. Numbers
+that differ by less than 1e-6 are equal in comparisons with LE and GE, as in LinuxCNC 2.9; in older
+interpreters they are not.
 
-Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own
-block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start
-at zero, or at home where words always are the tip; a change of offsets moves nothing. A stop or dwell belongs
-to the move before it, and a dwell before the first move is kept as `start_dwell`.
+Within a block the order is LinuxCNC's, with differences that posts rely on: F is in the units of its own
+block, G80 is ignored if the block has another motion code, and G0 in a block with G28 only stays in force.
+All axes start at zero, or at home where words always mean the tip; a change of offsets moves nothing. A stop
+or dwell belongs to the move before it, and a dwell before the first move is kept as `start_dwell`.
 
-A spline of several blocks is one move, in the line and at the feed of its first block; nothing else may stand
-inside it. Its knots and control points are LinuxCNC's and Fanuc's: with G91 those of G5.2 count from its
-start, those of G6.2 from the one before. G93 does not go with splines.
+A spline of several blocks is one move, with the line and the feed of its first block; no other words may be
+between its blocks. Knots and control points are read as LinuxCNC and Fanuc do: with G91, the points of G5.2
+are relative to its start, those of G6.2 to the point before. G93 is not allowed with splines.
 
-G43.4 and G43.5 take a machine with rotary axes. Under them no word has the tool's length in it: it is that of
-G43.1 Z before, else the machine file's, with a warning. The change moves nothing: where the joints are is
-written in the new words, and what the next block does not name stays there. G49, and G43 or G43.1, go back to
-joint positions; after directions these are followed move by move in the pose they began with, by the shortest
-turn. I, J, K point from the tip to the spindle; any length will do, missing ones are 0, and without all three
-the direction stays. G28, G30, G53 and cycles need G49 before. On machines whose words always are the tip, as
-cylindrical and CoreXY ones, home and work offsets are in the program's letters, and G43 adds to Z as
-elsewhere.
+G43.4 and G43.5 need a machine with rotary axes. In these modes no word includes the tool's length, which is
+that of G43.1 Z before, else that of the machine file, with a warning. The change of mode moves nothing: the
+positions of the joints are expressed in the new words, and axes that the next block does not name keep them.
+G49, and G43 or G43.1, return to joint positions. After directions, the joint positions are those of following
+the directions move by move, in the pose in which they began and by the shortest turn. I, J, K point from the
+tip to the spindle and may have any length; missing ones are 0, and without all three the direction stays.
+G28, G30, G53 and cycles need G49 before. On machines whose words always mean the tip, such as cylindrical and
+CoreXY machines, home and work offsets are in the program's letters, and G43 adds to Z as elsewhere.
 """
 
 from __future__ import annotations
@@ -129,13 +131,13 @@ MAX_MOVES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class Options:
-    """What the native reader takes besides the program.
+    """The arguments of the native reader besides the program.
 
-    `places` (n, 9) are the home position, where the program begins, and the work offsets G54 to G59.3 and
-    G54.1 P1 on, in X Y Z A B C U V W; `machine_axes` is empty where there is no machine, `tip_control` None.
+    `places` (n, 9) are the home position, the start of the program, and the work offsets G54 to G59.3 and
+    G54.1 P1 on, in X Y Z A B C U V W; without a machine `machine_axes` is empty and `tip_control` None.
     `machines_with` names the machines that have the axis of a letter; `tools` are rows of the tool table,
-    None where it is not known; `subprograms` gives for a name the file's name and bytes, or None; the others
-    are as for `read_gcode`.
+    None where it is not known; `subprograms` returns the file's name and bytes for a name, or None; the other
+    fields are those of `read_gcode`.
     """
 
     places: Floats
@@ -167,17 +169,19 @@ def read_gcode(
     """The moves of a G-code program.
 
     `source` is a path, a stream, or the program itself: bytes, or a str with a line break. `machine` gives
-    the work offsets, the home position and the axes there are; without it offsets and home are 0. `name`
-    stands in messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as
-    LinuxCNC does. `tools` is the tool table; without one lengths by H are 0. `subprograms` are folders of the
-    files that the program calls, after its own. `feed` [mm/s, deg/s] is that of moves before the first F.
-    `whole_step` is the unit of lengths and angles without a decimal point, in units of the program: 0.001 on
-    controls that are set so. `max_bytes` and `max_moves` bound the program. `progress` gets the part done.
-    Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
+    the work offsets, the home position and the axes that exist; without it offsets and home are 0. `name`
+    replaces the file's name in messages. `block_delete` leaves out blocks that start with `/`, as LinuxCNC
+    does. `tools` is the tool table; without one lengths by H are 0. `subprograms` are folders with files that
+    the program calls; the program's own folder is searched first. `feed` [mm/s, deg/s] is the feed of moves
+    before the first F. `whole_step` is the unit of lengths and angles without a decimal point, in units of
+    the program: 0.001 on controls with that setting. `max_bytes` and `max_moves` limit the program.
+
+    `progress` is called with the finished share. Raises ProgramError naming file, line, word and remedy,
+    MachineError where an offset's name is unknown.
     """
     content, name, text = content_of(source, name, max_bytes)
     folders = [*([text.parent] if isinstance(text, Path) else []), *subprograms]
-    # Kinematics are loaded where a program is read, not where feedplan is imported.
+    # Imported here, so that `import feedplan` does not load kinematics.
     from feedplan.program.tip import TipControl
 
     control = None if machine is None else TipControl(machine)
@@ -203,11 +207,11 @@ def read_gcode(
 
 
 def _places(machine: Machine | None) -> Floats:
-    """Home, the start of the program and the work offsets as rows (110, 9) over XYZABCUVW."""
+    """Home, the start of the program and the work offsets as rows (110, 9), in the order XYZABCUVW."""
     places = np.zeros((2 + len(WORK_OFFSETS), len(AXIS_LETTERS)))
     if machine is None:
         return places
-    # Axes of other names cannot be programmed.
+    # Axes with other names cannot be programmed.
     own = [k for k, letter in enumerate(machine.program_letters) if letter in tuple(AXIS_LETTERS)]
     columns = [AXIS_LETTERS.index(machine.program_letters[k]) for k in own]
     for key, row in machine.offsets:

@@ -1,4 +1,4 @@
-"""The smallest bundled machine that fits a program."""
+"""Finds the smallest bundled machine that fits a program."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from feedplan.errors import ProgramError
 from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.program.program import Program
 
-# The name by which users ask for the smallest machine.
+# The name with which users request the smallest machine.
 AUTO = "auto"
 
-# The machine that comes first among those with the same axes.
+# This machine is tried first among those with the same number of axes.
 _FIRST = "mill"
 
 
 def names_of_machines_with(letter: str) -> str:
-    """The bundled machines that have an axis, as a part of a sentence; empty where none has it."""
+    """The bundled machines that have an axis, as a part of a sentence; empty if none has it."""
     names = [machine.name for machine in _by_size() if letter in machine.program_letters]
     return f" ({', '.join(names)})" if names else ""
 
@@ -27,9 +27,9 @@ def names_of_machines_with(letter: str) -> str:
 def smallest_machine(read: Callable[[Machine], Program]) -> tuple[Machine, Program]:
     """The bundled machine with the fewest axes that fits a program, and the program.
 
-    A machine fits if the program can be read for it and stays within its travels. Where no travels suffice it
-    is the first machine that the program can be read for. `read` reads the program for a machine; its error
-    for the largest machine is raised where the program can be read for none.
+    A machine fits if the program can be read for it and stays within its travels. If no travels suffice, the
+    result is the first machine for which the program can be read. `read` reads the program for a machine; if
+    it fails for all machines, its error for the largest one is raised.
     """
     found: tuple[Machine, Program] | None = None
     *smaller, largest = _by_size()

@@ -1,4 +1,4 @@
-"""Collects lines, arcs and curves as the moves of a program: for readers of drawings and path files."""
+"""Collects lines, arcs and curves as the moves of a program, for the readers of drawings and path files."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.program.program import MoveKind, PathControl, Program
 
-# Ends closer than this are one point [mm, deg]: rounding to four decimals moves them so far.
+# Ends closer than this are the same point [mm, deg]: they may be rounded to four decimals.
 TOUCHING = 2e-4
 
-# The feed [mm/s] of moves without one: above the speed of every machine, and finite as they are no rapids.
+# The feed [mm/s] of moves without one: above the speed of every machine, but finite, because these moves are
+# no rapids.
 NO_FEED = 1e6
 
 
 class Moves:
     """Moves of a program in `axes`, which are in the order XYZABCUVW and include X, Y and Z.
 
-    `feed` [mm/s, deg/s] is that of moves without one, by default none.
+    `feed` [mm/s, deg/s] is the feed of moves that have none; by default the feed does not limit them.
     """
 
     def __init__(self, axes: tuple[str, ...], feed: float | None = None) -> None:
@@ -34,11 +35,12 @@ class Moves:
         self._splines: list[tuple[int, CompositeCurve]] = []
 
     def gap(self, point: Floats) -> float:
-        """The distance [mm] of a point from the end of the last move; 0 before the first move."""
+        """The greatest difference in one coordinate [mm, deg] between a point and the end of the last move; 0
+        before the first move."""
         return 0.0 if self._start is None else float(np.abs(point - self._position).max())
 
     def go_to(self, point: Floats, line: int) -> None:
-        """Adds a rapid to a point (axes,), unless the tool is there; the first point is the start."""
+        """Adds a rapid to a point (axes,), unless the tool is there already; the first point is the start."""
         if self._start is None:
             self._start = self._position = point
         elif self.gap(point) > TOUCHING:
@@ -55,7 +57,8 @@ class Moves:
         self._move(MoveKind.ARC, target, feed, line)
 
     def spline(self, curve: CompositeCurve, feed: float | None, line: int) -> None:
-        """Adds a curve in all axes from where the tool is, to rounding, unless all its points coincide."""
+        """Adds a curve in all axes, unless all its points coincide; its first point is set exactly to the
+        tool's position."""
         control = curve.control_points.copy()
         control[0] = self._position
         if (control == control[0]).all():
@@ -107,5 +110,5 @@ class Moves:
 
 
 def program_axes(letters: tuple[str, ...]) -> tuple[str, ...]:
-    """These letters and X, Y, Z, in the order of a program."""
+    """The given letters together with X, Y, Z, in the order of a program."""
     return tuple(letter for letter in AXIS_LETTERS if letter in {*letters, "X", "Y", "Z"})

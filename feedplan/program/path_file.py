@@ -1,16 +1,16 @@
-"""Reads a path file, curves in JSON, into a Program:
+"""Reads a path file (curves in JSON) into a Program:
 
     {"unit": "mm", "axes": ["X", "Y", "Z"], "feed": 80.0, "rapid": true,
      "curves": [{"degree": 3, "control_points": [[0, 0, 0], …], "knots": […], "weights": […], "feed": 60.0}]}
 
 Only "curves" is required. "unit" is "mm" (default) or "inch", for linear axes and feeds; rotary ones are in
-degrees. "axes" names the columns, X, Y, Z, A, B, C as many as there are by default. If one of them is no
-letter of a program, such as "j1", all are axes of the machine in its own units, and "unit" must be left
-out. "feed" is in units per second and may be given for each curve. Without "knots" degree + 1 control
-points are a Bézier curve, and more of them a B-spline with clamped uniform knots; with knots there are
-points + degree + 1. Each curve starts where the one before ends, or with "rapid": true a rapid goes there.
-The program starts where its first curve does. Places are machine coordinates; on a five-axis machine they are
-joint positions, as without G43.4.
+degrees. "axes" names the columns; by default they are the first of X, Y, Z, A, B, C. If one of the names is
+no letter of a program, such as "j1", all are axes of the machine in its own units, and "unit" must be left
+out. "feed" is in units per second and may be given for each curve. Without "knots", degree + 1 control points
+are a Bézier curve, and more points are a B-spline with clamped uniform knots; the number of knots must be
+points + degree + 1. Each curve must start where the one before ends, unless "rapid": true adds a rapid to its
+start. The program starts where its first curve does. Points are in machine coordinates; on a five-axis
+machine they are joint positions, as without G43.4.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MAX_BYTES = 1 << 28
 MAX_POINTS = 10_000_000
 
 _DEFAULT_AXES = "XYZABC"
-_FARTHEST = 1e6  # [mm]; beyond is a mistake
+_FARTHEST = 1e6  # [mm]; larger coordinates are a mistake
 _FARTHEST_TURN = 1e8  # [deg]
 _KEYS = {"unit", "axes", "feed", "rapid", "curves"}
 _CURVE_KEYS = {"degree", "control_points", "knots", "weights", "feed"}
@@ -52,7 +52,7 @@ def read_path_file(
 ) -> Program:
     """The curves of a path file as spline moves; `line` is the number of the curve, from 1.
 
-    `feed` [mm/s, or the unit of the axes per second] is that of curves without one.
+    `feed` [mm/s, or the unit of the axes per second] is the feed of curves that have none.
 
     Raises ProgramError in one sentence that names the place in the file.
     """
@@ -132,7 +132,7 @@ class _PathFile:
             len(points) > degree, f"{place}.control_points", f"{len(points)} points", f"more than {degree}"
         )
         n = len(points)
-        # Clamped and uniform; with degree + 1 points it is a Bézier curve.
+        # Clamped uniform knots; degree + 1 points are a Bézier curve.
         knots = np.clip(np.arange(n + degree + 1, dtype=np.float64), degree, n) - degree
         if row.get("knots") is not None:
             knots = self._numbers(row["knots"], f"{place}.knots", n + degree + 1)

@@ -1,4 +1,4 @@
-"""A part program as moves: what every reader returns and the path is built from."""
+"""A part program as moves: the result of every reader, and the input of the path builder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LINEAR_AXES = "XYZ"
 
 
 class MoveKind(IntEnum):
-    """What a move is."""
+    """The kind of a move."""
 
     RAPID = 0
     LINE = 1
@@ -32,7 +32,7 @@ class MoveKind(IntEnum):
 
 
 class StopCause(IntEnum):
-    """The cause of a full stop after a move; of several causes the last one in this list."""
+    """The cause of a full stop after a move; if there are several, the one with the greatest number."""
 
     NONE = 0
     CHANGE = 1  # of the coordinate mode or the tool length
@@ -66,36 +66,37 @@ _DTYPES = {
 class Program(OfNative[Moves]):
     """Moves of a part program in order, in machine coordinates [mm, deg].
 
-    `axes` are the letters of its columns: readers give X, Y, Z and the others that the program uses, in the
-    order XYZABCUVWIJK. `start` (axes,) is where the first move begins, after a pause of `start_dwell` [s].
+    `axes` are the letters of its columns: readers give X, Y, Z and all others that the program uses, in the
+    order XYZABCUVWIJK. `start` (axes,) is the position where the first move begins, after a pause of
+    `start_dwell` [s].
 
     Each of the n moves has
 
-    - `kind` (MoveKind), `line` (1-based source line) and `target` (n, axes), where it ends;
-    - `feed` [mm/s], infinite on rapids only. It counts along X, Y, Z where one of these moves, else along
-      U, V, W, else it is in deg/s of the rotary axes; on an arc it counts along the circle or helix;
+    - `kind` (MoveKind), `line` (1-based source line) and `target` (n, axes), its end position;
+    - `feed` [mm/s], infinite on rapids only. It counts along X, Y, Z where one of these moves, else along U,
+      V, W, else it is in deg/s of the rotary axes; on an arc it counts along the circle or helix;
     - `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q [mm], NaN without them);
-    - `stop`: a full stop follows, by an M word, a dwell or the end; `stop_cause` (StopCause; None where only
-      the end stops) and `dwell` [s] after it.
+    - `stop`: a full stop follows, because of an M word, a dwell or the end; `stop_cause` (StopCause; None
+      where only the end stops) and `dwell` [s] after it.
 
     Each of the k arcs has `arc_move` (index of its move), `arc_centre` (k, 3) in X, Y, Z, `arc_normal` (0, 1,
-    2: the axis that it turns about) and `arc_angle` [rad], positive counter-clockwise seen from the tip of
-    the normal; it may exceed a turn. All other axes move linearly with the angle, and so does the radius,
-    which rounded coordinates make different at both ends.
+    2: the axis of rotation X, Y, Z) and `arc_angle` [rad], positive counter-clockwise seen from the tip of
+    the normal; it may exceed a turn. All other axes are linear in the angle, and so is the radius, which may
+    differ at both ends because coordinates are rounded.
 
-    Each of the splines has `spline_move` (index of its move) and the pieces of `splines` from `spline_pieces`
-    (k + 1,), a curve in all `axes` from the move's start to its target.
+    Each of the k splines has `spline_move` (index of its move) and the pieces of `splines` from
+    `spline_pieces` (k + 1,): a curve in all `axes` from the move's start to its target.
 
-    Axis words have a meaning, `coordinate_mode` (n,), a `CoordinateMode`, and in the modes TIP and VECTOR a
-    tool, `tool_length` (n,) [mm], NaN for the machine file's; both are None where the machine has one mode
-    only. In the mode VECTOR the last columns are I, J, K, the unit vector from the tip to the spindle; F on a
-    move of these alone is in deg/s of the tool's turning. Columns that a mode does not use stay as they are.
-    A change of mode is a full stop and moves no joint: `change_move` (c,) are the first moves in a new mode,
-    and `change_start` (c, axes) is where they start in the new words.
+    `coordinate_mode` (n,) is the meaning of the axis words, a `CoordinateMode`; `tool_length` (n,) [mm] is
+    the tool in the modes TIP and VECTOR, NaN for that of the machine file; both are None where the machine
+    has only one mode. In the mode VECTOR the last columns are I, J, K, the unit vector from the tip to the
+    spindle; the feed of a move of these alone is the rate at which the tool turns [deg/s]. Columns that a
+    mode does not use do not change. A change of mode is a full stop and moves no joint: `change_move` (c,)
+    are the first moves in a new mode, and `change_start` (c, axes) their starts in the new words.
 
     `events` happen between the moves: spindle, coolant, tools, outputs, dwells, stops, messages. `warnings`
-    are sentences for the user. Of a program that was read, `text` is its file, or its bytes, and `sha256` the
-    hash of these; `reading` are the arguments of `read_program` that read it again as G-code.
+    are sentences for the user. For a program that was read, `text` is its file, or its bytes, and `sha256`
+    the hash of its bytes; `reading` are the arguments with which `read_program` reads it again as G-code.
 
     The arrays of the moves' geometry are read-only views of a native object.
     """
@@ -143,13 +144,13 @@ class Program(OfNative[Moves]):
         return f"<Program {self.name}: {counted(len(self), 'move')} of {' '.join(self.axes)}>"
 
     def starts(self) -> Floats:
-        """Where each move starts, in its own words (n, axes) [mm, deg]."""
+        """The start of each move, in the words of that move (n, axes) [mm, deg]."""
         starts = np.concatenate([self.start[None, :], self.target[:-1]])
         starts[self.change_move] = self.change_start
         return starts
 
     def moving(self) -> Flags:
-        """Which moves move which axes (n, axes); an arc moves both axes of its plane."""
+        """Whether each move moves each axis (n, axes); an arc moves both axes of its plane."""
         moves = np.empty(self.target.shape, dtype=np.bool_)
         moves[:1] = self.target[:1] != self.start
         moves[1:] = self.target[1:] != self.target[:-1]
@@ -158,7 +159,7 @@ class Program(OfNative[Moves]):
             if name in self.axes:
                 moves[self.arc_move[self.arc_normal != column], self.axes.index(name)] = True
         if self.splines is not None and len(self.spline_move):
-            # The points of a move reach from the offset of its first piece to that of the next move's.
+            # A move's control points are from the offset of its first piece to that of the next move's.
             points = self.splines.offsets[self.spline_pieces[:-1]]
             control = self.splines.control_points[: self.splines.offsets[self.spline_pieces[-1]]]
             greatest, least = np.maximum.reduceat(control, points), np.minimum.reduceat(control, points)
@@ -166,9 +167,9 @@ class Program(OfNative[Moves]):
         return moves
 
     def along(self, axes: tuple[str, ...]) -> Program:
-        """The same moves in some axes alone, in that order.
+        """These moves in the given axes only, in that order.
 
-        Raises InputError where the program has no such axis, or moves another one.
+        Raises InputError if the program lacks one of these axes, or moves another one.
         """
         if axes == self.axes:
             return self

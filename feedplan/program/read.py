@@ -1,4 +1,4 @@
-"""Reads a part program in any language: G-code, path file or drawing."""
+"""Reads a part program in any language: G-code, a path file or a drawing."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ def checked_reading(reading: object) -> Reading:
 
 Reader = Callable[[bytes, Machine | None, str, float | None], Program]
 
-# Readers by the ending of the name, with the greatest size [bytes]; everything else is G-code.
+# Readers by the ending of the name, with the greatest size [bytes]; all other programs are G-code.
 READERS: dict[str, tuple[Reader, int]] = {
     ".json": (read_path_file, path_file.MAX_BYTES),
     ".dxf": (lambda content, machine, name, feed: read_dxf(content, name, feed), path_file.MAX_BYTES),
 }
 _FOLDER = "the path of a folder"
 _TABLE = "the path of a tool table (.tbl)"
-# How programs without an ending begin; G-code never begins so.
+# How programs without an ending in their name begin; G-code never begins like this.
 _BEGINNINGS = {
     ".json": re.compile(rb"(\xef\xbb\xbf)?\s*\{"),
     ".dxf": re.compile(rb"\s*(0\s+SECTION|999\s|AutoCAD Binary DXF)"),
@@ -76,14 +76,14 @@ def read_program(
     """The moves of a part program: a path file (.json), a drawing (.dxf), else G-code.
 
     `source`: the path of a file; or the program itself, as bytes, as a str with a line break, or as an open
-    file or another stream. `name` stands in messages instead of the file's name, and its ending decides
-    the language; without an ending the first characters decide. `machine`, or the name or file of one, gives
-    work offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete`
-    leaves out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and
-    diameters of tools; `subprograms` are folders of files that the program calls, after its own; `feed`
-    [mm/s, deg/s] is that of moves before the first F, or without one; `whole_step` is the unit of lengths
-    without a decimal point, in units of the program; G-code of more than `max_moves`, loops and calls
-    counted, is refused. `progress` gets the part done.
+    file or another stream. `name` replaces the file's name in messages, and its ending decides the language;
+    without an ending the first characters decide. `machine` (a Machine, or its name or file) gives work
+    offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes that exist. `block_delete` leaves
+    out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and diameters of
+    tools; `subprograms` are folders with files that the program calls; the program's own folder is searched
+    first. `feed` [mm/s, deg/s] is the feed of moves before the first F, or of moves without one; `whole_step`
+    is the unit of lengths without a decimal point, in units of the program; G-code with more than `max_moves`
+    moves, including those of loops and calls, is refused. `progress` is called with the finished share.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.

@@ -1,4 +1,4 @@
-"""The content of a part program: from a file, or from the text itself as str, bytes or a stream."""
+"""The content of a part program, from a file, or from the text itself as str, bytes or a stream."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan.errors import InputError, ProgramError, unreadable
 Source = str | bytes | os.PathLike[str] | IO[str] | IO[bytes]
 
 MAX_BYTES = 1 << 30
-# The part of a stream that is read at once [bytes].
+# The number of bytes of a stream that are read at once.
 _PART = 1 << 24
 # The name of a program without a file in messages.
 NO_NAME = "program"
@@ -22,7 +22,7 @@ _REMEDY = "the path of a file, the program as text with its line breaks or as by
 
 
 class Content(NamedTuple):
-    """The `content` of a program, its `name` in messages, and its `text`: the file that it is in, else the
+    """The `content` of a program, its `name` in messages, and its `text`: the path of its file, else the
     content itself."""
 
     content: bytes
@@ -31,15 +31,15 @@ class Content(NamedTuple):
 
 
 def require_other(own: object, *places: Path, what: str = "program") -> None:
-    """Raises InputError if one of the places is a file that was read, as the program: it would be lost."""
+    """Raises InputError if one of the `places` is the file `own`, which was read and would be overwritten."""
     for place in places:
-        with suppress(OSError, ValueError):  # no such file, or a name that no file can have
+        with suppress(OSError, ValueError):  # no such file, or an impossible file name
             if isinstance(own, (str, os.PathLike)) and place.samefile(own):
                 raise InputError(f"{place} is the {what} itself, which would be lost: choose another file")
 
 
 def content_of(source: Source, name: str | None = None, max_bytes: int = MAX_BYTES) -> Content:
-    """The content of a program; `name` stands in messages instead of the file's.
+    """The content of a program; `name` replaces the file's name in messages.
 
     A str with a line break is the program itself, any other one the path of its file. Raises ProgramError in
     one sentence where it cannot be read, is empty or larger than `max_bytes`.
@@ -66,7 +66,7 @@ def _of_file(path: Path, max_bytes: int) -> bytes:
         size = path.stat().st_size
         _check_size(size, str(path), max_bytes)
         with path.open("rb") as stream:
-            # Pipes and other special files have the size 0 whatever they hold.
+            # Pipes and other special files have size 0, whatever they contain.
             content = stream.read(size + 1) if size else b"".join(_parts(stream, max_bytes))
     except OSError as error:
         raise ProgramError(unreadable(path, error, "the path of a part program")) from None
@@ -78,7 +78,7 @@ def _of_stream(stream: Any, name: str | None, max_bytes: int) -> Content:
     name = name or (Path(own).name if isinstance(own, str) else "") or NO_NAME
     try:
         parts = list(_parts(stream, max_bytes))
-    except (OSError, ValueError) as error:  # closed, open for writing alone, no text
+    except (OSError, ValueError) as error:  # closed, open only for writing, or no text
         raise ProgramError(unreadable(name, error, "an open stream of text or bytes")) from None
     texts = [part.encode("utf-8", "surrogateescape") if isinstance(part, str) else part for part in parts]
     odd = next((part for part in texts if not isinstance(part, bytes)), None)

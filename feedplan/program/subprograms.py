@@ -15,15 +15,15 @@ ENDINGS = (".ngc", ".nc", "")
 
 
 def finder(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> Finder:
-    """A function from the name of a subprogram to its file's name and bytes, or None where no folder has it.
+    """Returns a function that finds a subprogram's file (name and bytes), or None if no folder has it.
 
-    Names are looked up in the order of `folders`, whatever the case of their letters. The function raises
-    OSError where a file cannot be read, ValueError where it is larger than `max_bytes`.
+    The folders are searched in their order; upper and lower case are equal. The function raises OSError where
+    a file cannot be read, ValueError where it is larger than `max_bytes`.
     """
     known = tuple(folders)
 
     def find(name: str) -> tuple[str, bytes] | None:
-        # A number may be written with zeros before it, and with the O of its program.
+        # File names may have the number with leading zeros, and with the O of the program before it.
         wanted = [name, *(f"{letter}{name:0>4}" for letter in ("", "o") if name.isdigit())]
         names = [base + ending for base in wanted for ending in ENDINGS]
         for folder in known:
@@ -39,9 +39,10 @@ def finder(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> Finder:
 
 
 def numbered_files(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> dict[str, bytes]:
-    """All files that a program may call by a computed number, by name; the first folder with a name counts.
+    """All files that a program may call by a computed number, by name; of files with equal names the one in
+    the first folder is taken.
 
-    Raises as the function that `finder` returns.
+    Raises the errors of the function that `finder` returns.
     """
     find = finder(folders, max_bytes)
     stems = {file.name.lower().partition(".")[0] for folder in folders for file in _files(folder)}
@@ -60,7 +61,7 @@ def readable_folder(folder: Path) -> Path:
 
 
 def _files(folder: Path) -> list[Path]:
-    # The program's own folder may have been removed, or be one that only its files may be read in.
+    # The program's own folder may have been removed, or may not allow listing.
     try:
         return sorted(file for file in folder.iterdir() if file.is_file())
     except OSError:

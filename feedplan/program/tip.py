@@ -1,4 +1,4 @@
-"""What G43.4, G43.5 and G49 do on a machine: the same joint positions in another coordinate mode."""
+"""Converts the same joint positions between coordinate modes on a machine, for G43.4, G43.5 and G49."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _PARALLEL = 1e-9
 
 @dataclass(frozen=True)
 class TipControl:
-    """The reader's view of a machine; places are X Y Z A B C U V W [mm, deg], then I J K.
+    """The machine as the G-code reader uses it; places are X Y Z A B C U V W [mm, deg], then I J K.
 
-    `tool_length` [mm] is NaN for the machine file's. All raise MachineError in one sentence.
+    `tool_length` [mm] is NaN for that of the machine file. All methods raise MachineError in one sentence.
     """
 
     machine: Machine
@@ -32,7 +32,7 @@ class TipControl:
         return isinstance(self.machine.inverse, RotaryChain)
 
     def check(self, mode: int) -> None:
-        """Raises MachineError where the machine does not have that coordinate mode."""
+        """Raises MachineError if the machine does not have that coordinate mode."""
         if mode != CoordinateMode.JOINTS:
             self._chain(math.nan)
         if mode == CoordinateMode.VECTOR:
@@ -45,9 +45,10 @@ class TipControl:
         entry: Sequence[float],
         places: Sequence[Sequence[float]],
     ) -> list[float]:
-        """Joints (9,) at the last of the places (k, 12) of moves in one mode that begin at joints `entry`.
+        """Joints (9,) at the last of the `places` (k, 12) of consecutive moves in one mode; the joints are at
+        `entry` before them.
 
-        Where directions are programmed, each move takes the pose and the turn next to the one before.
+        With directions, each move takes the pose and the turns nearest to the joints before it.
         """
         joints = list(places[-1][: len(AXIS_LETTERS)])
         if mode == CoordinateMode.JOINTS:
@@ -65,7 +66,7 @@ class TipControl:
     def place(
         self, mode: int, tool_length: float, joints: Sequence[float]
     ) -> tuple[list[float], list[float]]:
-        """Place (9,) and tool direction (3,) in words of a mode, where the joints (9,) are."""
+        """Place (9,) and tool direction (3,) in the words of a mode, for joints (9,)."""
         place, direction = list(joints), [0.0, 0.0, 1.0]
         if mode == CoordinateMode.JOINTS:
             return place, direction
@@ -89,7 +90,7 @@ class TipControl:
     def _follow(
         self, chain: RotaryChain, entry: Sequence[float], places: Sequence[Sequence[float]]
     ) -> list[float]:
-        """The rotary joints after moves by directions, in the pose in which these begin."""
+        """The rotary joints [deg] after moves by directions, in the pose nearest at their first move."""
         joints = {name: entry[AXIS_LETTERS.index(name)] for name in chain.joint_names[3:]}
         vector = ToolVector(chain)
         first = vector.from_part[0].name
@@ -104,18 +105,18 @@ class TipControl:
                 others = _angles(other, joints, place)
                 if _turning(others, joints) < _turning(found, joints):
                     vector, found = other, others
-            # A tool parallel to the first axis from the part leaves that axis where it is.
+            # A tool parallel to the rotary axis nearest to the part does not move that axis.
             joints = found | ({first: joints[first]} if parallel else {})
         return list(joints.values())
 
 
 def _words(chain: RotaryChain, place: Sequence[float]) -> list[float]:
-    """Of a place what the chain takes: X, Y, Z and its rotary words."""
+    """The words of a place that the chain takes: X, Y, Z and its rotary words."""
     return [place[AXIS_LETTERS.index(name)] for name in chain.joint_names]
 
 
 def _angles(vector: ToolVector, before: Mapping[str, float], place: Sequence[float]) -> dict[str, float]:
-    """The rotary joints [deg] for a place's direction, next to those before."""
+    """The rotary joints [deg] for a place's direction, on the whole turns nearest to `before`."""
     found = vector.angles(place[9:])
     return {name: shortest_turn(angle, float(found[name])) for name, angle in before.items()}
 

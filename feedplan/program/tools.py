@@ -1,9 +1,9 @@
-"""Tool tables of LinuxCNC (.tbl): lengths for G43, diameters for G41 and G42.
+"""Reads tool tables of LinuxCNC (.tbl): lengths for G43, diameters for G41 and G42.
 
 A line is a tool: `T1 P2 Z50.3 D6 ;6 mm end mill`. T is its number, P its pocket, X to W its offset [mm, deg],
-D its diameter [mm], I and J the angles of a lathe tool, which no path needs, Q the side of its tip that cuts.
-Text after `;` is a comment. A number given to two tools is an error: LinuxCNC takes the first one without a
-word, where most people expect the last.
+D its diameter [mm], I and J are the angles of a lathe tool, which no path needs, Q its orientation. Text
+after `;` is a comment. A number given to two tools is an error: LinuxCNC silently takes the first one, where
+most people expect the last.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _KNOWN = frozenset("TPDQIJ").union(AXIS_LETTERS)
 
 
 class Tool(NamedTuple):
-    """A tool: `number`, `pocket`, `offset` (9,) along XYZABCUVW [mm, deg], `diameter` [mm] (negative where it
-    is smaller than the tool that a path was made for), `orientation` (1 to 9 for lathe tools, else 0)."""
+    """A tool: `number`, `pocket`, `offset` (9,) along XYZABCUVW [mm, deg], `diameter` [mm] (negative if it is
+    smaller than the tool for which the path was made), `orientation` (1 to 9 for lathe tools, else 0)."""
 
     number: int
     pocket: int

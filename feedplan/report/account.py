@@ -20,8 +20,9 @@ from feedplan.report.stops import Stops, stops_by_cause
 
 @dataclass(frozen=True)
 class Total:
-    """`time` of motion [s], its `length` [mm], and the angle that rotary axes `turn` while no other axis
-    moves [deg]; `turn_time` [s] is the time of that turning. `ToolMotion.units` may name other units."""
+    """A total of motion: its `time` [s] and `length` [mm], and the angle that rotary axes `turn` while no
+    other axis moves [deg]; `turn_time` [s] is the time of this turning. `ToolMotion.units` may name other
+    units."""
 
     time: float
     length: float
@@ -30,7 +31,7 @@ class Total:
 
     @property
     def mean(self) -> float:
-        """Mean speed, without turning alone [mm/s]."""
+        """Mean speed, without the parts where only rotary axes turn [mm/s]."""
         moving = self.time - self.turn_time
         return self.length / moving if moving > 0 and self.length > 0 else 0.0
 
@@ -42,9 +43,9 @@ class Total:
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """`limits` with their times, the longest first; the lines that lose most time; `stops` by cause; totals
-    of motion at a `feed`, of `rapid` motion and of `all`; the least and the greatest `tolerance` asked for
-    [mm]; `activity`, the active limit at each moment."""
+    """The account: `limits` with their times, the longest first; `slow`, the lines that lose most time;
+    `stops` by cause; totals of motion at a `feed`, of `rapid` motion and of `all`; the least and the greatest
+    requested `tolerance` [mm]; `activity`, the active limit at each moment."""
 
     motion: ToolMotion
     activity: Activity
@@ -57,7 +58,7 @@ class Account:
     tolerance: tuple[float, float]
 
     def to_json(self) -> dict[str, Any]:
-        """The numbers by name, as plan.json has them."""
+        """The numbers by name, as in plan.json."""
         return {
             "length": self.all.length,
             "turn": self.all.turn,

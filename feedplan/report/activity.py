@@ -1,8 +1,8 @@
 """The active limit at moments of a plan, computed from the plan's states and the limits of its problem.
 
-The use of a limit is its value over the limit. The active limit is the one with the greatest use, if that is
-at least `ACTIVE`; else no limit is active, and the motion changes from one limit to another. The method does
-not matter: no phase law is used.
+The use of a limit is value / limit. The active limit is the one with the greatest use, if this use is at
+least `ACTIVE`; else no limit is active, and the motion is in a transition between limits. The result does not
+depend on the method, because phase laws are not used.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from feedplan.report.limits import chord_speed, parameter_speed
 ACTIVE = 0.95
 NONE = "no limit active (transition)"
 
-# Most moments in all, and moments in each phase.
+# The greatest number of moments in total, and in each phase.
 _MOMENTS = 100_000
 _MOMENTS_PER_PHASE = 33
 
@@ -33,8 +33,8 @@ class Activity:
 
     `weight` is the time that each moment represents [s]; `run`, `piece` and `position` (`path_position`) are
     its run, piece and position on the path; `speed` is the tool's [mm/s, deg/s where it only turns]; `active`
-    is the number in `names` of the active limit; `pace` is the speed over the speed that feed and axis
-    velocities alone would allow.
+    is the index in `names` of the active limit; `pace` is speed / (speed that feed and axis velocities alone
+    would allow).
     """
 
     names: tuple[str, ...]
@@ -47,7 +47,7 @@ class Activity:
     position: Integers
 
     def at(self, position: Integers) -> Integers:
-        """Numbers of the last moments at or before these positions on the path; 0 if there is none before."""
+        """Indices of the last moments at or before these positions on the path; 0 if there is none before."""
         return np.maximum(np.searchsorted(self.position, position, "right") - 1, 0)
 
     @property
@@ -63,7 +63,7 @@ def activity(
     jerk: bool,
     progress: Listener | None = None,
 ) -> Activity:
-    """The activity of all limits; limits of jerk are included if `jerk` is true."""
+    """The activity of all limits; jerk limits are included if `jerk` is true."""
     time, weight, run = _moments(problem, profile)
     reader = profile.sampler(problem, part(progress, 0.0, 0.6))
     tell(progress, 0.6)
@@ -85,7 +85,7 @@ def activity(
     tell(progress, 0.9)
     names = ("feed", "chord error", *(f"{axis} {name}" for name in groups for axis in problem.axes), NONE)
     use = np.nan_to_num(np.column_stack([at_feed, chord, *groups.values()]), posinf=0.0)
-    # If the uses of several limits differ by rounding only, the first of these limits is the active one.
+    # If the uses of several limits differ only by rounding, the first of these limits counts as active.
     most = use.max(axis=1, initial=0.0)
     active = np.where(most >= ACTIVE, (use >= most[:, None] * (1.0 - 1e-6)).argmax(axis=1), len(names) - 1)
     pace = np.column_stack([at_feed, at_velocity]).max(axis=1, initial=0.0)
@@ -95,15 +95,15 @@ def activity(
 
 
 def path_position(problem: Problem, piece: NDArray[np.integer], u: Floats) -> Integers:
-    """Positions on a path as integers that grow along it: 2^20 for each piece."""
+    """Positions on a path as integers that increase along it: 2^20 for each piece."""
     part = u / problem.path.curve.width[piece]
     return np.asarray((piece.astype(np.int64) << 20) + np.round(part * ((1 << 20) - 1)).astype(np.int64))
 
 
 def _moments(problem: Problem, profile: SpeedProfile) -> tuple[Floats, Floats, Integers]:
-    """Times by the plan's clock, the time that each represents, and its run.
+    """Times on the plan's clock, the time that each represents [s], and its run.
 
-    Each phase is divided evenly; if there are too many phases, the whole time is divided evenly.
+    Each phase is divided equally; if there are too many phases, the whole time is divided equally.
     """
     count = len(profile)
     if 0 < count <= _MOMENTS:

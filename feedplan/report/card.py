@@ -1,4 +1,5 @@
-"""A plan as a small HTML table and its speed over time as SVG, for notebooks; it needs no other package."""
+"""Shows a plan as a small HTML table and its speed over time as SVG, for notebooks; needs no other
+package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a comparison: a row for each method, the speeds in one chart, linked to the tool path."""
+"""Makes the page of a comparison: a row for each method, the speeds in one chart, linked to the tool path."""
 
 from __future__ import annotations
 

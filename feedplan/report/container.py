@@ -1,4 +1,4 @@
-"""The data of a page as bytes: a JSON object, then the arrays in it as they are in memory.
+"""Writes the data of a page as bytes: a JSON object, then its arrays.
 
     4 bytes    length of the JSON, little-endian
     the JSON   with {"array": "f4", "at": 0, "count": 3} instead of each array; spaces up to a multiple
@@ -6,8 +6,8 @@
     arrays     each at a multiple of 4 bytes from the end of the JSON: the first byte of each number,
                little-endian, then the second byte of each, and so on
 
-`page/source/data.js` reads it. The high bytes of neighbours are much alike, so that a compressed page is a
-quarter smaller than with each number's bytes together.
+`page/source/data.js` reads it. The high bytes of neighbouring numbers are similar, so a compressed page is a
+quarter smaller than with the bytes of each number together.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def contained(data: Mapping[str, Any]) -> bytes:
 
 def as_text(content: bytes) -> str:
     """Bytes, compressed and in base 64, for the text of a page."""
-    # The low bytes of floats hardly shrink: level 6 would take twice the time for 1 % less.
+    # The low bytes of floats are hardly compressible: level 6 would take twice the time for 1 % less.
     return base64.b64encode(zlib.compress(content, 1)).decode("ascii")
 
 

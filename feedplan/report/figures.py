@@ -1,4 +1,4 @@
-"""The data of the page's charts, reduced from the setpoints in one pass over them."""
+"""Computes the data of the page's charts, reduced from the setpoints in one pass over them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from feedplan.report.tool_path import ToolPath
 from feedplan.setpoints import SetpointChunk
 from feedplan.units import finite
 
-# Points kept. The page draws a few thousand of them at once, and the finer ones when it is zoomed.
+# Number of points that are kept. The page draws a few thousand of them at a time, and more detail when it is
+# zoomed.
 _TIME_POINTS = 240_000  # all curves over time together
 _TIME_POINTS_PER_CURVE = 24_000
 _LENGTH_POINTS = 12_000  # each curve over length
@@ -27,9 +28,9 @@ _MEAN_POINTS = 1_000  # the mean of each curve, drawn where the curve oscillates
 
 
 class SetpointFigures:
-    """Takes all setpoints chunk by chunk; holds the curves over time and the tool path.
+    """Takes all setpoints chunk by chunk; keeps the curves over time and the tool path.
 
-    `count` is the number of setpoints to come; `path` takes them too.
+    `count` is the number of setpoints that will be added; they are also added to `path`.
     """
 
     def __init__(self, problem: Problem, path: ToolPath, count: int) -> None:
@@ -40,7 +41,7 @@ class SetpointFigures:
         self.duration = 0.0
 
     def add(self, chunk: SetpointChunk) -> None:
-        """The next setpoints."""
+        """Adds the next setpoints."""
         if len(chunk.t) == 0:
             return
         speed = self.path.add(chunk)
@@ -58,7 +59,7 @@ class SetpointFigures:
 
 
 def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:
-    """A column as the page reads it: x, y, the mean, and the source lines if they are wanted."""
+    """A column in the form that the page reads: x, y, the mean, and the source lines if requested."""
     x, y, line = curves.curve(column)
     mean_x, mean = curves.mean(column, _MEAN_POINTS)
     result: dict[str, Any] = {"x": x, "y": y, "mean": {"x": mean_x, "y": mean}}
@@ -90,7 +91,7 @@ def over_length(problem: Problem, profile: SpeedProfile, progress: Listener | No
             continue
         length, value, _ = curves.curve(column)
         if np.isfinite(value).any():
-            # A limit far above all speeds is cut, so that the chart keeps the scale of the speeds.
+            # A limit far above all speeds is cut off, so that the speeds determine the chart's scale.
             value = np.minimum(value, 20.0 * top) if top > 0 else value
             result[name] = {"x": length, "y": value}
     return result

@@ -1,5 +1,5 @@
-"""The section "gained" of the page: today's time by the controller, the plan's, and gains by raised
-limits."""
+"""Makes the section "gained" of the page: the controller's time today, the plan's time, and the time saved by
+raised limits."""
 
 from __future__ import annotations
 

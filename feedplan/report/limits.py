@@ -1,7 +1,7 @@
-"""Samples of the speed and its limits over the path's length: the limit curve and the speed caps.
+"""Computes samples of the speed and its limits over the path's length: the limit curve and the speed caps.
 
-The formulas follow the definitions, not the planner's code: q = C(u) for each axis, ' is d/du,
-p = (du/dt)².
+The formulas follow the definitions, independently of the planner's code: q = C(u) for each axis, ' is d/du, p
+= (du/dt)².
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from feedplan.constraints.problem import Problem, feed_square
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part, tell
 
-# Most samples in all: 16 for each two of the 12 000 points that the page keeps of a curve.
+# The greatest number of samples in total: about 16 for every two of the 12 000 points that the page keeps of
+# a curve.
 _SAMPLES = 100_000
 _SAMPLES_AT_ONCE = 10_000
 _SAMPLES_PER_PHASE = 33
@@ -43,14 +44,14 @@ class LimitSamples:
 
 
 def samples_per_phase(profile: SpeedProfile) -> int:
-    """Number of samples that `limit_samples` takes in each phase, both ends included."""
+    """Number of samples that `limit_samples` takes in each phase, including both ends."""
     return int(np.clip(_SAMPLES // max(len(profile), 1), 2, _SAMPLES_PER_PHASE))
 
 
 def drawn_phases(problem: Problem, profile: SpeedProfile) -> Integers:
-    """The phases that have samples: those in which more than rotary axes move, or all if there are none.
+    """The phases that have samples: those that move the tool, or all if the path only turns it.
 
-    Every second, third … of them, if all would have too many samples.
+    Only every second, third … of them if there would be too many samples.
     """
     drawn = np.flatnonzero(problem.tool_motion.drawn[profile.piece.astype(np.int64)])
     return drawn[:: 1 + len(drawn) * samples_per_phase(profile) // (_SAMPLES + 1)]
@@ -65,7 +66,7 @@ def limit_samples(
     states = profile.sampler(problem, part(progress, 0.0, 0.2))
     report = part(progress, 0.2, 1.0)
     tell(report, 0.0)
-    # Denser towards both ends: the speed changes most next to a stop.
+    # Denser towards both ends, because the speed changes most next to a stop.
     fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     step = max(1, _SAMPLES_AT_ONCE // count)
     for first in range(0, len(drawn), step):
@@ -89,7 +90,7 @@ def _sample(
     piece = profile.piece[phase].astype(np.int64)
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
     slope = problem.tool_motion.slope(piece, u)
-    # u̇ at both ends of each phase is the profile's own, and costs nothing.
+    # u̇ at both ends of each phase is known from the profile.
     ends = np.empty((len(phases), count))
     ends[:, 0], ends[:, -1] = np.sqrt(profile.p0[phases]), np.sqrt(profile.p1[phases])
     rate = ends.ravel()
@@ -112,8 +113,8 @@ def _sample(
 
 
 def parameter_speed(tangent: Floats, velocity: Floats) -> Floats:
-    """u̇ (n,) from q' and q̇ (n, joints), by the joint that moves most, which is accurate next to a cusp
-    too."""
+    """u̇ (n,) from q' and q̇ (n, joints), computed from the joint that moves most, which is accurate next to
+    a cusp too."""
     own = np.abs(tangent).argmax(axis=1)[:, None]
     slope, rate = np.take_along_axis(tangent, own, 1), np.take_along_axis(velocity, own, 1)
     return np.asarray(np.abs(rate) / np.where(slope == 0.0, np.inf, np.abs(slope)))[:, 0]

@@ -1,4 +1,4 @@
-"""How long each limit is active, and the source lines that lose most time."""
+"""Computes the time in which each limit is active, and the source lines that lose most time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from feedplan.report.activity import Activity
 
 @dataclass(frozen=True)
 class Share:
-    """A limit, the time in which it is active [s], and that time over the whole time (0 to 1)."""
+    """A limit, the time in which it is active [s], and its share of the whole time (0 to 1)."""
 
     limit: str
     time: float
@@ -25,8 +25,8 @@ class SlowLine:
     """A source line that takes longer than its feed and the axis velocities would allow.
 
     `time` spent and `lost` [s]; mean `speed`, and the mean speed `wanted` that feed and axis velocities allow
-    [mm/s, deg/s if the line mostly `turns`]; the `limit` that costs most and its part of the loss; `stops` if
-    the tool stops at an end of the line; `rapid` if no feed is programmed.
+    [mm/s, deg/s if the line mostly `turns`]; the `limit` that causes the greatest part of the loss, and this
+    `part` (0 to 1); `stops` if the tool stops at an end of the line; `rapid` if no feed is programmed.
     """
 
     line: int
@@ -61,7 +61,7 @@ def slowest_lines(
     lines, row_of_piece = np.unique(path.line, return_inverse=True)
     row = row_of_piece[activity.piece]
     time, lost = (np.bincount(row, values, len(lines)) for values in (activity.weight, activity.lost))
-    # Rounded, so that lines whose losses differ by rounding only stay in the program's order.
+    # Rounded, so that lines whose losses differ only by rounding keep the program's order.
     worst = np.argsort(-np.round(lost / time.sum(), 12), kind="stable")[:count]
     worst = worst[lost[worst] > 1e-9 * time.sum()]
     ends = np.zeros(len(lines), dtype=bool)
@@ -72,7 +72,8 @@ def slowest_lines(
         pieces = np.flatnonzero(row_of_piece == index)
         costs = np.bincount(activity.active[own], activity.lost[own])
         active = int(costs.argmax())
-        # The speed is in mm/s or deg/s, by what the line does for longer: moving or turning alone.
+        # The speed is in mm/s or deg/s, depending on whether the line moves the tool or only turns it for
+        # longer.
         turning = problem.tool_motion.turns[activity.piece[own]]
         turns = bool(activity.weight[own][turning].sum() > 0.5 * time[index])
         own = own[turning == turns]

@@ -1,7 +1,7 @@
-"""The time of a program by tool and operation: feed motion, rapids, dwells and tool changes [s].
+"""Computes the time of a program by tool and operation: feed motion, rapids, dwells and tool changes [s].
 
-An operation begins at a comment that is alone in its line, as CAM systems post them; of several such lines in
-succession the first gives the name. An operation continues in subprograms that have no such comments.
+An operation begins at a comment that is alone in its line, as CAM systems post them; of several such
+consecutive lines the first one gives the name. An operation continues in subprograms without such comments.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.source import content_of
 
-# Successive lines that consist of a comment; the first one gives the name.
+# Consecutive lines that consist of a comment; the first one gives the name.
 _COMMENTS = re.compile(
     rb"^(?:[ \t]*(?:N\d+[ \t]*)?(?:\([^)\r\n]*\)|;[^\r\n]*)[ \t]*\r?\n)+", re.MULTILINE | re.IGNORECASE
 )
 _TITLE = re.compile(rb"(?:N\d+[ \t]*)?[(;][ \t;]*([^)\r\n]*)", re.IGNORECASE)
-# Comments that are commands, or that end an operation, are no names.
+# Comments that are commands, or that end an operation, are not names.
 _NO_TITLE = re.compile(
     rb"(?:MSG|DEBUG|PRINT|LOG\w*|PROBE\w*|ABORT)\s*,|(?:FINISH|END)\w*\s+(?:OF\s+)?OPERATION\b|\W*\Z",
     re.IGNORECASE,
@@ -37,7 +37,7 @@ _SUBPROGRAM = re.compile(
 # The parts of the time of an operation.
 PARTS = ("feed", "rapid", "dwell", "change")
 _LONGEST = 48
-# Relative rounding error of sums of dwells, at most.
+# Bound of the relative rounding error of sums of dwells.
 _ROUNDING = 1e-9
 _TOOL_CHANGE = ord("M"), 6
 _TOOL = ord("T")
@@ -83,7 +83,7 @@ def operation_times(
         changes, numbers = events.letter == _TOOL, events.number
     of_move, of_event, lines, names = _operations(program)
     _begin_with_changes(of_move, of_event, program, np.flatnonzero(changes))
-    # Tool and operation as one number.
+    # Tool and operation are combined to one number.
     before = np.searchsorted(events.move[changes], np.arange(len(program)), "right")
     of_move += before * (len(lines) + 1)
     of_event += np.cumsum(changes) * (len(lines) + 1)
@@ -108,7 +108,7 @@ def operation_times(
     spent = {name: np.zeros(len(keys)) for name in PARTS}
     for name, of_part, time in parts:
         spent[name] += np.bincount(np.searchsorted(keys, of_part), time, len(keys))
-    # The number of moves before the begin of each.
+    # The number of moves before the start of each.
     first = np.full(len(keys), len(program))
     np.minimum.at(first, row_of, np.concatenate([np.arange(len(program)), events.move]))
     tools = [None, *(int(number) if np.isfinite(number) else None for number in numbers[changes])]
@@ -165,7 +165,7 @@ def _operations(
     content = b"" if program.text is None else content_of(program.text, program.name).content
     lines, names = _titles(content)
     ends = _line_numbers(content, [match.start() for match in _SUBPROGRAM.finditer(content)])
-    # In the order of time: an event after k moves comes before move k + 1.
+    # Sorted by time: an event after k moves comes before move k + 1.
     order = np.argsort(
         np.concatenate([2 * np.arange(len(program)) + 1, 2 * program.events.move]), kind="stable"
     )

@@ -1,4 +1,4 @@
-"""The report: one self-contained page that needs no network."""
+"""Makes the report: one self-contained page that needs no network."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def write_report(
     text: FilePath | bytes | None = None,
 ) -> None:
     """Writes the page. `summary` is the content of plan.json, `data` the result of `chart_data`, `text` the
-    text of the part program, or its file; None where its lines have no numbers."""
+    text of the part program, or its file; None if its lines have no numbers."""
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
     name = FilePath(summary["program"] or "path").name
     judged = (
@@ -85,7 +85,7 @@ def framed(kind: str, title: str, about: str, summary: str, sections: str, data:
 
 
 def missing_pictures() -> str:
-    """A sentence that tells why pages have no pictures; empty if they have."""
+    """A sentence with the reason why pages have no pictures; empty if they have."""
     if resources.files(__package__).joinpath(SCRIPT).is_file():
         return ""
     return (
@@ -101,7 +101,8 @@ def pictures(charts: str) -> str:
 
 
 def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
-    """The text of these lines, which end as a reader's do (LF, CR LF, CR); empty if the file is gone."""
+    """The text of the wanted lines, with the same line ends as in the reader (LF, CR LF, CR); empty if the
+    file is gone."""
     try:
         with (
             io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as content,

@@ -1,4 +1,4 @@
-"""Reduces millions of samples to the few thousand points that a chart can show; peaks and corners stay."""
+"""Reduces millions of samples to the few thousand points of a chart; peaks and corners are kept."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Columns = tuple[Array, ...]
 class Envelope:
     """The least and the greatest value of each bucket of consecutive samples, for several columns at once.
 
-    `count` is the number of samples that `add` will get. About `points` of each column are kept at most: both
-    extremes of a bucket at their own x, so that no peak is lost. With fewer samples than `points` all are
-    kept.
+    `count` is the number of samples that `add` will get. At most about `points` points of each column are
+    kept: both extremes of each bucket at their own x, so that no peak is lost. If there are fewer samples
+    than `points`, all are kept.
     """
 
     def __init__(self, count: int, points: int) -> None:
@@ -44,7 +44,7 @@ class Envelope:
         self._keep(whole, self._width)
 
     def curve(self, column: int) -> tuple[Floats, Floats, NDArray[np.integer]]:
-        """x, value and tag of the points kept of one column, in order."""
+        """x, value and tag of the kept points of one column, in order."""
         self._finish()
         if not self._parts:
             return np.empty(0), np.empty(0), np.empty(0, np.int64)
@@ -75,8 +75,8 @@ class Envelope:
         x, tag, *values = samples
         if len(x) == 0:
             return
-        # The weight of a sample is its distance in x from the sample before; without distances all weights
-        # are equal.
+        # The weight of a sample is its distance in x from the sample before; if all these distances are 0,
+        # the weights are equal.
         before = x[0] if self._last is None else self._last
         weight = np.diff(x, prepend=before).reshape(-1, width)
         weight[weight.sum(axis=1) <= 0] = 1.0
@@ -102,19 +102,19 @@ class Polyline:
     def __init__(self, limit: int, tolerance: float) -> None:
         self._limit = limit
         self.tolerance = tolerance
-        # Points, the part of the tolerance already used between each point and the next, and tags.
+        # Points, the part of the tolerance that is already used between each point and the next, and tags.
         self._kept: Columns = ()
         self._pending: list[Columns] = []
 
     def add(self, points: Floats, *tags: Array) -> None:
-        """Takes the next samples: `points` (n, 4), scaled so that one tolerance suits all, and columns of
-        their tags."""
+        """Takes the next samples: `points` (n, 4), scaled so that one tolerance holds for all columns, and
+        columns of their tags."""
         self._pending.append((points, np.zeros(len(points)), *tags))
         if sum(len(points) for points, *_ in self._pending) >= 2 * self._limit:
             self._settle()
 
     def result(self, limit: int | None = None, tolerance: float = 0.0) -> tuple[Floats, Columns, float]:
-        """The points kept, their tags and the tolerance; reduced further to `limit` points or to a greater
+        """The kept points, their tags and the tolerance; reduced further to `limit` points or to a greater
         `tolerance`, if given."""
         self._settle()
         if not self._kept:

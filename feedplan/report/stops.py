@@ -1,4 +1,5 @@
-"""Full stops by cause: their number, the time for which the tool waits, and the time lost by stopping [s]."""
+"""Counts full stops by cause: their number, the time for which the tool waits, and the time lost by braking
+and starting [s]."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ _BACK, _STRAIGHT = 135.0, 0.5
 
 @dataclass(frozen=True)
 class Stops:
-    """`count` stops of one `cause`. In all the tool waits there for `pause` [s]; braking and starting lose
-    `lost` [s] against the speed that feeds and axis velocities alone would allow."""
+    """`count` stops of one `cause`. The tool waits there for `pause` [s] in total; braking and starting lose
+    `lost` [s] compared with the speed that feeds and axis velocities alone would allow."""
 
     cause: str
     count: int
@@ -45,7 +46,7 @@ class Stops:
 def stops_by_cause(problem: Problem, program: Program | None, activity: Activity) -> list[Stops]:
     """The stops of a path by cause, the greatest loss first; start and end of the path are two stops.
 
-    The tool stops between runs, and for no time where pieces of a run meet at rest.
+    The tool stops between runs, and without a pause where pieces of a run meet at rest.
     """
     path = problem.path
     if len(path.runs) < 2:
@@ -109,7 +110,7 @@ def _turns(problem: Problem, last: NDArray[np.integer], first: NDArray[np.intege
 
 
 def _slow_parts(activity: Activity, rests: Integers) -> tuple[Floats, Floats]:
-    """Time lost before the end and after the start of what lies between two stops [s].
+    """Time lost before the end and after the start of each part between two stops [s].
 
     The part after a start ends where the tool reaches a feed or an axis velocity, or first slows down; the
     part before a stop is its mirror image.

@@ -1,4 +1,4 @@
-"""The numbers and tables of the page as HTML; they need no script."""
+"""Makes the numbers and tables of the page as HTML; they need no script."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def verdict(audit: Audit) -> str:
 
 
 def numbers(summary: Mapping[str, Any], account: Account, audit: Audit) -> str:
-    """The big numbers under the title."""
+    """The key figures under the title."""
     time, whole = summary["time"], account.all
     unit, turning = account.motion.units
     turned = f"turns alone {whole.turn:.4g} {turning}" if whole.turn > 0 else ""
@@ -110,7 +110,7 @@ def limits_table(shares: Sequence[Share]) -> str:
 
 
 def totals_table(account: Account) -> str:
-    """Time and length at a feed and in rapids; turning of rotary axes alone is a row of its own."""
+    """Time and length at a feed and in rapids; turning of rotary axes alone has its own row."""
     head = '<th>Motion</th><th class="n">Time</th><th class="n">Length</th><th class="n">Mean speed</th>'
     kinds = (("at a feed", account.feed), ("rapid", account.rapid))
     rows = "".join(_total_rows(name, total, account.motion.units) for name, total in kinds if total.time > 0)
@@ -149,7 +149,7 @@ def stops_table(stops: Sequence[Stops]) -> str:
 
 
 def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str:
-    """Figures of the fit, computing time of each stage, and least and greatest `tolerance` asked for [mm]."""
+    """Figures of the fit, computing time of each stage, and least and greatest requested `tolerance` [mm]."""
     fit, gain = summary["fit"], summary["gain"]
     rows: list[tuple[str, str]] = []
     points, splines, polynomials = (fit[key] for key in ("points", "splines", "polynomials"))
@@ -271,7 +271,7 @@ def _with_unit(check: LimitCheck, value: float) -> str:
 
 
 def _percent(ratio: float) -> str:
-    """A ratio as percent; near 100 with enough digits to tell on which side of 100 it is."""
+    """A ratio as percent; near 100 with enough digits to show on which side of 100 it is."""
     if not math.isfinite(ratio):
         return "–"
     percent = 100.0 * ratio
@@ -295,6 +295,6 @@ def _length(length: float, unit: str) -> tuple[str, str]:
 
 
 def _value_unit(text: str) -> tuple[str, str]:
-    """Splits `1.234 s` into value and unit; texts of more parts stay whole."""
+    """Splits `1.234 s` into value and unit; texts with more parts are not split."""
     value, _, unit = text.partition(" ")
     return (value, unit) if " " not in unit else (text, "")

@@ -1,4 +1,4 @@
-"""The tool path as a page draws it: few points with their speed, reduced in one pass over the setpoints."""
+"""Reduces the tool path to the few points (with speeds) that a page draws, in one pass over the setpoints."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from feedplan.report.limits import parameter_speed
 from feedplan.report.reduce import Polyline
 from feedplan.setpoints import SetpointChunk
 
-# Most points of the tool path in a report.
+# The greatest number of points of the tool path in a report.
 POINTS = 60_000
-# Most points in the service's page, which gets them uncompressed.
+# The greatest number of points in the service's page, which gets them uncompressed.
 MANY_POINTS = 500_000
 
-# Allowed deviation of the drawn tool path over its extent: a tenth of a pixel before zooming.
+# Allowed deviation of the drawn tool path as a share of its extent: a tenth of a pixel before zooming.
 _TOLERANCE = 1e-4
-# The least such deviation, for zooming.
+# The least allowed deviation, for zooming.
 _FINEST = 1e-5
-# Allowed deviation of the drawn speed over the top speed, where that of the path is `_TOLERANCE`.
+# Allowed deviation of the drawn speed as a share of the top speed, for a path with the deviation
+# `_TOLERANCE`.
 _SPEED_TOLERANCE = 0.01
 
 
@@ -49,7 +50,7 @@ class ToolPath:
         self._top = self._cutting = 0.0
 
     def add(self, chunk: SetpointChunk) -> Floats:
-        """Takes the next setpoints; returns the tool's speed at each, in drawn units a second."""
+        """Takes the next setpoints; returns the tool's speed at each, in drawn units per second."""
         points, speed = self._tool(chunk)
         if len(chunk) == 0:
             return speed
@@ -63,7 +64,7 @@ class ToolPath:
         return speed
 
     def mark(self, chunk: SetpointChunk, time: float) -> None:
-        """Marks the tool's position at the first setpoint of a chunk at a time [s] or after it."""
+        """Marks the tool's position at the first setpoint of a chunk at or after a time [s]."""
         points, _ = self._tool(chunk)
         self._marks.append(points[min(int(np.searchsorted(chunk.t, time)), len(chunk) - 1)].tolist())
 

@@ -3,8 +3,8 @@
     guard ──► app ──► store ◄── runner ──► feedplan.jobs (processes | cluster) ──► planning, files
 
 - Requests: `guard` checks each one, `app` has the addresses, `uploads` receives programs, `requests` checks
-  what is asked for, `problems` answers errors.
-- Jobs: `store` has their folders, `database` their records, `runner` has them planned.
+  their content, `problems` answers errors.
+- Jobs: `store` has their folders, `database` their records, `runner` runs them on an executor.
 - Answers: `answers` has their types, `views` and `exports` make them, `events` streams progress, `front` has
   the page, `openapi` and `page` the documentation.
 - Shared: `limits` and `refusals`. `server` starts the service.

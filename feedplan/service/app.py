@@ -1,4 +1,4 @@
-"""The addresses of the service."""
+"""The addresses (routes) of the service."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ from feedplan.service.requests import MachineRequest, machine_of, order_of, requ
 from feedplan.service.runner import Runner
 from feedplan.service.store import ENDED, Store
 
-# Most requests whose programs are received at the same time; each needs memory.
+# The greatest number of requests whose programs are received at the same time; each needs memory.
 RECEIVED_AT_ONCE = 4
 MOST_COMPARED = 20
-# A report may run its own scripts only, and may not send requests to the service.
+# A report may only run its own scripts, and may not send requests to the service.
 _REPORT_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; style-src 'unsafe-inline'; "
     "script-src 'unsafe-inline'; img-src data: blob:"
@@ -56,7 +56,7 @@ Time = Annotated[float | None, Query(allow_inf_nan=False)]
 
 
 def _known_query(request: Request) -> None:
-    """Raises Refusal for a parameter in the address that it does not take, or not so often."""
+    """Raises Refusal for a query parameter that is unknown, or repeated without being a list."""
     known = {own.alias: own.field_info.annotation for own in request.scope["route"].dependant.query_params}
     for name in request.query_params:
         if name not in known:

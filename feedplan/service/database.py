@@ -44,7 +44,7 @@ PRAGMA user_version = {VERSION};
 
 
 class Database:
-    """The database in a file, which is made if missing. Raises InputError if it has another version."""
+    """The database in a file, which is created if missing. Raises InputError if it has another version."""
 
     def __init__(self, file: FilePath) -> None:
         self._file = file
@@ -90,6 +90,6 @@ class Database:
     @contextmanager
     def change(self) -> Iterator[sqlite3.Connection]:
         """A transaction: all changes of the block are kept, or none."""
-        with self.read() as db, db:  # the end of a connection's block commits or rolls back
+        with self.read() as db, db:  # leaving `with db` commits, or rolls back after an exception
             db.execute("BEGIN IMMEDIATE")
             yield db

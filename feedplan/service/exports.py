@@ -1,4 +1,4 @@
-"""Setpoints of a job by time and axis, in every format of `feedplan.outputs`."""
+"""Makes files of a job's setpoints by time and axis, in every format of `feedplan.outputs`."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def setpoints_file(
 ) -> tuple[FilePath, bool]:
     """A file of the setpoints of a job from `start` to `end` [s] of some `axes` (empty: all).
 
-    The flag is true if the file is a new one, in a folder of its own below `new`, which the caller removes.
-    Raises Refusal for axes or times that the plan does not have.
+    The flag is true if the file is new, in its own folder below `new`; the caller removes this folder. Raises
+    Refusal for axes or times that the plan does not have.
     """
     stored = result / npz.FILE
     if format_name == "npz" and not axes and start is None and end is None:

@@ -1,4 +1,4 @@
-"""The page that people use: one document, one style and one script, served by the service itself."""
+"""The web page of the service: one document, one style and one script, served by the service itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse, Response
 
 from feedplan.report.page import SCRIPT, STYLE, asset, missing_pictures
 
-# These need no token: they have no secrets, and the page itself asks for the token.
+# These addresses need no token: they contain no secrets, and the page itself asks for the token.
 ADDRESSES = ("/", "/page.css", "/page.js")
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
@@ -19,7 +19,7 @@ _POLICY = (
 
 
 def add(app: FastAPI) -> None:
-    """The addresses of the page."""
+    """Adds the addresses of the page."""
 
     @app.get("/", include_in_schema=False)
     def start() -> Response:

@@ -3,11 +3,11 @@
 - `Host` must be a name of this service; a foreign page whose name was pointed at the service (DNS rebinding)
   sends another name. Numeric addresses are allowed, because a foreign page cannot have them.
 - `Origin`, which browsers send with requests of a page, must be the service itself.
-- The token, if there is one, comes as `Authorization: Bearer TOKEN`, or as the password of Basic, which
-  browsers ask their users for.
-- The body has at most `max_upload`, and arrives within `max_upload_time`.
+- The token, if there is one, is sent as `Authorization: Bearer TOKEN`, or as the password of Basic
+  authentication, for which browsers ask their users.
+- The body has at most `max_upload`, and must arrive within `max_upload_time`.
 
-A request HEAD is answered as GET is, without the content.
+A HEAD request is answered as GET, without the content.
 """
 
 from __future__ import annotations
@@ -125,13 +125,13 @@ class Guard:
         return over(self._limits, TOO_LARGE, said)
 
     def _counted(self, receive: Receive) -> Receive:
-        """The same messages; raises Refusal if the body is too long or too late."""
+        """Passes the messages on; raises Refusal if the body is too long or too late."""
         received, whole = 0, False
         end: float | None = None
 
         async def part() -> Message:
             nonlocal received, whole, end
-            if whole:  # only the end of the connection can follow
+            if whole:  # after the whole body only the end of the connection can follow
                 return await receive()
             loop = asyncio.get_running_loop()
             end = loop.time() + self._limits.max_upload_time if end is None else end

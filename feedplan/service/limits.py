@@ -16,7 +16,7 @@ def _limit(default: float, unit: str, help: str, least: float) -> Any:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of a service; the type of each is that of its default."""
+    """The limits of a service; each has the type of its default."""
 
     max_upload: float = _limit(256.0, "MB", "Size of a request, which contains the program.", 0.001)
     max_upload_time: float = _limit(300.0, "s", "Time in which a whole request must arrive.", 0.01)

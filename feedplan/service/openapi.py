@@ -1,4 +1,4 @@
-"""Adds to the OpenAPI document what FastAPI does not find in the code: forms, problems and examples."""
+"""Adds to the OpenAPI document what FastAPI cannot derive from the code: forms, problems and examples."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _EXAMPLE = {
     "options": {"tolerance": 0.02},
 }
 _TEXT = {"type": "string"}
-# The fields of a form are texts, with the descriptions that they have in JSON.
+# The fields of a form are texts, with the same descriptions as in JSON.
 _FIELDS = {
     name: {**_TEXT, "description": own.description} if own.description else _TEXT
     for name, own in PlanRequest.model_fields.items()

@@ -1,4 +1,4 @@
-"""The documentation as one page without scripts, made from the OpenAPI document."""
+"""Makes the documentation, one page without scripts, from the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -102,6 +102,6 @@ def _code(text: str) -> str:
 
 
 def _prose(text: str) -> str:
-    """A paragraph with code between backquotes."""
+    """A paragraph in which text between backquotes is shown as code."""
     parts = escape(" ".join(text.split())).split("`")
     return "".join(f"<code>{part}</code>" if k % 2 else part for k, part in enumerate(parts))

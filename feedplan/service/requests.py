@@ -26,7 +26,7 @@ from feedplan.service.limits import Limits
 from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal, over
 from feedplan.setpoints import Interpolator
 
-# Longest name of a program. Messages and reports show names; no file is named by them.
+# The greatest length of a program's name. Messages and reports show names; files are not named after them.
 LONGEST_NAME = 120
 # Options that are keywords of `read_program`; the other options are keywords of `plan`.
 READING = ("block_delete", "whole_step")
@@ -197,8 +197,8 @@ def order_of(request: PlanRequest, limits: Limits) -> Order:
 
 
 def _machine(given: str, *others: str) -> Machine:
-    """The bundled machine of that name, or the machine of a text. Names in `others` are valid in other
-    requests. The service reads no file that a client names."""
+    """The bundled machine of that name, or the machine of a text. `others` are further names that the message
+    lists as valid. The service reads no file that a client names."""
     if given in bundled_machines():
         return Machine.load(given)
     if "=" in given:
@@ -216,7 +216,7 @@ def _title(given: str) -> str:
 
 
 def require_once(text: bytes | str, *within: str) -> None:
-    """Raises Refusal for a name that comes twice in an object of JSON, of which readers take the last."""
+    """Raises Refusal if a name occurs twice in a JSON object: readers would use the last value."""
 
     def once(pairs: list[tuple[str, Any]]) -> None:
         known: set[str] = set()
@@ -226,7 +226,7 @@ def require_once(text: bytes | str, *within: str) -> None:
                 raise Refusal(INPUT, f"{place} comes twice in one object: give it once")
             known.add(name)
 
-    # What is wrong with a text that is no JSON is told by its reader.
+    # Texts that are not JSON are refused later, by their reader.
     with suppress(ValueError, RecursionError):
         json.loads(text, object_pairs_hook=once)
 
@@ -244,10 +244,11 @@ def parsed(model: type[Model], text: bytes | str, *within: str) -> Model:
 
 def sentence_of(error: Any) -> str:
     """An error of pydantic as one sentence."""
-    # A program is a text or an object: pydantic adds which of them it tried.
+    # A program is a text or an object, so pydantic adds the type that it tried to the place of the error; it
+    # is left out.
     parts = [str(part)[:60] for part in error["loc"] if part != "str" and "[" not in str(part)]
     member = ".".join(parts) or "the request"
     said = str(error["msg"])[:220]
-    # A capital of a name, as in JSON, stays.
+    # The first letter is made lower case, except in names such as JSON.
     said = said if said[:2].isupper() else f"{said[:1].lower()}{said[1:]}"
     return f"{member}: {said}: correct it as the documentation at /docs tells"

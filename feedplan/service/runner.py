@@ -1,4 +1,4 @@
-"""Runs waiting jobs on an executor, as many as it has slots for, and records their outcomes."""
+"""Runs waiting jobs on an executor, as many at a time as it has slots, and records their outcomes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from feedplan.service.refusals import CANCELLED, DISK, KINDS, LIMIT, Refusal
 from feedplan.service.requests import READING
 from feedplan.service.store import Record, Store, sync
 
-# Time between two requests for the number of slots, and pause after the executor was lost [s].
+# Time between two requests for the number of slots (EVERY), and pause after the executor was lost (AWAY) [s].
 EVERY, AWAY = 1.0, 2.0
 # Time between two searches for old jobs [s].
 KEEPING = 600.0
@@ -42,7 +42,7 @@ class Runner:
             thread.start()
 
     def stop(self) -> None:
-        """Stops the running jobs, which wait again for the next server."""
+        """Stops the running jobs; they are queued again for the next server."""
         with self._wake:
             self._end.set()
             for run in self._running.values():
@@ -92,7 +92,7 @@ class Runner:
                 time.sleep(EVERY)
 
     def _start_one(self) -> bool:
-        # Under the lock a job is added to the running ones before a client can see that it runs.
+        # Because of the lock, a job is in `_running` before a client can see that it runs.
         record = None if self._end.is_set() else self._store.claim()
         if record is None:
             return False
@@ -104,7 +104,7 @@ class Runner:
         try:
             if run.execute(self._executor):
                 self._end.wait(AWAY)
-        except Exception:  # a full disk, for instance: the next server plans a job that is not recorded
+        except Exception:  # for example a full disk: the next server repeats a job that is not recorded
             traceback.print_exc()
             self._end.wait(EVERY)
         finally:
@@ -127,7 +127,7 @@ class _Run:
         self._stop.set()
 
     def execute(self, executor: Executor) -> bool:
-        """Has the job planned and records its outcome; returns whether the executor was lost."""
+        """Runs the job and records its outcome; returns whether the executor was lost."""
         [outcome] = executor.run([self._job()], self._report, self._stop)
         self._record_end(outcome)
         return outcome.state == "lost"
@@ -138,7 +138,7 @@ class _Run:
     @property
     def _options(self) -> dict[str, Any]:
         options: dict[str, Any] = json.loads(self._record["options"])
-        # `order_of` has refused larger values of clients.
+        # `order_of` has already refused larger values.
         options.setdefault("max_setpoints", self._limits.max_setpoints)
         return options
 
@@ -188,7 +188,8 @@ class _Run:
         sentence = failure.sentence.replace(f"{self._folder}/", "")
         if failure.kind in ("worker", "defect"):
             return Refusal(KINDS[failure.kind], sentence)
-        # The reader does not name its bound, of which others than the service's users know nothing.
+        # The reader's sentence does not name this limit, because only users of the service know it: its name
+        # is added.
         bound = rf"than {self._limits.max_moves} (?:moves|pieces)(?: take)?"
         sentence = re.sub(bound, lambda found: f"{found[0]} (max_moves)", sentence)
         limit = replace(self._limits, max_setpoints=self._options["max_setpoints"]).named_in(sentence)

@@ -1,4 +1,4 @@
-"""The jobs on the disk: records in SQLite, programs and results in one folder for each job.
+"""Stores the jobs on disk: records in SQLite, programs and results in one folder for each job.
 
     STORE/jobs.sqlite            the records; files without a record are not part of the store
     STORE/lock                   held by the server that uses the store
@@ -8,9 +8,9 @@
     STORE/jobs/ID/result-N/      the plan of the N-th attempt, as `feedplan plan -o` writes it
 
 The transaction that adds a record accepts a job, after its files are on the disk; the transaction that sets
-the state ends it, after the result has its name. If a server ends in between, files without a record are
-left, and the next server removes them. A running job of a server that ended waits again; its next attempt has
-a new folder, so that a worker left from before cannot change it.
+the state ends it, after the result has its name. If a server ends in between, there are files without a
+record, which the next server removes. A running job of a server that ended is queued again; its next attempt
+has a new folder, so that a worker of the old attempt cannot change it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from feedplan.service.requests import Order
 ENDED = ("done", "failed", "cancelled")
 # Size of a job's record and events, besides its files [bytes].
 RECORD = 16_384
-# What a job has that waits again.
+# The columns of a job that is queued again.
 _WAITS: dict[str, object] = {"state": "queued", "started": None, "stage": None, "done": 0}
 
 
@@ -119,7 +119,7 @@ class Store:
                 if left.name not in ("program", "tools.tbl", results[folder.name]):
                     _remove(left)
 
-    # What is asked for.
+    # Requests for records.
 
     def job(self, job: str) -> Record:
         """The record of a job. Raises Refusal for an unknown job."""
@@ -157,7 +157,7 @@ class Store:
         """The folder of the plan of a job's last attempt."""
         return self.folder(record) / f"result-{record['attempt']}"
 
-    # What happens to jobs.
+    # Changes of jobs.
 
     def accept(self, upload: Upload, order: Order, key: str | None = None) -> tuple[Record, bool]:
         """The record of a new job, or of a job with the same fingerprint that has not failed.
@@ -244,7 +244,7 @@ class Store:
             raise full
 
     def _full(self, db: sqlite3.Connection, size: int, job: str = "") -> Refusal | None:
-        """The refusal of so many bytes of a job beside those of all others; None if there is room."""
+        """The refusal of a job with `size` bytes if all jobs would exceed max_disk; None if there is room."""
         limits = self._limits
         query = "SELECT COALESCE(SUM(size), 0) FROM jobs WHERE id != ?"
         kept = db.execute(query, (job,)).fetchone()[0]
@@ -275,7 +275,7 @@ class Store:
         return self.job(job)
 
     def progress(self, record: Record, stage: str, part: float, done: float) -> None:
-        """Records the progress of a running job: the part of the stage and of the whole that is done."""
+        """Records the progress of a running job: the finished shares of the stage and of the whole job."""
         with self._database.change() as db:
             if _set(db, record["id"], "running", record["attempt"], stage=stage, done=done):
                 told = {"stage": stage, "part": round(part, 4), "done": round(done, 4)}
@@ -286,7 +286,7 @@ class Store:
         self, record: Record, state: str, *, result: Mapping[str, Any] | None, problem: str | None
     ) -> None:
         """Records the end of a running job; without a result its result folder is removed. A job whose result
-        has no room below max_disk has failed."""
+        does not fit within max_disk fails."""
         self._end_run(
             record,
             state=state,
@@ -301,8 +301,8 @@ class Store:
         self._end_run(record, **_WAITS)
 
     def _end_run(self, record: Record, **columns: object) -> None:
-        """Sets columns of a running job, and its size; without a `result` in them, or room for it, its result
-        folder is removed."""
+        """Sets columns of a running job, and its size. If `columns` have no `result`, or it does not fit, the
+        result folder is removed."""
         with self._database.change() as db:
             full = None
             if columns.get("result") is not None:
@@ -349,8 +349,8 @@ class Store:
 def _set(
     db: sqlite3.Connection, job: str, was: str, attempt: int | None = None, /, **columns: object
 ) -> bool:
-    """Sets columns of a job that is in the state `was`, and in that attempt if one is given; tells of a new
-    state. Returns whether there is such a job."""
+    """Sets columns of a job that is in the state `was` (and in the given attempt, if any), and adds an event
+    for a new state. Returns whether there is such a job."""
     names = ", ".join(f"{name} = ?" for name in columns)
     where = "id = ? AND state = ? AND attempt = COALESCE(?, attempt)"
     changed = db.execute(f"UPDATE jobs SET {names} WHERE {where}", (*columns.values(), job, was, attempt))
@@ -375,7 +375,7 @@ def _remove(path: FilePath) -> None:
 
 
 def sync(path: FilePath) -> None:
-    """Makes a file, or the names in a folder, survive a power failure from now on."""
+    """Writes a file, or the names in a folder, to the disk, so that they survive a power failure."""
     number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)

@@ -1,4 +1,4 @@
-"""Receives a request to plan: the program goes to a file, machine and options to memory."""
+"""Receives a request to plan: the program is written to a file, machine and options are kept in memory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from feedplan.service.refusals import INPUT, LIMIT, MEDIA, PROGRAM, Refusal, ove
 from feedplan.service.requests import JobRequest, Options, PlanRequest, parsed
 from feedplan.service.store import Upload
 
-# Longest text beside the program [bytes].
+# The greatest length of a text other than the program [bytes].
 LONGEST_TEXT = 1 << 20
 _PART = 1 << 20
 _FIELDS = tuple(PlanRequest.model_fields)
@@ -52,7 +52,7 @@ def _of_json(body: bytes, new: FilePath, limits: Limits) -> tuple[Upload, PlanRe
 def _path_file(table: dict[str, Any]) -> bytes:
     try:
         return json.dumps(table).encode()
-    except (ValueError, RecursionError):  # ValueError for integers of thousands of digits too
+    except (ValueError, RecursionError):  # ValueError also for integers of thousands of digits
         raise Refusal(INPUT, "program: it has numbers that no path file has: give finite ones") from None
 
 

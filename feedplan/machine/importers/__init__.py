@@ -1,8 +1,9 @@
-"""Machines from files of controllers: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg, ROS's joint limits.
+"""Makes machines from controllers' files: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg, ROS's joint
+limits.
 
-A format is a module with `CONTROLLER`, its name, `RECOGNISED`, a pattern of what only its files hold, and
+A format is a module with `CONTROLLER`, its name; `RECOGNISED`, a pattern that occurs only in its files; and
 `read(path, files)`, which finds the numbers with their sources. Numbers that a file lacks are never guessed:
-the user gives them.
+the user must give them.
 """
 
 from __future__ import annotations
@@ -26,14 +27,13 @@ _REMEDY = "LinuxCNC's INI file, what grbl prints for $$, Klipper's printer.cfg o
 def import_machine(
     file: str | os.PathLike[str], limits: Mapping[str, float] | None = None, *, name: str | None = None
 ) -> Machine:
-    """The machine of a controller's own file: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg, ROS's
-    joint_limits.yaml.
+    """The machine described by a controller's own file: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg,
+    ROS's joint_limits.yaml.
 
-    `limits` are given in place of the file's, by axis and limit: `{"X.jerk": 50_000}`, also velocity and
-    acceleration, in mm, degrees (or the axis's unit) and seconds. `name` is the machine's, in place of the
-    file's. `Machine.to_toml` gives the text of a machine file.
-    Raises MachineError where the file cannot be read or used, and where it lacks a velocity or acceleration:
-    it names all that are missing.
+    `limits` replace numbers of the file, by axis and limit: `{"X.jerk": 50_000}`, also velocity and
+    acceleration, in mm, degrees (or the axis's unit) and seconds. `name` replaces the machine's name in the
+    file. `Machine.to_toml` gives the text of a machine file. Raises MachineError where the file cannot be
+    read or used, and where it lacks velocities or accelerations: the message names all that are missing.
     """
     found = find_machine(file, limits, name=name)
     return Machine.from_toml(found.to_toml(), found.origin)
@@ -44,7 +44,7 @@ def find_machine(
 ) -> FoundMachine:
     """The numbers, with their sources, from which `import_machine` makes the machine.
 
-    Raises as `import_machine`, but not for numbers outside the ranges of a machine.
+    Raises as `import_machine` does, except for numbers outside the ranges of a machine.
     """
     if not (limits is None or isinstance(limits, Mapping)):
         raise MachineError(f"limits is {shown(limits)}: give a dictionary such as {{'X.jerk': 50000}}")
@@ -54,7 +54,7 @@ def find_machine(
         path = file_path(file, "the file of a machine", _REMEDY)
     except InputError as error:
         raise MachineError(str(error)) from None
-    # The format follows from the file itself, not from files that it includes.
+    # The format is recognised by the file itself, not by files that it includes.
     text = "\n".join(line for line, _ in TextFiles(path).lines(path))
     form = next((each for each in FORMATS if each.RECOGNISED.search(text)), None)
     if form is None:

@@ -1,4 +1,5 @@
-"""A machine found in a controller's file: numbers with their sources, and the machine file made from them."""
+"""A machine found in a controller's file: its numbers with their sources, and the machine file made from
+them."""
 
 from __future__ import annotations
 
@@ -15,10 +16,10 @@ from feedplan.machine.controller import MODELS
 from feedplan.machine.importers.text_files import Setting
 from feedplan.machine.toml import toml_value
 
-# The limits of an axis that can be given, and their keys in a machine file.
+# The names of an axis's limits for `limits`, and their keys in a machine file.
 LIMITS = {"velocity": "max_velocity", "acceleration": "max_acceleration", "jerk": "max_jerk"}
 _NEEDED = ("velocity", "acceleration")
-# Numbers from here on, such as 1e99, mean that nothing is limited.
+# Numbers from this size on, such as 1e99, mean that there is no limit.
 _NONE_FROM = {
     "velocity": VELOCITIES[1],
     "acceleration": GREATEST_ACCELERATION,
@@ -31,27 +32,27 @@ _TIME = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³"}
 
 @dataclass(frozen=True)
 class Found:
-    """A number [mm, deg, s, or an axis's own unit] and where it comes from."""
+    """A number [mm, deg, s, or the axis's own unit] and its source."""
 
     value: float
     source: str
 
 
 def least(candidates: Iterable[Found | None]) -> Found | None:
-    """The least of those limits that are known; None where none is."""
+    """The least of the limits that are known; None if none is known."""
     return min((each for each in candidates if each is not None), key=lambda each: each.value, default=None)
 
 
 def greatest(candidates: Iterable[Found | None]) -> Found | None:
-    """The greatest of those numbers that are known; None where none is."""
+    """The greatest of the numbers that are known; None if none is known."""
     return max((each for each in candidates if each is not None), key=lambda each: each.value, default=None)
 
 
 @dataclass(frozen=True)
 class FoundAxis:
-    """An axis: `limits` by the names of `LIMITS`, `travel` from and to where it is known.
+    """An axis: `limits` by the names of `LIMITS`; `travel` (least, greatest), None if not known.
 
-    `unused_travel` is one that the controller does not enforce, with the reason.
+    `unused_travel` is a travel that the controller does not enforce, with the reason.
     """
 
     name: str
@@ -70,11 +71,12 @@ class FoundAxis:
 
 @dataclass(frozen=True)
 class FoundMachine:
-    """A machine of a controller's file: `origin` names file and controller, `period` [s] with its source.
+    """A machine from a controller's file: `origin` names file and controller, `period` [s] is that of the
+    servo, with its source.
 
-    `remarks` are sentences for the head of the machine file; `warnings` those that its user must see.
-    `controller` is the model of the controller (`feedplan.machine.controller`), if there is one, and
-    `parameters` what the file says of its parameters.
+    `remarks` are sentences for the head of the machine file; `warnings` are sentences that the user must see.
+    `controller` is the name of its model (`feedplan.machine.controller`), empty if there is none, and
+    `parameters` are the model's parameters in the file.
     """
 
     name: str
@@ -88,10 +90,10 @@ class FoundMachine:
     parameters: Mapping[str, Found] = field(default_factory=dict)
 
     def with_limits(self, given: Mapping[str, float]) -> FoundMachine:
-        """The same with limits given by name, such as `X.jerk`, in place of the file's.
+        """This machine with limits given by name, such as `X.jerk`, which replace those of the file.
 
         Raises MachineError for unknown names, for values that are no positive numbers, and for velocities and
-        accelerations that are still missing: it names all of these.
+        accelerations that are still missing: the message names all of these.
         """
         axes = {axis.name: axis for axis in self.axes}
         for key, value in given.items():
@@ -114,7 +116,7 @@ class FoundMachine:
         return result
 
     def notes(self) -> tuple[str, ...]:
-        """Sentences for the user: what the file says that a machine file cannot hold, and what it lacks."""
+        """Sentences for the user: what a machine file cannot express, and what the file lacks."""
         without = [axis.name for axis in self.axes if "jerk" not in axis.limits]
         if not without:
             return self.warnings
@@ -156,7 +158,7 @@ class FoundMachine:
 
 
 def limits_of(found: Mapping[str, Found | None]) -> dict[str, Found]:
-    """The limits that are known; 0 for jerk and numbers too great for a limit are left out."""
+    """The limits that are known and in range; a jerk of 0 and numbers too great for a limit mean no limit."""
     return {
         limit: own
         for limit, own in found.items()
@@ -165,8 +167,8 @@ def limits_of(found: Mapping[str, Found | None]) -> dict[str, Found]:
 
 
 def parameters_of(controller: str, settings: Mapping[str, Setting], per_mm: float = 1.0) -> dict[str, Found]:
-    """The parameters of the controller's model that its settings give with an allowed value; lengths in
-    settings have `per_mm` units a mm."""
+    """The parameters of the controller's model that its settings give with an allowed value; lengths in the
+    settings are in units of 1/`per_mm` mm."""
     parameters = MODELS[controller].parameters
     found: dict[str, Found] = {}
     for key, setting in settings.items():
@@ -177,7 +179,8 @@ def parameters_of(controller: str, settings: Mapping[str, Setting], per_mm: floa
 
 
 def travel_of(low: Found | None, high: Found | None) -> tuple[Found, Found] | None:
-    """The travel between two ends, infinite at an end that is unknown or too far; None without both ends."""
+    """The travel between two ends; an unknown end is infinite. None if both are unknown or beyond
+    FARTHEST."""
     low, high = low or Found(-math.inf, "no lower end"), high or Found(math.inf, "no upper end")
     return None if min(abs(low.value), abs(high.value)) > FARTHEST else (low, high)
 
@@ -203,11 +206,11 @@ def _row(key: str, found: Found) -> str:
 
 
 def _number(value: float) -> str:
-    """A number without the rounding of a conversion of units."""
+    """A number as text, without the rounding errors of a conversion of units."""
     return repr(float(f"{value:.{_DIGITS}g}"))
 
 
 def _comment(text: str, mark: str = "# ") -> str:
-    """A comment of one line, whatever the text is."""
+    """A comment on one line, even if the text has line breaks."""
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
     return mark + (line if len(line) <= _LONGEST else f"{line[: _LONGEST - 3]}...")

@@ -1,4 +1,5 @@
-"""Machines of grbl and grblHAL, from what `$$` prints: https://github.com/gnea/grbl/wiki/Grbl-v1.1-Configuration.
+"""Makes machines of grbl and grblHAL from the output of `$$`:
+https://github.com/gnea/grbl/wiki/Grbl-v1.1-Configuration.
 
 | setting | what it becomes, for axis k of XYZABCUVW |
 |---|---|
@@ -10,7 +11,7 @@
 | $376 | which of A, B, C, U, V are rotary (grblHAL) |
 | $11, $12 [mm], $398 | junction_deviation, arc_tolerance, planner_blocks of [controller]; grblHAL has $398 |
 
-The last value of a setting counts. All else in the file, such as a log of the session, is passed over.
+The last value of a setting counts. All other lines of the file, such as a log of the session, are ignored.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _MAY_TURN = "ABCUV"
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
-    """The machine of a dump of settings; raises MachineError where no axis has a setting."""
+    """The machine from the lines of `$$`; raises MachineError where no axis has a setting."""
     settings: dict[int, Setting] = {}
     for line, place in files.lines(path):
         match = _SETTING.match(line)

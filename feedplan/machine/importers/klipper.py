@@ -1,4 +1,4 @@
-"""Machines of Klipper, from printer.cfg: https://www.klipper3d.org/Config_Reference.html.
+"""Makes machines of Klipper from printer.cfg: https://www.klipper3d.org/Config_Reference.html.
 
 | setting | what it becomes |
 |---|---|
@@ -9,8 +9,8 @@
 | [printer] kinematics | cartesian, corexy |
 
 The last value of an option counts; `[include file]` may have `*` in the file's name. Klipper's limits hold
-along the path, here for each joint: a diagonal move may be faster on a cartesian printer, and is slower than
-Klipper would allow on a corexy.
+along the path; here they hold for each joint: diagonal moves may be faster than in Klipper on a cartesian
+printer, and are slower on a corexy.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Options = dict[tuple[str, str], Setting]
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
-    """The machine of a printer.cfg; raises MachineError for kinematics that are not imported."""
+    """The machine from a printer.cfg; raises MachineError for kinematics that cannot be imported."""
     options: Options = {}
     _read(path, (), files, options)
     kinematics = options.get(("printer", "kinematics"))
@@ -61,7 +61,7 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         period=Found(0.001, "Klipper has none: that of the setpoints [s]"),
         kinematics=kinematics.text,
         remarks=tuple(_remarks(corexy)),
-        # The model of Klipper knows axes that are the program's.
+        # Klipper's controller model needs joints that are the program's axes.
         controller="" if corexy else "klipper",
         parameters={} if corexy else parameters_of("klipper", _of_controller(options)),
     )
@@ -110,7 +110,7 @@ def _read(path: Path, inside: tuple[Path, ...], files: TextFiles, options: Optio
     section = ""
     for line, place in files.lines(path):
         line = _COMMENT.sub("", line).rstrip()
-        # Indented lines belong to an option of several lines, such as the G-code of a macro.
+        # Indented lines continue an option of several lines, such as the G-code of a macro.
         if not line or line[0].isspace():
             continue
         head = _SECTION.match(line)

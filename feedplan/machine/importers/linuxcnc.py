@@ -1,4 +1,4 @@
-"""Machines of LinuxCNC, from its INI file: https://linuxcnc.org/docs/html/config/ini-config.html.
+"""Makes machines of LinuxCNC from its INI file: https://linuxcnc.org/docs/html/config/ini-config.html.
 
 | setting | what it becomes |
 |---|---|
@@ -12,10 +12,10 @@
 | [EMCMOT] SERVO_PERIOD | period |
 | [KINS] KINEMATICS | trivkins, with its coordinates, or corexykins; others have dimensions in HAL files |
 
-A value is the first of its name, up to the end of the line, with a warning where a later one differs; lines
-that are no settings are passed over, and a backslash at its end joins a line to the next. `#INCLUDE file`
-stands at the start of a line. Limits of the tool's whole motion hold for each axis here: a diagonal move may
-be faster. DEFAULT_… are for jogging.
+The first value of a name counts, up to the end of the line, with a warning where a later one differs. Lines
+that are no settings are ignored, and a backslash at the end of a line joins it to the next. `#INCLUDE file`
+must be at the start of a line. Limits of the tool's motion along the path hold here for each axis: a diagonal
+move may be faster. DEFAULT_… are for jogging and are ignored.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ _UNITS_PER_DEGREE = {
     **dict.fromkeys(("rad", "radian"), math.pi / 180.0),
     **dict.fromkeys(("grad", "gon"), 10.0 / 9.0),
 }
-# LinuxCNC's default of MAX_LINEAR_JERK, which its documentation calls none.
+# LinuxCNC's default of MAX_LINEAR_JERK, which means no limit by its documentation.
 _NO_JERK = 1e9
-# Kinematics with dimensions, and the bundled machines like them.
+# Kinematics whose dimensions are not in the INI file, and the bundled machines that are like them.
 _LIKE = {
     "xyzac-trt-kins": "trunnion-ac",
     "xyzbc-trt-kins": "trunnion-bc",
@@ -66,7 +66,7 @@ _MOTORS = ("U", "V")
 
 
 class Ini:
-    """The settings of an INI file and those that it includes; the first of a name counts."""
+    """The settings of an INI file and the files that it includes; the first setting of a name counts."""
 
     def __init__(self, path: Path, files: TextFiles) -> None:
         self._settings: dict[tuple[str, str], Setting] = {}
@@ -77,7 +77,7 @@ class Ini:
         self._read(path, ())
 
     def get(self, section: str, *keys: str) -> Setting | None:
-        """The setting of the first of these keys that exists."""
+        """The setting of the first of these keys that exists and is not empty."""
         for key in keys:
             found = self._settings.get((section, key))
             if found is not None and found.text:
@@ -91,7 +91,7 @@ class Ini:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence for each setting that was asked for and that a later one contradicts."""
+        """A sentence for each setting that was read by `get` and has a different value later in the files."""
         return tuple(self._overruled)
 
     def _read(self, path: Path, inside: tuple[Path, ...]) -> None:
@@ -121,7 +121,7 @@ class Ini:
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
-    """The machine of an INI file; raises MachineError for units and kinematics that cannot be used."""
+    """The machine from an INI file; raises MachineError for units and kinematics that cannot be used."""
     ini = Ini(path, files)
     kinematics, joints, warnings = _kinematics(ini, path)
     letters = _letters(ini)
@@ -141,16 +141,16 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         period=_period(ini),
         kinematics=kinematics,
         remarks=tuple(_remarks(ini)),
-        # The model of LinuxCNC knows axes that are the program's.
+        # LinuxCNC's controller model needs joints that are the program's axes.
         controller="linuxcnc" if kinematics == "cartesian" else "",
         parameters=_of_controller(ini, per_mm) if kinematics == "cartesian" else {},
     )
-    # When all settings have been asked for, it is known which of them a later one contradicts.
+    # The warnings are complete only after all settings have been read.
     return replace(found, warnings=(*warnings, *ini.warnings))
 
 
 def _of_controller(ini: Ini, per_mm: float) -> dict[str, Found]:
-    """The limits along the path and the depth of looking ahead, for the model of LinuxCNC."""
+    """The limits along the path and the look-ahead depth, for LinuxCNC's controller model."""
     places = {
         "max_linear_velocity": ("MAX_LINEAR_VELOCITY", "MAX_VELOCITY"),
         "max_linear_acceleration": ("MAX_LINEAR_ACCELERATION", "MAX_ACCELERATION"),
@@ -167,8 +167,8 @@ class _AxisReader:
     def axis(
         self, name: str, letters: Iterable[str], joints: Iterable[int], moves_tool: bool = True
     ) -> FoundAxis:
-        """The axis `name`, by the limits of axes and joints; without travel where it does not move the tool
-        alone."""
+        """The axis `name`, with the least limits of these axes and joints; it has no travel if it does not
+        move the tool alone (`moves_tool` false)."""
         turns = moves_tool and name in ROTARY_LETTERS
         unit = self._per_degree if turns else self._per_mm
         sections = [f"AXIS_{letter}" for letter in letters]
@@ -198,17 +198,17 @@ class _AxisReader:
         return FoundAxis(name, limits_of(limits), travel)
 
     def _without_offsets(self, section: str, own: Found | None) -> Found | None:
-        """The share of a limit that programs have beside external offsets."""
+        """A limit without the share that is reserved for external offsets."""
         ratio = self._ini.get(section, "OFFSET_AV_RATIO")
         if ratio is None or own is None:
             return own
-        # LinuxCNC replaces values that it does not allow by 0.1.
+        # LinuxCNC replaces values that are not allowed by 0.1.
         part = ratio.number if 0.0 <= ratio.number <= 0.9 else 0.1
         return Found(own.value * (1.0 - part), f"{own.source}, less OFFSET_AV_RATIO = {part:g}")
 
 
 def _corexy_axes(reader: _AxisReader, letters: list[str], path: Path) -> list[FoundAxis]:
-    """The two motors, whose limits keep those of X and Y too, and the other axes."""
+    """The two motors, with limits that also keep those of X and Y, and the other axes."""
     others = [letter for letter in letters if letter not in "XY"]
     taken = [letter for letter in others if letter in _MOTORS]
     if taken:
@@ -220,7 +220,7 @@ def _corexy_axes(reader: _AxisReader, letters: list[str], path: Path) -> list[Fo
 
 
 def _kinematics(ini: Ini, path: Path) -> tuple[str, dict[str, list[int]], list[str]]:
-    """The kinematics' name here, the joints of each letter, and what the user must know."""
+    """feedplan's name of the kinematics, the joints of each letter, and warnings for the user."""
     setting = ini.get("KINS", "KINEMATICS")
     words = setting.text.split() if setting else []
     name = words[0].lower() if words else "trivkins"
@@ -247,7 +247,7 @@ def _letters(ini: Ini) -> list[str]:
 
 
 def _units(ini: Ini, path: Path, key: str, names: dict[str, float], remedy: str) -> float:
-    """Units of the file per mm or degree."""
+    """Units of the file per mm or per degree."""
     setting = ini.get("TRAJ", key)
     if setting is None:
         raise MachineError(f"{path.name} has no [TRAJ] {key}: add it there, as {key} = {remedy.split()[0]}")

@@ -1,4 +1,4 @@
-"""Robots of ROS, from joint_limits.yaml (MoveIt, ros2_control): limits that overwrite those of the URDF.
+"""Makes machines from joint_limits.yaml of ROS (MoveIt, ros2_control), which replaces limits of the URDF.
 
 | key of a joint | what it becomes |
 |---|---|
@@ -7,9 +7,9 @@
 | max_jerk, where has_jerk_limits is true | jerk [rad/s³] |
 | min_position, max_position, where has_position_limits is true | travel [rad] |
 
-Joints stand below `joint_limits`, each with its keys, as such files have them; `!degrees` before a number is
-known. Lists, texts of several lines, anchors and braces are not read: no such file needs them. Which joints
-are prismatic, and so in metres, only the URDF knows.
+Joints are below the key `joint_limits`, each with its own keys; `!degrees` before a number is understood.
+Lists, texts of several lines, anchors and braces are not read: such files do not need them. Only the URDF
+says which joints are prismatic, and so in metres.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Joint = dict[str, Setting]
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
-    """The machine of the joints in a file; raises MachineError for lines that such files do not have."""
+    """The machine with the joints of a file; raises MachineError for lines that such files do not have."""
     joints = _joints(path, files)
     if not joints:
         raise MachineError(f"{path.name} has no joints below joint_limits: give a joint_limits.yaml")
@@ -65,7 +65,7 @@ def _axis(name: str, joint: Joint) -> FoundAxis:
 def _joints(path: Path, files: TextFiles) -> dict[str, Joint]:
     """The keys of each joint, in the order of the file."""
     joints: dict[str, Joint] = {}
-    # The keys that are open, each with its indentation.
+    # The keys that enclose the current line, each with its indentation.
     keys: list[tuple[int, str]] = []
     for line, place in files.lines(path):
         line = _COMMENT.sub("", line).rstrip()

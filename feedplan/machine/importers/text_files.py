@@ -1,4 +1,4 @@
-"""Text files that include each other, read with bounds on their size, number and depth."""
+"""Reads text files that include each other, with limits on their size, number and depth."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 from feedplan.arguments import shown
 from feedplan.errors import MachineError, unreadable
 
-# Bounds of all files together: size [bytes], number, and depth of inclusion.
+# Limits for all files together: size [bytes], number, and depth of inclusion.
 MAX_BYTES = 1 << 20
 MAX_FILES = 100
 MAX_DEPTH = 16
-# A line that is longer holds no setting.
+# Longer lines are ignored: they hold no setting.
 LONGEST_LINE = 4096
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?=[\s#;]|\Z)", re.ASCII)
@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?=[\s#;]|\Z)", 
 
 @dataclass(frozen=True)
 class Setting:
-    """A value as a file has it: `label` says what it is, `place` its file and line."""
+    """A setting's text in a file: `label` is its name for messages, `place` its file and line."""
 
     label: str
     text: str
@@ -45,7 +45,7 @@ class Setting:
 
 @dataclass
 class TextFiles:
-    """The imported file and the files that it includes; `missing` are those that do not exist."""
+    """The imported file and the files that it includes; `missing` names included files that do not exist."""
 
     main: Path
     missing: list[str] = field(default_factory=list)
@@ -53,9 +53,9 @@ class TextFiles:
     _files: int = 0
 
     def lines(self, path: Path) -> Iterator[tuple[str, str]]:
-        """The lines of a file, without their ends, each with its place for messages.
+        """The lines of a file, without line ends, each with its place for messages.
 
-        Raises MachineError where it cannot be read, is binary, or more than the bounds.
+        Raises MachineError where it cannot be read, is binary, or exceeds the limits above.
         """
         self._files += 1
         if self._files > MAX_FILES:
@@ -80,10 +80,10 @@ class TextFiles:
                 yield line, f"{path.name} line {number}"
 
     def included(self, name: str, inside: tuple[Path, ...], place: str) -> list[Path]:
-        """The files that the last of `inside` includes by `name`, in order; `*` and `?` may stand in a name.
+        """The files that the last of `inside` includes by `name`, in order; names may contain `*` and `?`.
 
-        Raises MachineError where a file would include itself, or they are too deep. One that does not exist
-        is kept in `missing`.
+        Raises MachineError where a file would include itself, or inclusion is too deep. A name without a file
+        is added to `missing`.
         """
         if len(inside) >= MAX_DEPTH:
             raise MachineError(f"{place}: files include each other more than {MAX_DEPTH} deep: give fewer")
@@ -99,7 +99,7 @@ class TextFiles:
                 self.missing += [] if found else [name]
             known = [own.resolve() for own in inside]
             again = next((entry for entry in found if entry.resolve() in known), None)
-        except (OSError, ValueError, RuntimeError) as error:  # no path, no such home
+        except (OSError, ValueError, RuntimeError) as error:  # not a path, or no such home directory
             raise MachineError(f"{place}: {shown(name)} cannot be included ({error}): correct it") from None
         if again is not None:
             raise MachineError(f"{place}: {again.name} includes itself: take this line out")

@@ -1,9 +1,9 @@
-"""Kinematics q = K(P): from the coordinates of the tool tip to those of the joints; one file a machine type.
+"""Kinematics q = K(P): joint positions from the coordinates of the tool tip; one file a machine type.
 
 A module has `build(axes, parameters) -> Kinematics` and is found by its name: the type `trunnion-ac` is the
 module `trunnion_ac`. Users add their own with `register`. K is written once, with the functions of
-`feedplan.machine.numbers`; it is called once and recorded, and the record is evaluated natively: positions,
-exact derivatives along a curve, proven bounds of them.
+`feedplan.machine.numbers`. It is called once and recorded, and the native module evaluates the record:
+positions, exact derivatives along a curve, and their proven bounds.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from feedplan.machine.parameters import Parameters
 class Kinematics(ABC):
     """A machine type with its dimensions.
 
-    `tip_names` are the program letters that `joints` takes in this order, `joint_names` the machine's axis
-    letters in its file's order. `rotary`: the joint is an angle [deg]; the others are lengths [mm].
-    `turning`: the joint is known up to whole turns only, since it comes from `atan2`; along a path it is
-    continuous. `always` is true where a program's words always mean the tip, as X, Y, Z
-    on a cylindrical machine; false where they are joint positions until G43.4 or the like. `any_unit`: joints
-    need not be in mm and degrees.
+    `tip_names` are the program letters that `joints` takes, in this order; `joint_names` are the machine's
+    axis names in its file's order. `rotary`: whether each joint is an angle [deg]; the others are lengths
+    [mm]. `turning`: whether each joint is known only up to whole turns, because it comes from `atan2`; along
+    a path it is continuous. `always` is true where a program's words always mean the tip, as X, Y, Z on a
+    cylindrical machine; false where they are joint positions until G43.4 or the like. `any_unit`: joints need
+    not be in mm and degrees.
     """
 
     tip_names: tuple[str, ...]
@@ -41,7 +41,7 @@ class Kinematics(ABC):
 
     @property
     def rotary(self) -> tuple[bool, ...]:
-        """Which joints are angles; those named A, B or C unless a subclass says otherwise."""
+        """Whether each joint is an angle; by default those named A, B or C."""
         return tuple(name in ROTARY_LETTERS for name in self.joint_names)
 
     @property
@@ -51,12 +51,12 @@ class Kinematics(ABC):
 
     @property
     def turning(self) -> tuple[bool, ...]:
-        """Which joints are known up to whole turns only; none unless a subclass says otherwise."""
+        """Whether each joint is known only up to whole turns; by default none."""
         return (False,) * len(self.joint_names)
 
     @abstractmethod
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
-        """Joint positions [mm, deg] for the tip [mm, deg]: one formula for all places, of any numbers."""
+        """Joint positions [mm, deg] for a tip [mm, deg]: one formula for all places and types of numbers."""
 
     @cached_property
     def recorded(self) -> Expression:
@@ -68,7 +68,7 @@ class Kinematics(ABC):
         raise MachineError(f"the kinematics {type(self).__name__} has no tip(joints): write that method")
 
     def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
-        """What vanishes where K is singular, by names that complete "the tool is at …"; empty by default."""
+        """Quantities that vanish where K is singular, by names that complete "the tool is at …"."""
         return {}
 
 
@@ -78,7 +78,7 @@ _registered: dict[str, Factory] = {}
 
 
 def register(name: str, factory: Factory) -> None:
-    """Makes a kinematics known under a name for machine files; a later one of the same name replaces it.
+    """Registers a kinematics under a name for machine files; a later one with the same name replaces it.
 
     `factory(axes, parameters)` gets the machine's axes in order and its `[kinematics]` keys.
     """
@@ -95,7 +95,7 @@ def types() -> tuple[str, ...]:
 
 
 def create(name: str, axes: tuple[Axis, ...], values: Mapping[str, Any], machine: str) -> Kinematics:
-    """The kinematics of that name for a machine's axes; raises MachineError with the remedy."""
+    """The kinematics of a name for a machine's axes; raises MachineError with the remedy."""
     if name in _registered:
         factory = _registered[name]
     elif name in _bundled():

@@ -2,8 +2,9 @@
 
     q_j = scale_j · P_axis(j)
 
-Without keys every joint has the program axis of its own letter. `map` gives joints another program axis: two
-joints may share one, as the two motors of a gantry do. `scale` turns mm of the tip into mm of the joint.
+Without keys every joint follows the program axis of its own letter. `map` lets joints follow another program
+axis; two joints may follow the same, as the two motors of a gantry do. `scale` is mm of the joint per mm of
+the tip.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from feedplan.machine.parameters import Parameters
 
 @dataclass(frozen=True)
 class Cartesian(Kinematics):
-    """`source[j]` is the index in `tip_names` of the program axis that joint j follows, times `scale[j]`."""
+    """`source[j]`: index in `tip_names` of the program axis that joint j follows; `scale[j]`: its factor."""
 
     tip_names: tuple[str, ...]
     joint_names: tuple[str, ...]
@@ -31,7 +32,7 @@ class Cartesian(Kinematics):
 
     @property
     def rotary(self) -> tuple[bool, ...]:
-        """As the machine's axes are."""
+        """The kinds of the machine's axes."""
         return self.rotary_joints
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
@@ -65,7 +66,7 @@ def build(axes: tuple[Axis, ...], parameters: Parameters) -> Cartesian:
                 f"machine {parameters.machine}: the {axis.kind} joint {axis.name} follows {letter}: "
                 "map linear joints to X, Y, Z, U, V, W and rotary ones to A, B, C"
             )
-    # Axes of other names follow themselves: no program moves them.
+    # Axes with other names follow themselves: programs cannot move them.
     letters = tuple(AXIS_LETTERS)
     tip_names = tuple(name for name in letters if name in follows)
     tip_names += tuple(name for name in follows if name not in letters)

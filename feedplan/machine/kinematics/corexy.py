@@ -2,8 +2,8 @@
 
     q_1 = x + y,   q_2 = x − y,   q_3 = z
 
-The first two axes of the machine file are the motors, in mm of belt, whatever their letters (U and V, or A
-and B with kind = "linear"). A third axis and those after it follow the program axis of their own letter.
+The first two axes of the machine file are the motors, in mm of belt, with any letters but X and Y (U and V,
+or A and B with kind = "linear"). All further axes follow the program axis of their own letter.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class CoreXY(Kinematics):
 
     @property
     def rotary(self) -> tuple[bool, ...]:
-        """The motors are counted in mm of belt; the others are as in the machine file."""
+        """The motors are linear (mm of belt); the others are as in the machine file."""
         return self.rotary_joints
 
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:

@@ -1,9 +1,9 @@
-"""Cylindrical machines: a column turns an arm, the arm goes in and out, the tool up and down.
+"""Cylindrical machines: a column turns an arm, the arm moves in and out, and the tool moves up and down.
 
     θ = atan2(y − y_c, x − x_c),   r = √((x − x_c)² + (y − y_c)²),   z = z
 
 Cheatham 2007, figure 5.1b. The axes of the machine file are, in this order, the column [deg], the arm [mm]
-and the height [mm], whatever their letters: say C, X, Z. K is singular on the column's axis.
+and the height [mm], with any letters, such as C, X, Z. K is singular on the column's axis.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class Cylindrical(Kinematics):
         return radius * cosine + self.centre[0], radius * sine + self.centre[1], z
 
     def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
-        """The radius."""
+        """The radius, which is 0 on the column's axis."""
         return {"the axis of the column": hypot(tip[0] - self.centre[0], tip[1] - self.centre[1])}
 
 
 def build(axes: tuple[Axis, ...], parameters: Parameters) -> Cylindrical:
-    """Keys `centre_x`, `centre_y` [mm]: where the column stands, 0 by default."""
+    """Keys `centre_x`, `centre_y` [mm]: the position of the column's axis, 0 by default."""
     centre = (parameters.number("centre_x", 0.0), parameters.number("centre_y", 0.0))
     names = tuple(axis.name for axis in axes)
     return Cylindrical(joint_names=names if len(names) == 3 else ("C", "X", "Z"), centre=centre)

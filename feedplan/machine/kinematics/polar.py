@@ -1,10 +1,10 @@
-"""Polar machines: the table turns the part under a tool that only goes in and out, up and down.
+"""Polar machines: the table turns the part under a tool that only moves in and out, and up and down.
 
-    X = ±√(x² + y²),   C = atan2(±y, ±x),   Z = z      about the table's centre
+    X = ±√(x² + y²),   C = atan2(±y, ±x),   Z = z      (relative to the table's centre)
 
-The axes of the machine file are, in this order, the slide [mm], the height [mm] and the table [deg], whatever
-their letters: say X, Z, C. ISO 841 counts the table against its own turning, so that C is the angle by which
-the tool goes round the part: C = +atan2(y, x) unless `turns = "reversed"`. `side = "minus"` works at negative
+The axes of the machine file are, in this order, the slide [mm], the height [mm] and the table [deg], with any
+letters, such as X, Z, C. ISO 841 counts a table's angle by the tool's motion relative to the part, opposite
+to the table's own turning: C = +atan2(y, x), unless `turns = "reversed"`. `side = "minus"` works at negative
 X. K is singular at the table's centre.
 """
 
@@ -21,7 +21,8 @@ from feedplan.machine.parameters import Parameters
 
 @dataclass(frozen=True)
 class Polar(Kinematics):
-    """A table about `centre` [mm]; `side` ±1 is the sign of the slide, `sense` ±1 the table's counting."""
+    """A table with its axis at `centre` [mm]; `side` ±1 is the sign of the slide, `sense` ±1 the sign of the
+    table's angle."""
 
     joint_names: tuple[str, ...]
     centre: tuple[float, float] = (0.0, 0.0)
@@ -45,7 +46,7 @@ class Polar(Kinematics):
         return radius * cosine + self.centre[0], radius * sine + self.centre[1], z
 
     def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
-        """The radius."""
+        """The radius, which is 0 at the table's centre."""
         return {"the centre of the table": hypot(tip[0] - self.centre[0], tip[1] - self.centre[1])}
 
 

@@ -1,4 +1,5 @@
-"""Four-axis machines: X, Y, Z and one rotary table, C flat or A or B upright, followed by the tip."""
+"""Four-axis machines: X, Y, Z and one rotary table (C about a vertical axis, or A or B about a horizontal
+one); the tip follows the part."""
 
 from __future__ import annotations
 
