@@ -74,20 +74,20 @@ _SWEPT = "may be given several times"
     type=option.Place(),
     required=True,
     metavar="DIR",
-    help="A folder for each plan is made there.",
+    help="Folder that gets a folder for each plan.",
 )
 @click.option(
     "--format",
     "formats",
     type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), option.NO_SETPOINTS]),
     multiple=True,
-    help=f"Format of the setpoints, npz by default; {_SWEPT}. none: no setpoints.",
+    help=f"Format of the setpoints (npz by default); {_SWEPT}. none: no setpoints.",
 )
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes of this computer.  [default: as many as it has cores]",
+    help="Processes on this computer.  [default: as many as it has cores]",
 )
 @cluster_options
 @click.option(
@@ -96,7 +96,7 @@ _SWEPT = "may be given several times"
     default=3600.0,
     show_default=True,
     metavar="S",
-    help="Time that a plan may take.",
+    help="Time limit of each plan.",
 )
 @click.option(
     "--max-memory",
@@ -104,7 +104,7 @@ _SWEPT = "may be given several times"
     default=8000.0,
     show_default=True,
     metavar="MB",
-    help="Memory of a process here; the workers of a cluster have limits of their own.",
+    help="Memory limit of each process on this computer; workers of a cluster have their own limits.",
 )
 @option.JSON
 @option.QUIET

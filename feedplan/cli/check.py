@@ -18,9 +18,13 @@ from feedplan.cli.options import JSON, ZERO_OR_MORE
     help="A bundled machine or a TOML file.  [default: the plan's own]",
 )
 @click.option(
-    "--resolution", type=ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
+    "--resolution",
+    type=ZERO_OR_MORE,
+    default=0.0,
+    metavar="MM",
+    help="Last digit of the positions, if they were rounded.",
 )
-@click.option("--jerk", is_flag=True, help="Judge jerk whatever the method.")
+@click.option("--jerk", is_flag=True, help="Judge the jerk, whatever the method.")
 @JSON
 def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
     """Audit setpoints from files alone, against the limits of the machine that plan.json holds.

@@ -26,12 +26,12 @@ cluster_options = as_one(
         click.option(
             "--cluster",
             metavar="ADDRESS",
-            help="The scheduler of a Dask cluster that plans, as tcp://127.0.0.1:8786, or tls://planner:8786.",
+            help="Scheduler of a Dask cluster that makes the plans: tcp://127.0.0.1:8786, or tls://planner:8786.",
         ),
         click.option(
-            "--tls-ca", metavar="FILE", help="Certificate that has signed those of the cluster (PEM)."
+            "--tls-ca", metavar="FILE", help="Certificate of the authority that signed the cluster's (PEM)."
         ),
-        click.option("--tls-cert", metavar="FILE", help="Our certificate for the cluster (PEM)."),
-        click.option("--tls-key", metavar="FILE", help="The key of our certificate (PEM)."),
+        click.option("--tls-cert", metavar="FILE", help="This computer's certificate for the cluster (PEM)."),
+        click.option("--tls-key", metavar="FILE", help="Private key of this certificate (PEM)."),
     ),
 )

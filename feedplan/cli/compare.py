@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     "-o",
     type=option.Place(),
     metavar="DIR",
-    help="Write comparison.json and comparison.html there.",
+    help="Folder for comparison.json and comparison.html.",
 )
 @option.JSON
 @option.QUIET
@@ -64,7 +64,7 @@ def compare(
     """Plan PROGRAM by several methods: time, proven gap, computing time and audit of each.
 
     PROGRAM is as for plan. Exit code 0 if any method has a plan, even if the plan breaks a limit: the table
-    tells that.
+    shows it.
     """
     from feedplan.comparison import LIMITS
     from feedplan.comparison import compare as make_comparison

@@ -56,7 +56,8 @@ controller_options = as_one(
         click.option(
             "--controller",
             type=click.Choice(tuple(MODELS)),
-            help="Tell the time that this controller takes today.  [default: the machine file's, if any]",
+            help="Also compute the time that this controller needs by its own look-ahead.  [default: the "
+            "machine file's, if any]",
         ),
         click.option(
             "--controller-option",

@@ -17,7 +17,9 @@ from feedplan.program.read import Reading
 @MACHINE
 @reading_options
 @TOLERANCE
-@click.option("--smooth", is_flag=True, help="Fit all moves as the methods that limit jerk do.")
+@click.option(
+    "--smooth", is_flag=True, help="Fit all moves by smooth curves, as for methods that limit jerk."
+)
 @JSON
 def fit(
     program: str | IO[bytes],

@@ -33,7 +33,7 @@ def show(name: str) -> None:
 
 
 _OUTPUT = click.option(
-    "--output", "-o", type=Place(), metavar="FILE", help="Write it there.  [default: standard output]"
+    "--output", "-o", type=Place(), metavar="FILE", help="File for the machine.  [default: standard output]"
 )
 
 

@@ -62,14 +62,14 @@ MACHINE = click.option(
     default="mill",
     show_default=True,
     metavar="NAME|FILE",
-    help="A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits.",
+    help="A bundled machine, a TOML file, or auto: the smallest bundled machine that the program fits on.",
 )
 METHOD = click.option(
     "--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True
 )
-FEED = click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+FEED = click.option("--feed", type=Number(), metavar="MM/S", help="Feed that replaces all programmed ones.")
 FEED_OVERRIDE = click.option(
-    "--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on the feed."
+    "--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on all programmed feeds."
 )
 TOLERANCE = click.option(
     "--tolerance", type=Number(), metavar="MM", help="Allowed distance from the programmed path."
@@ -79,37 +79,39 @@ PATH = click.option(
     type=click.Choice(PATHS),
     default="as-fitted",
     show_default=True,
-    help="The path of the program alone, with arcs of their size (as-fitted), or one that is fitted to the "
-    "speed of a first plan, within the tolerance, where that is faster (fastest).",
+    help="as-fitted: the path follows from the program alone, and arcs keep their size. fastest: within the "
+    "tolerance the path is fitted to the speed of a first plan, wherever this saves time.",
 )
 PATH_ROUNDS = click.option(
     "--path-rounds",
     type=click.IntRange(1, MAX_ROUNDS),
     default=1,
     show_default=True,
-    help="How often the fastest path is made: first fitted to the speed of a plan, then by steps along the "
-    "gradient of its time.",
+    help="Rounds of --path fastest: the first one fits the path to the speed of a plan, the others make "
+    "steps along the gradient of the time.",
 )
 ACCURACY = click.option(
-    "--accuracy", type=Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
+    "--accuracy", type=Number(), metavar="PART", help="Relative error of the time, for methods with a mesh."
 )
-TIME_LIMIT_HELP = "Time that a method with a mesh may take."
+TIME_LIMIT_HELP = "Limit of the computing time, for methods with a mesh."
 WHOLE_LIMIT_HELP = (
-    "Time that a method with a mesh may take. With jerk-limited it is for the whole command: reading, "
-    "fitting, a first plan, the audit and the files are never left out, and 0 allows only these; the rest "
-    "of the time improves the plan and its bound."
+    "Limit of the computing time, for methods with a mesh. With jerk-limited it is the limit of the whole "
+    "command: reading, fitting, a first plan, the audit and the files are always done (0 allows only these); "
+    "the rest of the time improves the plan and its lower bound."
 )
-PERIOD = click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+PERIOD = click.option(
+    "--period", type=Number(), metavar="S", help="Servo period that replaces the machine's."
+)
 MOST_SETPOINTS = click.option(
     "--max-setpoints",
     type=click.IntRange(min=1),
     default=MAX_SETPOINTS,
     show_default=True,
     metavar="N",
-    help="A plan of more setpoints is refused.",
+    help="Refuse plans with more setpoints.",
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only, and what --json asks for.")
+QUIET = click.option("--quiet", "-q", is_flag=True, help="Print only errors and the output of --json.")
 PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
 ZERO_OR_MORE = Number(or_zero=True)
 # This value of --format means that no setpoints are written.

@@ -45,26 +45,31 @@ from feedplan.setpoints import INTERPOLATORS
     "--start-speed", type=option.ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start."
 )
 @click.option("--end-speed", type=option.ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
-@click.option("--one-step-more", is_flag=True, help="Plan again with each limit raised, and tell the gain.")
+@click.option(
+    "--one-step-more", is_flag=True, help="Plan again with each limit raised by a step; show the time saved."
+)
 @click.option(
     "--output",
     "-o",
     type=option.Place(),
     metavar="DIR",
-    help="Write plan.json, setpoints and report.html there.",
+    help="Folder for plan.json, setpoints and report.html.",
 )
 @click.option(
     "--format",
     "formats",
     type=click.Choice((*outputs.formats(), option.NO_SETPOINTS)),
     multiple=True,
-    help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
+    help="Format of the setpoints (npz by default); may be given several times. none: only plan.json and the "
+    "report.",
 )
 @click.option(
-    "--step", type=option.Number(), metavar="S", help="Longest step of a pvt table, which needs it."
+    "--step", type=option.Number(), metavar="S", help="Longest time step of a pvt table, for --format pvt."
 )
 @program_options
-@click.option("--server", metavar="URL", help="Have a service plan, such as http://127.0.0.1:8000.")
+@click.option(
+    "--server", metavar="URL", help="Address of a service that makes the plan, such as http://127.0.0.1:8000."
+)
 @TOKEN_FILE
 @cluster_options
 @option.JSON
@@ -88,8 +93,8 @@ def plan(
 ) -> int:
     """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
 
-    With --cluster and jerk-limited the workers of a Dask cluster plan the runs between stops, with the same
-    result bit for bit; reading, fitting, the audit and the files stay on this computer.
+    With --cluster and jerk-limited, the workers of a Dask cluster plan the runs between stops. The result is
+    the same bit for bit; reading, fitting, the audit and the files stay on this computer.
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """

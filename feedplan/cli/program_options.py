@@ -71,19 +71,19 @@ program_options = as_one(
     _wanted,
     (
         click.option(
-            "--program-out", type=Place(), metavar="FILE", help="Write the program with planned feeds there."
+            "--program-out", type=Place(), metavar="FILE", help="File for the program with planned feeds."
         ),
         click.option(
             "--program",
             "in_folder",
             is_flag=True,
-            help="Write that program into the folder -o, as program.ngc.",
+            help="Write the program with planned feeds into the folder -o, as program.ngc.",
         ),
         click.option(
             "--feed-step",
             type=float,
             metavar="MM/S",
-            help="In that program, split lines and arcs where the planned speed varies by more.",
+            help="In that program, split lines and arcs on which the planned speed varies by more than this.",
         ),
         click.option(
             "--inverse-time", is_flag=True, help="In that program, give feeds as inverse time (G93)."
@@ -91,13 +91,13 @@ program_options = as_one(
         click.option(
             "--dialect",
             type=click.Choice(DIALECTS),
-            help="The control that the program is for: words that it lacks are reported.  "
+            help="Control that runs that program; words that it does not know are reported.  "
             "[default: linuxcnc]",
         ),
         click.option(
             "--expand",
             is_flag=True,
-            help="Write the moves of the program one by one, without loops, calls and cycles.",
+            help="In that program, write every move on its own, without loops, calls and cycles.",
         ),
     ),
 )

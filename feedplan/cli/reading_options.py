@@ -30,13 +30,14 @@ reading_options = as_one(
             "--subprograms",
             multiple=True,
             metavar="DIR",
-            help="Folder of files that the program calls, after its own; may be given several times.",
+            help="Folder with files that the program calls, searched after the program's own folder; may be "
+            "given several times.",
         ),
         click.option(
             "--whole-step",
             type=float,
             metavar="UNITS",
-            help="Unit of lengths without a decimal point, such as 0.001.  [default: 1]",
+            help="Unit of lengths that have no decimal point, such as 0.001.  [default: 1]",
         ),
     ),
 )

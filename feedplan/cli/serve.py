@@ -20,7 +20,7 @@ TOKEN_FILE = click.option(
     "--token-file",
     metavar="FILE",
     envvar="FEEDPLAN_TOKEN_FILE",
-    help="The service's token, a line in a file.",
+    help="File with the service's token on one line.",
 )
 
 
@@ -41,9 +41,15 @@ limit_options = as_one("limits", Limits, [_limit_option(own) for own in fields(L
 
 
 @click.command()
-@click.option("--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Where to listen.")
 @click.option(
-    "--port", type=click.IntRange(0, 65_535), default=8000, show_default=True, help="0: a free one."
+    "--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Address to listen at."
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65_535),
+    default=8000,
+    show_default=True,
+    help="Port to listen at; 0: any free one.",
 )
 @click.option(
     "--store",
@@ -51,7 +57,7 @@ limit_options = as_one("limits", Limits, [_limit_option(own) for own in fields(L
     default="feedplan-jobs",
     show_default=True,
     metavar="DIR",
-    help="Where jobs are kept.",
+    help="Folder for the jobs.",
 )
 @TOKEN_FILE
 @click.option(
@@ -59,7 +65,7 @@ limit_options = as_one("limits", Limits, [_limit_option(own) for own in fields(L
     "allowed",
     multiple=True,
     metavar="NAME",
-    help="Another name that the service is known by.",
+    help="Another host name by which clients reach the service.",
 )
 @cluster_options
 @limit_options
@@ -72,10 +78,10 @@ def serve(
     limits: Limits,
     cluster: ClusterAddress | None,
 ) -> None:
-    """Plan for others over HTTP: jobs, progress, results; its address /docs describes the requests.
+    """Plan jobs of clients over HTTP; the address /docs of the service describes the requests.
 
-    To be reached from other computers the service needs --token-file. It prints its address when it is ready.
-    With --cluster jobs run on the workers of a Dask cluster, as many at a time as these have threads.
+    A service that other computers can reach needs --token-file. It prints its address when it is ready.
+    With --cluster jobs run on the workers of a Dask cluster, as many at a time as the workers have threads.
     """
     try:
         from feedplan.service.server import serve as run
