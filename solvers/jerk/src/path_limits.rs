@@ -22,22 +22,15 @@
 mod chain_rule;
 mod shape;
 
+use crate::path_problem::Limits as AxisLimits;
 use crate::s_curve::Limits;
-use feedplan_planner::problem::{greater, Both, Fault};
+use feedplan_planner::problem::{greater, Fault};
 pub use shape::{bounded, bounded_until, sampled, Curve, Shape};
 
 /// Golden-section steps: the bracket shrinks to 1e-5 of its width; more is not needed, because the minimum is flat.
 const STEPS: usize = 24;
 /// Fractions of the greatest V and A that are tried: a V below its greatest leaves some A, and an A below its greatest some J.
 const RANGE: (f64, f64) = (1e-3, 1.0 - 1e-6);
-
-/// The limits of every axis as absolute values, in mm (or degrees) and seconds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisLimits<const M: usize> {
-    pub velocity: Both<M>,
-    pub acceleration: Both<M>,
-    pub jerk: [f64; M],
-}
 
 impl<const M: usize> AxisLimits<M> {
     /// These limits, with the limits of jerk lower by the fraction `part`.

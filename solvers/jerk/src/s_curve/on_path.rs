@@ -11,7 +11,7 @@ use crate::curvature_jumps::HALF;
 use crate::feed;
 use crate::jerk_limited::on_path::Task;
 use crate::jerk_profile::JerkProfile;
-use crate::path_limits::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
+use crate::path_limits::{allowable, bounded, greatest, Allowable, Curve, Shape};
 use crate::path_problem::{Effort, Geometry, Limits, PathPoint, SpeedCap};
 use crate::s_curve::{self, Section, Segment, SegmentEnd};
 use crate::subruns::{checked, over_subruns, subruns, Subrun, CREEP, MOMENT};
@@ -189,7 +189,7 @@ struct Around {
 struct Parts<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     path: &'a ArcLengthPath<'a, M>,
-    axes: AxisLimits<M>,
+    axes: Limits<M>,
     cuts: Vec<Cut<M>>,
 }
 
@@ -200,9 +200,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         limits: &Limits<M>,
         watch: Watch,
     ) -> Self {
-        let Limits { velocity, acceleration, jerk } = *limits;
-        let axes = AxisLimits { velocity, acceleration, jerk };
-        let mut parts = Self { problem, path, axes, cuts: vec![] };
+        let mut parts = Self { problem, path, axes: *limits, cuts: vec![] };
         let free = SpeedCap::new(0.0, f64::INFINITY);
         let mut before = free;
         let junctions = path.junctions(&limits.jerk);
