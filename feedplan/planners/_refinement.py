@@ -1,12 +1,12 @@
 """Plans with a solver: each subrun is solved on finer and finer meshes until its time is accurate enough.
 
-The fastest profile reaches some limit everywhere. Most time is lost in cells whose arcs reach no limit, or
+The fastest profile reaches some limit everywhere. Most time is lost in cells whose phases reach no limit, or
 whose rows are stricter than the limits: these cells are bisected.
 
-On each mesh the solution is checked between the stations. Where an arc exceeds a limit although its rows keep
-it, the limit is lowered by the excess and the subrun is solved again. After some rounds p is scaled down by
-the remaining excess, so that every limit holds. So the result is feasible, and its time approaches the least
-time from above.
+On each mesh the solution is checked between the stations. Where a phase exceeds a limit although its rows
+keep it, the limit is lowered by the excess and the subrun is solved again. After some rounds p is scaled down
+by the remaining excess, so that every limit holds. So the result is feasible, and its time approaches the
+least time from above.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from feedplan.arguments import is_whole, number, shown
 from feedplan.arrays import Flags, Floats
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError, at_line
-from feedplan.planners._arcs import Arcs, arcs_between, profile
 from feedplan.planners._faults import end_error
 from feedplan.planners._mesh import Cuts, Mesh, Subrun, even_cuts, mesh, subruns
+from feedplan.planners._phases import Phases, phases_between, profile
 from feedplan.planners._transcription import Rows, Transcription, transcribe
 from feedplan.profile import SpeedProfile
 
@@ -36,8 +36,8 @@ _LEAST, _FIRST = 4, 32
 MAX_CELLS = 400_000
 # The greatest number of cells for each piece that a user may request.
 _MOST_CELLS = 1_000_000_000
-# How many times limits are lowered where arcs exceed them: `_ROUNDS`, or `_MOVING_ROUNDS` if given speeds at
-# the ends forbid scaling. `_EXCESS` is the excess that scaling may remove; the audit allows 1e-6.
+# How many times limits are lowered where phases exceed them: `_ROUNDS`, or `_MOVING_ROUNDS` if given speeds
+# at the ends forbid scaling. `_EXCESS` is the excess that scaling may remove; the audit allows 1e-6.
 _ROUNDS = 3
 _MOVING_ROUNDS = 8
 _EXCESS = 5e-7
@@ -74,7 +74,7 @@ class Method:
     """A solver from a package.
 
     `rows` makes the rows of a mesh from limits (n, joints) and from the cells whose limits hold at both ends
-    (n,). `by_axis`: arcs may have a constant joint acceleration. `feasible`: the result must keep limits
+    (n,). `by_axis`: phases may have a constant joint acceleration. `feasible`: the result must keep limits
     between the stations. `platform`: the only platform with this package, if any. `others`: further packages
     that it needs.
     """
@@ -121,7 +121,7 @@ def plan_on_meshes(
         time_limit = number(time_limit, "the time limit", "a positive number", lambda limit: limit > 0, "s")
     method.require()
     deadline = time.monotonic() + (math.inf if time_limit is None else time_limit)
-    parts: list[tuple[Mesh, Arcs]] = []
+    parts: list[tuple[Mesh, Phases]] = []
     runs, count = [0], 0
     for run in subruns(problem):
         for subrun in run:
@@ -148,12 +148,12 @@ class _Strictness:
         cells = len(grid)
         return cls(np.ones((cells, len(problem.axes))), np.ones(cells + 1), np.zeros(cells, dtype=bool))
 
-    def tightened(self, arcs: Arcs) -> _Strictness:
-        """Lowers limits where arcs exceed them; a cell that exceeds them again gets rows at its ends."""
-        stubborn = self.repeated & (arcs.acceleration.max(axis=1) > 1.0 + _STUBBORN) & ~self.at_ends
-        acceleration = self.acceleration / _excess(arcs.acceleration)
+    def tightened(self, phases: Phases) -> _Strictness:
+        """Lowers limits where phases exceed them; a cell that exceeds them again gets rows at its ends."""
+        stubborn = self.repeated & (phases.acceleration.max(axis=1) > 1.0 + _STUBBORN) & ~self.at_ends
+        acceleration = self.acceleration / _excess(phases.acceleration)
         acceleration[stubborn] = 1.0
-        beyond = _excess(arcs.speed)
+        beyond = _excess(phases.speed)
         speed = self.speed / np.maximum(np.append(beyond, 1.0), np.append(1.0, beyond))
         return _Strictness(acceleration, speed, self.at_ends | stubborn, repeated=True)
 
@@ -177,31 +177,31 @@ class _Planner:
     method: Method
     deadline: float
 
-    def plan(self, accuracy: float, cells: int | None) -> tuple[Mesh, Arcs]:
+    def plan(self, accuracy: float, cells: int | None) -> tuple[Mesh, Phases]:
         pieces = self.subrun.last - self.subrun.first
         if cells is not None:
             self._check(pieces * cells, "a coarser mesh (fewer cells)")
-            grid, arcs, _ = self._on(even_cuts(self.subrun, cells))
-            excess = float(arcs.worst.max()) - 1.0
+            grid, phases, _ = self._on(even_cuts(self.subrun, cells))
+            excess = float(phases.worst.max()) - 1.0
             if self.method.feasible and excess > _EXCESS:
                 raise SolverError(
                     f"{self._place}{self.method.name} leaves a limit by {excess:.1g} of it between stations, "
                     "and speeds given at the ends of the path keep it from being slower: give more cells"
                 )
-            return grid, arcs
+            return grid, phases
         cuts = even_cuts(self.subrun, max(_LEAST, math.ceil(_FIRST / pieces)))
         times: list[float] = []
         reached = ""
         while True:
             self._check(len(cuts), f"an accuracy above {accuracy:g}{reached}")
-            grid, arcs, lost = self._on(cuts)
-            times.append(float(arcs.duration.sum()))
-            unsure = lost + arcs.duration * (1.0 - arcs.used)
+            grid, phases, lost = self._on(cuts)
+            times.append(float(phases.duration.sum()))
+            unsure = lost + phases.duration * (1.0 - phases.used)
             if len(times) > 2:
                 error = max(_left(times), _TRUE * float(unsure.sum())) / times[-1]
-                kept = not self.method.feasible or arcs.worst.max() <= 1.0 + _EXCESS
+                kept = not self.method.feasible or phases.worst.max() <= 1.0 + _EXCESS
                 if kept and error <= _SAFETY * accuracy:
-                    return grid, arcs
+                    return grid, phases
                 reached = f" ({error:.1g} is reached)"
             cuts = cuts.bisected(_greatest(unsure))
 
@@ -212,40 +212,40 @@ class _Planner:
                 f"ask for {remedy}, or use bang-bang"
             )
 
-    def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Floats]:
+    def _on(self, cuts: Cuts) -> tuple[Mesh, Phases, Floats]:
         """The mesh, its solution, and the time (n,) [s] lost by keeping the limits between the stations."""
         grid = mesh(self.problem, self.subrun, cuts)
         moving = any(p is not None and p > 0.0 for p in grid.fixed)
         strict = _Strictness.none(grid, self.problem)
-        arcs, rows = self._under(strict, grid)
+        phases, rows = self._under(strict, grid)
         if not self.method.feasible:
-            return grid, arcs, np.zeros(len(grid))
-        best = arcs, rows, strict
+            return grid, phases, np.zeros(len(grid))
+        best = phases, rows, strict
         for _ in range(_MOVING_ROUNDS if moving else _ROUNDS):
-            if arcs.worst.max() <= 1.0 + _EXCESS:
+            if phases.worst.max() <= 1.0 + _EXCESS:
                 break
-            strict = strict.tightened(arcs)
+            strict = strict.tightened(phases)
             try:
-                arcs, rows = self._under(strict, grid)
+                phases, rows = self._under(strict, grid)
             except InfeasibleError:
                 break  # the given speeds at the ends need the full limits
-            if arcs.feasible_time < best[0].feasible_time:
-                best = arcs, rows, strict
-        arcs, rows, strict = best
-        worst = float(arcs.worst.max())
-        held = (rows.held & (arcs.acceleration > _NEAR)).any(axis=1)
-        lost = arcs.duration * (strict.share + np.where(held, grid.turn, 0.0))
-        lost += arcs.duration.sum() * np.maximum(arcs.worst - (1.0 + _EXCESS), 0.0)
+            if phases.feasible_time < best[0].feasible_time:
+                best = phases, rows, strict
+        phases, rows, strict = best
+        worst = float(phases.worst.max())
+        held = (rows.held & (phases.acceleration > _NEAR)).any(axis=1)
+        lost = phases.duration * (strict.share + np.where(held, grid.turn, 0.0))
+        lost += phases.duration.sum() * np.maximum(phases.worst - (1.0 + _EXCESS), 0.0)
         # Given speeds at the ends cannot be scaled: a finer mesh has to remove the excess.
-        return grid, arcs if moving else arcs.scaled((1.0 - _MARGIN) / max(worst, 1.0)), lost
+        return grid, phases if moving else phases.scaled((1.0 - _MARGIN) / max(worst, 1.0)), lost
 
-    def _under(self, strict: _Strictness, grid: Mesh) -> tuple[Arcs, Rows]:
-        """The arcs of the solution under stricter limits, and its rows."""
+    def _under(self, strict: _Strictness, grid: Mesh) -> tuple[Phases, Rows]:
+        """The phases of the solution under stricter limits, and its rows."""
         acceleration = np.array([-self.problem.min_acceleration, self.problem.max_acceleration])
         rows = self.method.rows(grid, acceleration[:, None] * strict.acceleration, strict.at_ends)
         task = transcribe(grid, rows, acceleration, strict.speed, self.method.feasible)
         p = self._solve(task) * task.scale
-        return arcs_between(self.problem, grid, p, self.method.by_axis), rows
+        return phases_between(self.problem, grid, p, self.method.by_axis), rows
 
     def _solve(self, transcription: Transcription) -> Floats:
         left = self.deadline - time.monotonic()

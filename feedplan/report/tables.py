@@ -31,7 +31,7 @@ _NAMES = {
     "acceleration_continuity": "acceleration jump along the path",
     "junction": "speed at corners and stops",
     "duration": "recorded durations",
-    "order": "order of the arcs",
+    "order": "order of the phases",
     "gap": "gaps in the path",
     "place": "setpoints off the path",
     "grid": "time grid",

@@ -1,4 +1,4 @@
-"""Computes from p at the stations the arcs (phases) between them, their use of limits, and the profile."""
+"""Computes from p at the stations the phases between them, their use of limits, and the profile."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
 from feedplan.profile import NO_AXIS, OF_PHASES, PhaseLaw, SpeedProfile
 
-# A joint may be chosen for an arc of constant joint acceleration only if its |q'| varies by less than this
+# A joint may be chosen for a phase of constant joint acceleration only if its |q'| varies by less than this
 # factor in the cell,
 _VARIES = 1e3
 # and if it exceeds this share of the greatest |q'| of all joints: then the relative rounding error of q',
@@ -23,8 +23,8 @@ _MOVES = 1e-6
 
 
 @dataclass(frozen=True)
-class Arcs:
-    """One arc for each cell: `kind`, `axis`, `value`, p at both `ends` (2, n) and `duration` (n,) [s].
+class Phases:
+    """One phase for each cell: `kind`, `axis`, `value`, p at both `ends` (2, n) and `duration` (n,) [s].
 
     `acceleration` (n, joints) and `speed` (n,) are upper bounds of the use of the acceleration limits and of
     the squared use of the speed limits. `used` (n,) is the mean over the cell of the greatest use at each
@@ -50,9 +50,9 @@ class Arcs:
         """The duration if the greatest factor `worst` scaled all p down [s]."""
         return float(self.duration.sum()) * math.sqrt(max(float(self.worst.max()), 1.0))
 
-    def scaled(self, factor: float) -> Arcs:
-        """These arcs with p multiplied by a factor."""
-        return Arcs(
+    def scaled(self, factor: float) -> Phases:
+        """These phases with p multiplied by a factor."""
+        return Phases(
             self.kind,
             self.axis,
             self.value * factor,
@@ -64,11 +64,12 @@ class Arcs:
         )
 
 
-def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs:
-    """The arcs through p at the stations (n + 1,): p linear in u, or the acceleration of one joint constant.
+def phases_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Phases:
+    """The phases through p at the stations (n + 1,): with p linear in u, or with constant acceleration of one
+    joint.
 
-    If `by_axis` is true, each cell takes the arc with the least greatest use of a limit; else p is linear in
-    u in all cells.
+    If `by_axis` is true, each cell takes the phase with the least greatest use of a limit; else p is linear
+    in u in all cells.
     """
     start, end = mesh.gain * p[:-1], p[1:]
     own = start + (end - start) * PLACES[:, None]
@@ -103,7 +104,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Floats, by_axis: bool) -> Arcs
     used = np.maximum(problem.use("acceleration", acceleration).max(axis=2), speed.max(axis=2))
     # Each direction separately, because the use of a limit has a kink where the acceleration changes sign.
     peaks = [_peak(acceleration / limit) for limit in (problem.max_acceleration, problem.min_acceleration)]
-    return Arcs(
+    return Phases(
         kind,
         axis,
         value,
@@ -130,7 +131,7 @@ def _peak(values: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class _Motion:
-    """p and s of arcs at the places of their cells (places, n)."""
+    """p and s of phases at the places of their cells (places, n)."""
 
     p: Floats
     s: Floats
@@ -152,11 +153,11 @@ class _Motion:
         return _Motion(np.where(better, other.p, self.p), np.where(better, other.s, self.s))
 
 
-def profile(parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
-    """The arcs of all subruns as one profile; `runs` are the offsets of the runs in the arcs."""
+def profile(parts: list[tuple[Mesh, Phases]], runs: list[int]) -> SpeedProfile:
+    """The phases of all subruns as one profile; `runs` are the offsets of the runs in the phases."""
     rows = (
-        (mesh.piece, arcs.kind, arcs.axis, arcs.value, *mesh.ends, *arcs.ends, arcs.duration)
-        for mesh, arcs in parts
+        (mesh.piece, phases.kind, phases.axis, phases.value, *mesh.ends, *phases.ends, phases.duration)
+        for mesh, phases in parts
     )
     columns: list[Any] = [np.concatenate(column) for column in zip(*rows, strict=True)]
     return SpeedProfile(**dict(zip(OF_PHASES, columns, strict=False)), runs=np.array(runs))
