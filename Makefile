@@ -1,14 +1,14 @@
-# Two commands do everything: `make demo` plans an example, `make test` checks the project.
+# The two main commands: `make demo` plans an example, `make test` checks the project.
 VENV := .venv
 BIN := $(VENV)/bin
 NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
 PAGE := feedplan/report/bundle/page.js
-# Modules are compiled when they are imported first: most files of the packages never are.
+# Without --no-compile pip would compile all modules of the packages; most of them are never imported.
 INSTALL := $(BIN)/pip install --quiet --no-compile --constraint constraints.txt
 CARGO := MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target
 MANYLINUX := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux_2_28)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
-# Modules that are compiled in each start of Python, instead of once, would take a tenth of a second each time.
+# With this variable Python would compile modules again at each start, which takes a tenth of a second.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test pytest native lint clippy linuxcnc page wheel docs bench campaign clean cargo
@@ -18,17 +18,18 @@ demo: $(VENV)/built $(PAGE)
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
-# What each needs is built first; then they run side by side where make has more than one job (`.ci/run`).
+# The prerequisites are built first; with several jobs (`.ci/run`) these three then run in parallel.
 test: native lint pytest
 
-# The tests are compiled once here, and not by each process that runs them. Half of the time tests wait for the services and
-# programs that they start: two of them share a processor. The tests of a file share its servers, clusters and browser, so one
-# process runs them all.
+# The first command compiles the test files once, so that not every process does it. Tests wait half of the time for services
+# and programs that they start, so there are two processes per processor. The tests of a file share servers, clusters and a
+# browser, so one process runs all tests of a file.
 pytest: $(VENV)/dev $(PAGE) $(filter linuxcnc,$(MAKECMDGOALS))
 	@$(BIN)/pytest --collect-only --quiet --quiet >/dev/null
 	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile --no-loadscope-reorder
 
-# They link what has been compiled for the module, which comes first: the tests in Python wait for it.
+# The native tests link the crates that have been compiled for the module. The module is built first, because the tests in
+# Python wait for it.
 native: | $(VENV)/built
 	$(CARGO) cargo test --release --quiet --lib --tests --manifest-path solvers/Cargo.toml
 
@@ -43,21 +44,22 @@ lint: clippy $(VENV)/dev
 clippy: cargo
 	$(CARGO) cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
-# The interpreter that G-code is compared with, and an emulator of ARM64: tests that need them are skipped without them.
+# Installs LinuxCNC, whose interpreter is compared with ours, and an emulator of processors. Without them the tests that need
+# them are skipped.
 linuxcnc:
 	.ci/linuxcnc
 
 page: $(PAGE)
 
-# For those who have neither cargo nor Node.js. On Linux zig links it for glibc 2.28 and newer. TARGET is another kind of
-# processor that cargo can compile for: `rustup target add $(ARM)`, then `make wheel TARGET=$(ARM)`.
+# A package for computers without cargo and Node.js. On Linux zig links it for glibc 2.28 and newer. TARGET selects another
+# processor for which cargo can compile: `rustup target add $(ARM)`, then `make wheel TARGET=$(ARM)`.
 ARM := aarch64-unknown-linux-gnu
 wheel: $(VENV)/dev $(VENV)/zig $(PAGE)
 	rm -rf dist
 	$(CARGO) $(BIN)/maturin build --release $(MANYLINUX) $(addprefix --target ,$(TARGET)) --out dist
 	FEEDPLAN_WHEELS=dist $(BIN)/pytest -rs tests/test_portable.py
 
-# Warnings are errors. Pages show what the numbered examples print, and load nothing from the network.
+# Warnings are errors. The pages show the output of the numbered examples, and load nothing from the network.
 docs: $(VENV)/docs $(VENV)/dev $(PAGE)
 	@mkdir -p out/examples
 	for script in examples/[0-9]_*.py; do \
@@ -71,8 +73,8 @@ bench: $(VENV)/dev $(PAGE)
 	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench
 	$(BIN)/python -m benchmarks
 
-# Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
-# found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
+# Millions of random paths, thousands on every machine, and property tests with new random cases. A failure becomes a case of
+# the test that found it; benchmarks/README.md has the numbers of cases.
 campaign: $(VENV)/dev $(PAGE) docs wheel
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::bound:: -- --nocapture
@@ -108,12 +110,12 @@ campaign: $(VENV)/dev $(PAGE) docs wheel
 clean:
 	rm -rf $(VENV) out solvers/target page/node_modules $(dir $(PAGE))
 
-# The native module is built once, and again only when its sources change; the tests of native code link the same crates.
+# The native module is built again only if its sources have changed; the native tests link the same crates.
 $(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
 	$(CARGO) $(INSTALL) --no-build-isolation --editable .
 	@touch $@
 
-# The packages that tests and lint need besides, and those of the documentation.
+# The additional packages for tests and lint, and those for the documentation.
 $(VENV)/dev $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/built
 	$(INSTALL) "feedplan[$(@F)]"
 	@touch $@
@@ -125,7 +127,7 @@ $(VENV)/zig: constraints.txt | $(VENV)/maturin
 cargo:
 	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
 
-# What draws report, comparison and the page of the service: one script and its style.
+# The script and the style sheet that draw the report, the comparison and the page of the service.
 $(PAGE): $(wildcard page/source/* page/source/*/*) page/build.mjs page/node_modules/installed
 	node page/build.mjs
 

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from benchmarks import results
 
-# Each is the function `run` of the module of that name.
+# Each name is a module of this package ("-" for "_") whose function `run` returns the result.
 NAMES = (
     "methods",
     "planner-cost",
@@ -54,7 +54,7 @@ def main() -> None:
             if status := subprocess.run(command, check=False).returncode:
                 sys.exit(status)
         return
-    # Without a terminal the width is enough for every table.
+    # A file or pipe gets a fixed width at which every table fits.
     console = Console() if sys.stdout.isatty() else Console(width=160)
     for name in arguments.names or NAMES:
         result = importlib.import_module(f"benchmarks.{name.replace('-', '_')}").run(arguments.quick)

@@ -1,9 +1,9 @@
 """The jerk-limited plan against copp's third-order program, the best open solver of the same problem.
 
-copp (Wang et al.) solves a second-order cone program on fixed stations: the limits of jerk are linear about a
-given speed, at first that of its own profile without limits of jerk (reachability), then that of the program
-before. The limits hold at its stations. What an axis gets between them shows in the third differences of
-setpoints every millisecond.
+copp (Wang et al.) solves a second-order cone program on fixed stations. It linearises the limits of jerk
+about a given speed profile: first its own profile without limits of jerk (reachability analysis), then the
+result of the previous program. The limits hold at the stations only; third differences of setpoints every
+millisecond show the jerk between them.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from feedplan.planners._jerk import jerk_limits
 
 Array = NDArray[np.float64]
 VELOCITY, ACCELERATION, JERK = 250.0, 3000.0, 50_000.0
-# Stations of copp, about uniform in length; with 4001 its second program for the butterfly fails. Programs
-# follow each other until one gains less than GAIN of the time.
+# Number of copp's stations, about uniform in length (with 4001 its second program for the butterfly fails).
+# Programs are repeated until one reduces the time by less than GAIN, at most MOST_PROGRAMS times.
 STATIONS, GAIN, MOST_PROGRAMS = 4201, 1e-4, 10
 PERIOD = 1e-3
-# That of a plan where nothing is said.
+# The default accuracy of a plan.
 ACCURACY = 1e-4
 
 
@@ -53,7 +53,7 @@ CURVES: dict[str, Callable[[], CompositeCurve]] = {
 
 
 def run(quick: bool = False) -> Result:
-    """Time, excess of jerk and computing time of both on every curve."""
+    """Time, excess of jerk and computing time of feedplan and copp on every curve."""
     stations = 401 if quick else STATIONS
     rows: list[dict[str, Cell]] = []
     for name, make in itertools.islice(CURVES.items(), 1 if quick else None):
@@ -92,7 +92,7 @@ def _problem(curve: CompositeCurve) -> Problem:
 
 def _by_copp(problem: Problem, stations: int) -> tuple[float, float, int]:
     """copp's time [s], the relative excess of its third differences over the limit of jerk, and the number of
-    its programs."""
+    programs that it solved."""
     piece, u, s = _stations(problem, stations)
     total = s[-1]
     first, second, third = derivatives_by_length(problem, piece, u)
@@ -101,7 +101,7 @@ def _by_copp(problem: Problem, stations: int) -> tuple[float, float, int]:
     axes = position.shape[1]
     robot = copp.Robot(axes, capacity=len(s))
     robot.append_s(s)
-    # In units of the whole length: q' is the same, each further derivative has one factor more.
+    # Lengths are divided by the whole length: q' stays the same, each higher derivative gets one more factor.
     robot.set_q(position / total, first, second * total, 0, dddq=third * total**2)
     for add, limit in (
         (robot.add_velocity_limits, VELOCITY),
@@ -136,14 +136,14 @@ def _stations(problem: Problem, count: int) -> tuple[NDArray[np.int64], Array, A
     s = np.append(np.concatenate(within), table.total)
     piece = np.append(np.repeat(pieces, share), pieces[-1])
     found, u = table.locate(s)
-    # A station on a joint belongs to the piece that begins there.
+    # A station where two pieces meet belongs to the piece that begins there.
     return piece, np.where(found == piece, u, 0.0), s
 
 
 def _row(
     curve: str, best: float, unit: float, solver: str, time: float, excess: float, computing: float
 ) -> dict[str, Cell]:
-    """A row whose time and computing time are told over `best` and `unit` [s], too."""
+    """One row of the table; its ratios are to the time `best` [s] and the computing time `unit` [s]."""
     return {
         "curve": curve,
         "solver": solver,

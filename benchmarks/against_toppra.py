@@ -1,4 +1,4 @@
-"""The exact planner against toppra at equal accuracy of the time."""
+"""Computing time of the exact planner against toppra's, at equal accuracy of the planned time."""
 
 from __future__ import annotations
 

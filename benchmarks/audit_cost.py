@@ -1,4 +1,4 @@
-"""Cost of sampling and audit for each setpoint, of plans by bang-bang and with limited jerk."""
+"""Cost per setpoint of sampling and of the audit, for plans by bang-bang and by jerk-limited."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def run(quick: bool = False) -> Result:
 
 
 def cost(plan: Plan) -> dict[str, float]:
-    """Setpoints, phases, and the least processor times of three for each setpoint [µs]."""
+    """Number of setpoints and phases, and processor times per setpoint, each the least of three [µs]."""
     judged = partial(
         audit, plan.problem, plan.profile, plan.machine, plan.program, jerk=limits_jerk(plan.method)
     )

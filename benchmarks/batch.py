@@ -1,4 +1,4 @@
-"""Overhead of a job over its plan: in one process, in several processes, and on a Dask cluster."""
+"""Overhead of a job over its plan alone: in one process, in several processes, and on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def run(quick: bool = False) -> Result:
 
 
 def _programs(folder: Path, count: int) -> list[Path]:
-    """Different circles of points."""
+    """Writes `count` programs of 40 moves along a circle, each circle at another centre."""
     folder.mkdir()
     files = [folder / f"part{number:04}.ngc" for number in range(count)]
     for number, file in enumerate(files):
@@ -58,7 +58,7 @@ def _programs(folder: Path, count: int) -> list[Path]:
 
 
 def _one_process(programs: list[Path], folder: Path) -> float:
-    """The time of all plans in sequence [s]."""
+    """The time of planning all programs one after the other [s]."""
     machine = Machine.load("mill")
     start = time.perf_counter()
     for file in programs:

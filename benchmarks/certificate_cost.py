@@ -1,4 +1,4 @@
-"""Cost of the lower bound over that of its plan, and the gap between both."""
+"""Computing time of the lower bound compared with that of its plan, and the gap between bound and plan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from feedplan.profile import SpeedProfile
 
 
 def run(quick: bool = False) -> Result:
-    """Times the native calls on one path of each kind: the best of five, plan and bound in one process."""
+    """Times the native calls for plan and bound on one path of each kind: the best of five."""
     count = 300 if quick else 3000
     rows = [_row(f"quadratics, {pieces}", random_problem(pieces)) for pieces in _sizes(quick)]
     for kind, curve in random_curves(count).items():
@@ -70,7 +70,7 @@ def _jerk_row(name: str, problem: Problem) -> dict[str, Cell]:
 
 
 def _cells(name: str, problem: Problem, gap: float, plan: float, bound: float) -> dict[str, Cell]:
-    """The processor times [s] of plan and bound, for each piece."""
+    """One row: processor times of `plan` and `bound` [s] as times per piece [µs]."""
     pieces = len(problem.path)
     return {
         "path": name,

@@ -1,4 +1,4 @@
-"""Cost of the exact planner on curves of higher degree, rational ones and joint paths."""
+"""Cost of the exact planner on curves of higher degree, on rational curves and on joint paths."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from feedplan.profile import SpeedProfile
 
 SEED = 1
 FEEDS = (100.0, 1e5)
-# Number of calls of each; the calls alternate.
+# Number of timed calls of each case; the cases alternate.
 ROUNDS = 15
 
 
 def run(quick: bool = False) -> Result:
-    """Plans one random path of each kind, one run from rest to rest; the best of alternating calls."""
+    """Plans one random path of each kind from rest to rest; the best of several calls that alternate."""
     count = 300 if quick else 3000
     quadratics = random_problem(count)
     cases = [
@@ -54,12 +54,12 @@ def run(quick: bool = False) -> Result:
 
 
 def elevated(path: Path) -> Path:
-    """The same path with its pieces as cubics."""
+    """The same path with pieces of degree 3."""
     return replace(path, curve=path.curve.elevated(3))
 
 
 def cylindrical(count: int) -> Problem:
-    """Cubics on the cylindrical machine, whose joints have pieces of degree 9."""
+    """Cubic tip curves on the cylindrical machine; the joint pieces have degree 9."""
     machine = Machine.load("cylindrical")
     axes = tuple(replace(axis, travel=(-np.inf, np.inf)) for axis in machine.axes)
     near = random_curves(count)["cubics"]
@@ -68,7 +68,7 @@ def cylindrical(count: int) -> Problem:
 
 
 def random_curves(count: int) -> dict[str, CompositeCurve]:
-    """Splines through one random walk of points whose direction changes slowly."""
+    """Splines of several kinds through one random walk of points whose direction changes slowly."""
     rng = np.random.default_rng(SEED)
     heading = np.cumsum(rng.normal(0, 0.25, (count + 1, 3)), axis=0) + np.array([3.0, 0.0, 0.0])
     steps = heading / np.linalg.norm(heading, axis=1)[:, None] * rng.uniform(0.5, 2.0, (count + 1, 1))

@@ -1,4 +1,4 @@
-"""From half a million blocks to audited setpoints: seconds for each step and peak memory."""
+"""From half a million blocks to audited setpoints: time of each step [s] and peak memory."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pathlib import Path
 from benchmarks.named import example
 from benchmarks.results import Cell, Result
 
-# Example, its machine, number of blocks. The lettering has a tenth: its strokes are so much longer than the
-# blocks of the finishing parts that it takes hours of machining and millions of setpoints.
+# Example, its machine, number of blocks. The lettering has a tenth of the blocks, because its strokes are so
+# much longer: this already makes hours of machining and millions of setpoints.
 PARTS = (("vase", "vase", 500_000), ("head", "mill", 500_000), ("lettering", "router", 50_000))
 QUICK = 100  # times fewer blocks
 

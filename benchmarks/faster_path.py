@@ -1,4 +1,4 @@
-"""What paths fitted to the speed gain over the path as fitted on polylines of ten kinds, and their cost."""
+"""Time saved by paths that are fitted to the planned speed, on polylines of ten kinds, and their cost."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def square() -> Array:
 
 
 def facets() -> Array:
-    """A circle of chords of 0.3 mm, 0.01 mm from it in their middle."""
+    """A circle of chords of 0.3 mm; the circle is 0.01 mm from the middle of each chord."""
     radius = 0.3**2 / 0.08 + 0.005
     count = round(2.0 * np.pi * radius / 0.3)
     angle = np.arange(count + 1) * 2.0 * np.pi / count
@@ -78,14 +78,14 @@ def machine(limits: str) -> Machine:
 
 
 def program(points: Array) -> Program:
-    """The lines between the points, without a feed that counts."""
+    """The lines between the points, at a feed that limits nothing."""
     lines = "\n".join(f"G1 X{x:.6f} Y{y:.6f}" for x, y in points[1:])
     text = f"G21 G90 G64\nG1 X{points[0, 0]:.6f} Y{points[0, 1]:.6f} F6000000\n{lines}\nM2\n"
     return read_gcode(text.encode(), machine("fast"), "lines.ngc")
 
 
 def run(quick: bool = False) -> Result:
-    """Plans all cases by both paths, and by up to three rounds."""
+    """Plans all cases along the fitted path and, in one to three rounds, along paths fitted to the speed."""
     some = ("corner of 90°", "noisy scan line") if quick else tuple(CASES)
     tolerances = (0.05,) if quick else TOLERANCES
     methods: tuple[MethodName, ...] = ("jerk-limited", "bang-bang")
@@ -115,7 +115,7 @@ def _row(case: str, limits: str, tolerance: float, method: MethodName) -> dict[s
         found = plan(points, known, method, tolerance=tolerance, **options)  # type: ignore[arg-type]
         return found, time.process_time() - begin
 
-    made(path="fastest", path_rounds=2)  # Packages are loaded.
+    made(path="fastest", path_rounds=2)  # loads all packages before anything is timed
     first, cost = made()
     rounds = [made(path="fastest", path_rounds=count) for count in (1, 2, 3)]
     once, twice, thrice = (found for found, _ in rounds)

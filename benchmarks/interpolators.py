@@ -1,5 +1,5 @@
-"""Sarfraz predictor-corrector against Newton–Raphson: rounds, length error and time of setpoints with all
-derivatives, at constant feed, on small and large steps."""
+"""Sarfraz predictor-corrector against Newton–Raphson at constant feed, on small and large steps: number of
+rounds, error of the length, and time to compute setpoints with all derivatives."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FEED = 50.0  # [mm/s]
 
 
 def curves() -> dict[str, Path]:
-    """A surface pass, large curves, and a fold whose pieces turn by nearly 180 degrees within micrometres."""
+    """A surface pass, large curves, and folds: turns of nearly 180 degrees within micrometres."""
     rng = np.random.default_rng(1)
     direction = np.cumsum(rng.normal(0, 0.15, (400, 3)), axis=0) + np.array([4.0, 0.0, 0.0])
     surface = np.cumsum(direction / np.linalg.norm(direction, axis=1)[:, None], axis=0)
@@ -30,7 +30,7 @@ def curves() -> dict[str, Path]:
 
 
 def constant_feed(path: Path) -> SpeedProfile:
-    """A profile of one phase for each piece at `FEED`: the stream starts and ends in motion."""
+    """A profile at the constant speed `FEED`, one phase for each piece; it starts and ends in motion."""
     count = len(path)
     joints = np.append(path.lengths.length(np.arange(count), np.zeros(count)), path.length)
     edges = np.diff(path.curve.by_piece, axis=1)
@@ -50,7 +50,7 @@ def constant_feed(path: Path) -> SpeedProfile:
 
 
 def unlimited(path: Path) -> Problem:
-    """A problem without limits, which the stream does not need."""
+    """A problem without limits: setpoints need only its path and feed."""
     count, axes = len(path), len(path.axes)
     return Problem(
         path=path,

@@ -1,4 +1,4 @@
-"""Time from Ctrl-C to the prompt in each stage of a large plan, and the intervals of its progress [s]."""
+"""Time from Ctrl-C to the prompt in each stage of a large plan, and time between reports of progress [s]."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from feedplan.setpoints import Setpoints
 
 METHODS = ("bang-bang", "s-curve", "jerk-limited")
 PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 1000
-# Time between signals in a stage [s], and time of the signal that ends a stage over the stage's time.
+# Time between signals in a stage [s], and when the ending signal comes, as a share of the stage's time.
 EVERY, MOMENT = 0.1, 0.5
 
 Stage = Callable[[Listener], Any]
 
 
 def run(quick: bool = False) -> Result:
-    """Runs each stage as a whole, with a listener and many signals, and in a child that a signal ends."""
+    """Runs each stage twice: whole, with a listener and many signals, and in a child that a signal ends."""
     blocks = BLOCKS // (QUICK if quick else 1)
     rows: list[dict[str, Cell]] = []
     with tempfile.TemporaryDirectory() as directory:
@@ -88,7 +88,7 @@ def _stages(program: Path, machine: Machine, method: str, output: Path) -> Itera
 
 
 def _measured(stage: Stage) -> dict[str, Cell]:
-    """Runs a stage in this process, and in a forked child that a signal ends."""
+    """Times a stage in this process, and the end of a forked child that gets Ctrl-C in the stage."""
     child = _child(stage)
     told: list[tuple[float, float]] = [(time.perf_counter(), 0.0)]
     with _signals() as late:
@@ -108,8 +108,8 @@ def _measured(stage: Stage) -> dict[str, Cell]:
 
 @contextmanager
 def _signals() -> Iterator[list[float]]:
-    """The delay until each of many signals is handled [s]; signals that come while one waits are not
-    counted."""
+    """Sends this process a signal every `EVERY` seconds; collects the delay until each is handled [s].
+    Signals that come while an earlier one waits are not counted."""
     late: list[float] = []
     start, handled = time.perf_counter(), 0
 
@@ -129,7 +129,7 @@ def _signals() -> Iterator[list[float]]:
 
 
 def _child(stage: Stage) -> tuple[int, int]:
-    """A forked child that runs the stage when a byte comes through the pipe."""
+    """Forks a child that runs the stage when a byte comes through the pipe; its id and the pipe's end."""
     sys.stdout.flush()
     out, into = os.pipe()
     heard, ready = os.pipe()
@@ -157,7 +157,8 @@ def _child(stage: Stage) -> tuple[int, int]:
 
 
 def _end(child: tuple[int, int], moment: float) -> float:
-    """Time from a signal during the stage to the end of the child [s]; 0 if the child was done before."""
+    """Starts the child's stage and interrupts it after `moment` seconds: the time until the child has ended
+    [s]; 0 if the stage was done before."""
     process, into = child
     os.write(into, b".")
     os.close(into)

@@ -31,7 +31,7 @@ CURVES: dict[str, Callable[[], CompositeCurve]] = {
     "trefoil": trefoil,
     "butterfly": butterfly,
 }
-# Other solvers get the grid of a plan of this accuracy; the butterfly's grid is too large for IPOPT.
+# Other solvers get the grid of a plan with this accuracy; the butterfly's grid is too large for IPOPT.
 ACCURACY = 1e-3
 OTHERS = {"Clarabel": by_clarabel, "one stage (pseudo-jerk)": pseudo_jerk, "IPOPT": by_ipopt}
 # Lengths of the winding path [mm]; the longest needs about a million intervals.
@@ -79,7 +79,7 @@ def run(quick: bool = False) -> Result:
 
 
 def winding(length: float) -> CompositeCurve:
-    """A C2 cubic spline of about this length [mm], whose direction has two angles that are sums of sines."""
+    """A C2 cubic spline of about this length [mm]; yaw and pitch of its direction are sums of sines."""
     s = np.arange(0.0, length + 0.5)
     yaw = 0.9 * np.sin(s / 3.1) + 0.3 * np.sin(s / 1.7) + 1.5 * np.sin(s / 7.3)
     pitch = 0.3 * np.sin(s / 1.7) + 0.5 * np.cos(s / 7.3)
@@ -88,7 +88,7 @@ def winding(length: float) -> CompositeCurve:
 
 
 def _cost(length: float) -> dict[str, Cell]:
-    """Time and memory of the planner for a long path."""
+    """Time and memory that the planner needs for a long path."""
     problem = build_problem(Path.from_curve(winding(length), feed=FREE), MACHINE)
     plan, made = planner("jerk-limited"), list[SpeedProfile]()
     cost = taken(lambda: made.append(plan(problem)))
@@ -106,7 +106,7 @@ def _cost(length: float) -> dict[str, Cell]:
 def _row(
     curve: str, best: float, unit: float, method: str, found: float, gap: float, excess: float, cost: float
 ) -> dict[str, Cell]:
-    """A row whose time and computing time are told over `best` and `unit` [s], too."""
+    """One row of the table; its ratios are to the time `best` [s] and the computing time `unit` [s]."""
     return {
         "curve": curve,
         "method": method,

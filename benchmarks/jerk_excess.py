@@ -1,5 +1,4 @@
-"""Greatest excess of a jerk-limited profile over its limits, from exact derivatives of the motion in its
-phases."""
+"""Greatest excess of a jerk-limited profile over its limits, by exact derivatives inside its phases."""
 
 from __future__ import annotations
 
@@ -15,9 +14,9 @@ from feedplan.report.limits import chord_speed
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(20)
-# Distance of the outermost samples from the ends of a phase, over its length in u.
+# Distance of the outermost samples from the ends of a phase, as a share of its length in u.
 INSET = 1e-7
-# Lengths are integrated over parts that shrink towards both ends, where the path may turn sharply.
+# Lengths are integrated over parts that get shorter towards both ends, where the path may turn sharply.
 DECADES = 10.0 ** np.arange(-6, -1)
 
 
@@ -25,8 +24,9 @@ DECADES = 10.0 ** np.arange(-6, -1)
 class Excess:
     """Greatest relative excess of axis velocity, acceleration and jerk, of the feed and of the chord speed.
 
-    `gaps`: differences of successive phases in speed, acceleration and u, and of the columns from the true
-    length and time, over the greatest speed and acceleration, the whole length and the whole time.
+    `gaps` is the greatest of: jumps of speed, acceleration and u between phases, and differences of the
+    profile's lengths and durations from integrated ones; each relative to the greatest speed or acceleration,
+    the whole length or the whole time (jumps of u are absolute).
     """
 
     velocity: float
@@ -43,8 +43,8 @@ class Excess:
 
 def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> Excess:
     """The excess at `samples` points of each phase and at its ends."""
-    # Both ends, and the samples; the outermost samples are inside the phase, where every curve has a
-    # direction.
+    # Both ends, and the samples; the outermost ones are a little inside, because a curve may have no
+    # direction at its ends.
     t = np.concatenate([[0.0], np.linspace(INSET, 1 - INSET, samples), [1.0]])
     fine = np.unique(np.concatenate([t, DECADES, 1 - DECADES]))
     along = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * fine
@@ -83,10 +83,10 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
 def derivatives_by_length(
     problem: Problem, piece: NDArray[np.integer], u: Array
 ) -> tuple[Array, Array, Array]:
-    """Derivatives of the axes by the length of the tool's path (samples, axes) up to the third."""
+    """First to third derivative of the axes by the length of the tool's path, each (samples, axes)."""
     _, c1, c2, c3 = problem.derivatives(piece, u, 3)
     if problem.way_speed is None:
-        # With T the direction and P = I - T Tᵀ: on a straight path the result is 0 at any parameter speed.
+        # T is the direction, P = I − T Tᵀ: on a straight path the result is exactly 0 at any parameter speed.
         d = (c1**2).sum(axis=1, keepdims=True)
         tangent = c1 / np.sqrt(d)
         along = (tangent * c2).sum(axis=1, keepdims=True)
@@ -102,15 +102,14 @@ def derivatives_by_length(
 
 
 def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, Array, Array]:
-    """Speed, acceleration and jerk along the path at lengths (phases, samples) from the starts of the
-    phases."""
+    """Speed, acceleration and jerk along the path at lengths (phases, samples) from each phase's start."""
     d0 = _speed_sq(problem, profile.piece, profile.u0)[0]
     d1 = _speed_sq(problem, profile.piece, profile.u1)[0]
     with np.errstate(invalid="ignore"):
         v0, v1 = (np.nan_to_num(np.sqrt(d * p)) for d, p in ((d0, profile.p0), (d1, profile.p1)))
     h = s[:, -1:]
     x = s / h
-    # v² is a cubic of the length.
+    # Phases of the law SPEED_CUBIC: v² is a cubic of the length.
     w0, w1, s0, s1 = (
         column[:, None] for column in (v0**2, v1**2, 2 * profile.a0 * h[:, 0], 2 * profile.a1 * h[:, 0])
     )
@@ -120,7 +119,7 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
     bend = ((6 - 12 * x) * (w1 - w0) + (6 * x - 4) * s0 + (6 * x - 2) * s1) / h**2
     v = np.sqrt(np.maximum(w, 0.0))
     a, j = slope / 2, v * bend / 2
-    # Constant jerk: bisection for the time at each length, from the slower end, where rounding matters most.
+    # Phases of constant jerk: the time at each length by bisection, from the slower end (less rounding).
     rows = profile.kind == PhaseLaw.PATH_JERK
     back = (v1 < v0)[rows, None]
     way = np.where(back, h[rows] - s[rows], s[rows])
@@ -138,11 +137,11 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
 
 
 def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
-    """Differences of length and time (phases,) from the columns of the profile."""
+    """Differences (phases,) of integrated lengths and durations from those of the profile."""
     t, length = profile.duration, s[:, -1]
     constant = profile.kind == PhaseLaw.PATH_JERK
     way = t * (v[:, 0] + t * (profile.a0 / 2 + t * profile.value / 6))
-    # Parts as for the lengths, because 1/v is nearly singular next to rest.
+    # The same parts as for the lengths, because 1/v is nearly singular next to rest.
     ends = np.concatenate([[0.0], DECADES, [0.5], 1 - DECADES[::-1], [1.0]])
     half = np.diff(ends)[:, None] / 2
     nodes, weights = (ends[:-1, None] + half * (NODES + 1)).ravel(), (half * WEIGHTS).ravel()
@@ -156,7 +155,7 @@ def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
 
 
 def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array) -> Array:
-    """Lengths of the tool's path (phases, samples) from the starts of the phases."""
+    """Lengths of the tool's path (phases, samples) from the start of each phase [mm]."""
     low = np.concatenate([start[:, None], u[:, :-1]], axis=1)
     half = (u - low) / 2
     places = low[..., None] + half[..., None] * (NODES + 1)
@@ -166,7 +165,7 @@ def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array)
 
 
 def _tool_share(problem: Problem, piece: NDArray[np.integer], u: Array) -> Array:
-    """The speed that the feed limits over the speed along the path, at the samples."""
+    """Speed that the feed limits, divided by the speed along the path, at the samples."""
     if problem.way_speed is None:
         return np.ones(len(u))
     return np.sqrt(speed_square(problem, piece, u) / _speed_sq(problem, piece, u)[0])

@@ -1,4 +1,4 @@
-"""Cost of kinematics per point and per piece: positions, exact derivatives, proven bounds."""
+"""Cost of kinematics per point and per piece: positions, exact derivatives, proven bounds of derivatives."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SEED = 1
 
 
 def run(quick: bool = False) -> Result:
-    """Times cubic pieces some mm long on one machine of each type: the best of three on one thread."""
+    """Times cubic pieces of a few mm on one machine of each type: the best of three, on one thread."""
     count = 500 if quick else 4000
     machines: dict[str, Kinematics] = {}
     for name in bundled_machines():

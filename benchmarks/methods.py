@@ -1,4 +1,4 @@
-"""Every method on every problem with a name: time over the optimum, gap, cost, limits kept."""
+"""Every method on every named problem: time over the optimum, gap, computing time, worst use of a limit."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from feedplan.errors import InfeasibleError, SolverError
 from feedplan.planners import limits_jerk, methods, options_of
 
 EXACT = "bang-bang"
-# Most pieces for slow methods, which take minutes for more pieces.
+# Greatest number of pieces for slow methods, which would take minutes for more.
 MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100, "ruckig": 100}
 QUICK = ("spline-10",)
-# Relative accuracy and time limit [s] of solvers on meshes.
+# Relative accuracy and time limit [s] of the solvers on meshes.
 ACCURACY, TIME_LIMIT = 1e-3, 10.0
 
 
@@ -61,7 +61,7 @@ def run(quick: bool = False) -> Result:
 def _row(
     problem: str, pieces: int, method: str, said: str, numbers: tuple[float, ...] = ()
 ) -> dict[str, Cell]:
-    """One row; a method without a plan has the reason instead of numbers."""
+    """One row; without a plan `said` is the reason, and the numbers are left out."""
     names = ("time [s]", "over optimum [%]", "gap [%]", "computing [ms]", "ratio")
     shown = numbers or ("-",) * len(names)
     return {
@@ -74,7 +74,7 @@ def _row(
 
 
 def _worst(verdict: Audit) -> str:
-    """`Y acceleration 1.832`."""
+    """The limit that is used most, with its use: `Y acceleration 1.832`."""
     names = ("feed", "velocity", "acceleration", "chord", "jump")
     checks = [check for check in verdict.checks if check.name in names and math.isfinite(check.ratio)]
     worst = max(checks, key=lambda check: check.ratio)

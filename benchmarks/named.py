@@ -29,7 +29,7 @@ CURVES = Machine(name="curves", axes=tuple(Axis(name, 250.0, 3000.0) for name in
 FAN = Machine(name="fan", axes=tuple(Axis(name, 100.0, 1000.0) for name in "XYZ"))
 # A feed that no axis of these machines reaches.
 FREE = 1e9
-# Example, its machine, number of blocks.
+# Example: its machine and its number of blocks.
 PROGRAMS = {"vase": ("vase", 5000), "lettering": ("router", 2000), "head": ("mill", 5000)}
 
 Named = tuple[Program | Path, Machine]
@@ -61,13 +61,13 @@ def cubic_by_chord(points: Array, ends: str) -> CompositeCurve:
 
 
 def lemniscate() -> CompositeCurve:
-    """50 (cos θ, sin θ cos θ) once round from its crossing [mm]."""
+    """The curve 50 (cos θ, sin θ cos θ) [mm], once round from its crossing."""
     a = 50.0
     return harmonic([np.array([a, 0.0]), np.zeros(2)], [np.zeros(2), np.array([0.0, a / 2])], np.pi / 2)
 
 
 def trefoil() -> CompositeCurve:
-    """20 (sin θ + 2 sin 2θ, cos θ − 2 cos 2θ, −sin 3θ) once round [mm]."""
+    """The curve 20 (sin θ + 2 sin 2θ, cos θ − 2 cos 2θ, −sin 3θ) [mm], once round."""
     b = 20.0
     cosines = [np.array([0.0, b, 0.0]), np.array([0.0, -2 * b, 0.0]), np.zeros(3)]
     sines = [np.array([b, 0.0, 0.0]), np.array([2 * b, 0.0, 0.0]), np.array([0.0, 0.0, -b])]
@@ -75,7 +75,7 @@ def trefoil() -> CompositeCurve:
 
 
 def harmonic(cosines: list[Array], sines: list[Array], start: float) -> CompositeCurve:
-    """Σ cosines[k] cos kθ + sines[k] sin kθ once round from `start`, as rational pieces of quarter turns.
+    """The curve Σ cosines[k] cos kθ + sines[k] sin kθ once round from `start`, as rational quarter turns.
 
     With x = tan(φ/2), cos φ = (1 − x²)/(1 + x²) and sin φ = 2x/(1 + x²): degree 2m for m harmonics.
     """
@@ -105,7 +105,7 @@ def harmonic(cosines: list[Array], sines: list[Array], start: float) -> Composit
 
 
 def example(name: str) -> ModuleType:
-    """A module of the examples."""
+    """The module of an example."""
     spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -115,7 +115,7 @@ def example(name: str) -> ModuleType:
 
 
 def part(name: str, blocks: int, model: str | None = None) -> tuple[Program, Machine]:
-    """A program of the examples of about this many blocks, and its machine or the given one."""
+    """An example's program of about `blocks` blocks, and its own machine or the bundled `model`."""
     machine = Machine.load(model or PROGRAMS[name][0])
     return read_program(example(name).program(blocks), machine, name=f"{name}.ngc"), machine
 
@@ -140,7 +140,7 @@ NAMED: dict[str, Callable[[], Named]] = {
 
 
 def path_of(source: Program | Path, machine: Machine) -> Path:
-    """The path that is planned."""
+    """The path that is planned for a program or a path."""
     return source if isinstance(source, Path) else build_path(source, machine)
 
 

@@ -1,4 +1,4 @@
-"""Cost of the exact planner for each piece, from ten pieces to a million; it should be constant."""
+"""Cost of the exact planner per piece, from ten pieces to a million; it should be constant."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from feedplan.planners import bang_bang
 
 
 def run(quick: bool = False) -> Result:
-    """Plans one random spline of each size on one thread (one run); the best of several times."""
+    """Plans one random spline of each size on one thread; the best of several calls."""
     rows: list[dict[str, Cell]] = []
     for pieces in (10, 100, 1000, 10_000) if quick else (10, 100, 1000, 10_000, 100_000, 1_000_000):
         problem = random_problem(pieces)

@@ -1,4 +1,4 @@
-"""Random problems of the benchmarks, whose paths are like fitted programs of CAM systems."""
+"""Random problems whose paths resemble fitted programs of CAM systems."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from feedplan import Axis, Machine, Path
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 
-# The accelerations of Zhang et al. 2010, section 4.3, and speeds that some pieces reach.
+# The accelerations of Zhang et al. 2010, section 4.3; the velocities are reached on some pieces.
 MACHINE = Machine(
     name="benchmark",
     axes=(Axis("X", 250.0, 3000.0), Axis("Y", 250.0, 3000.0), Axis("Z", 250.0, 1000.0)),
@@ -18,7 +18,7 @@ FEED = 100.0  # [mm/s]
 
 
 def random_spline(pieces: int, seed: int = 0) -> Path:
-    """A C1 quadratic B-spline of this many pieces in X, Y, Z, a pure function of `seed`.
+    """A random C1 quadratic B-spline of this many pieces in X, Y, Z; equal seeds give equal splines.
 
     Control polygon edges are 0.3 to 3 mm long (log-uniform); directions wander by about 0.15 rad from edge to
     edge, and one edge in twelve turns sharply, up to a reversal.
@@ -36,7 +36,7 @@ def random_spline(pieces: int, seed: int = 0) -> Path:
 
 
 def quadratic_spline(points: NDArray[np.float64], feed: float) -> Path:
-    """The C1 quadratic B-spline of control points (n + 2, axes) as a path of one run.
+    """The C1 quadratic B-spline with control points (n + 2, axes) as a path of one run.
 
     Knot spans are the mean lengths of the edges on both sides, so the parameter is about the arc length.
     """

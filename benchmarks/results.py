@@ -1,4 +1,4 @@
-"""The result of a benchmark: a table that is shown, stored as JSON and drawn as a chart."""
+"""The result of a benchmark: a table that is printed, stored as JSON and drawn as a chart."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Cell = float | int | str
 
 @dataclass(frozen=True)
 class Chart:
-    """The columns of a chart with logarithmic scales: `x`, `y`, `series` (one colour for each value) and the
-    `label` of a point."""
+    """The columns of a chart with logarithmic scales: `x`, `y`, `series` (one colour for each value) and
+    `label` (the text at a point)."""
 
     x: str
     y: str
@@ -57,7 +57,7 @@ def show(result: Result, console: Console) -> None:
 
 
 def store(name: str, result: Result, directory: Path) -> None:
-    """Writes the table and the computer that it was made on to NAME.json."""
+    """Writes the table and a description of this computer to NAME.json."""
     directory.mkdir(parents=True, exist_ok=True)
     packages = {name: metadata.version(name) for name in ("feedplan", "numpy")}
     content = {
@@ -74,12 +74,12 @@ def store(name: str, result: Result, directory: Path) -> None:
     partial.replace(path)
 
 
-# Colours that differ without red or green.
+# Colours that differ without red and green too.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#332288", "#882255", "#666666")
 
 
 def draw(name: str, result: Result, directory: Path) -> None:
-    """Draws the chart, if there is one, to NAME.svg, each point with its label."""
+    """Draws the chart, if the result has one, to NAME.svg, each point with its label."""
     chart = result.chart
     if chart is None:
         return
@@ -115,7 +115,7 @@ def _written(cell: Cell) -> str:
 
 
 def _processor() -> str:
-    """The processor's name if the system tells it, else its architecture."""
+    """The name of the processor if the system gives it, else its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Time of requests while a service plans, and overhead of a job over its plan."""
+"""Response times of a service that plans, and overhead of a job over its plan alone."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from feedplan import Client, plan
 from feedplan.client.transport import form
 
 SMALL = "G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nM2\n"
-# Time between requests [s], as of a page that follows a job.
+# Time between requests [s], like that of a page that follows a job.
 PAUSE = 0.01
 
 
@@ -54,7 +54,7 @@ def run(quick: bool = False) -> Result:
 
 @contextmanager
 def _server(store: str) -> Iterator[str]:
-    """The address of a new service."""
+    """The address of a newly started service."""
     command = [sys.executable, "-m", "feedplan", "serve", "--port", "0", "--store", store]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -110,7 +110,7 @@ def _latencies(url: str, job: str, count: int, when: str, quick: bool) -> list[d
 
 
 def _overhead(client: Client, count: int) -> dict[str, Cell]:
-    """Time of a small job less the time of its plan and files in this process [s]."""
+    """One row: time of a small job in the service minus the time of its plan and files in this process."""
     from feedplan.plan_folder import write_plan
 
     more = []

@@ -1,4 +1,4 @@
-"""The radius that smooth paths, of methods that limit jerk, have on programmed arcs."""
+"""Radius that smooth paths, as methods with limits of jerk follow them, have on programmed arcs."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from feedplan.program.gcode import read_gcode
 
 RADII = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 TOLERANCES = (0.001, 0.01, 0.1)
-# Samples of each piece of the path.
+# Samples per piece of the path.
 PLACES = 200
-# The part of an arc in its middle that is measured; the rest is near its ends.
+# The share of an arc, about its middle, that is measured; the rest is too near its ends.
 MIDDLE = 0.5
 
 Array = NDArray[np.float64]
@@ -31,12 +31,12 @@ def full_circle(r: float) -> str:
 
 
 def hole(r: float) -> str:
-    """A circle from its centre and back, with corners of 90° before and after it."""
+    """From the centre of a circle to it, once round, and back: corners of 90° before and after the circle."""
     return f"G0 X0 Y0\nG1 Y{-r}\nG3 Y{-r} I0 J{r}\nG1 Y0"
 
 
 def alone(r: float) -> str:
-    """A circle from rest to rest."""
+    """A circle that starts and ends at rest."""
     return f"G0 X0 Y{-r}\nG3 Y{-r} I0 J{r}"
 
 
@@ -53,7 +53,7 @@ def pocket(r: float) -> str:
 
 
 def helix(r: float) -> str:
-    """Three turns of a helix of a pitch of a tenth of its radius."""
+    """Three turns of a helix whose pitch is a tenth of its radius."""
     turns = "\n".join(f"G3 X0 Y{-r} Z{-0.1 * r * turn} I0 J{r}" for turn in (1, 2, 3))
     return f"G0 X0 Y{-r} Z0\n{turns}"
 
@@ -114,7 +114,7 @@ def _row(shape: str, r: float, tolerance: float) -> dict[str, Cell]:
 
 
 def radii(shape: str, r: float, tolerance: float) -> Array:
-    """Distances [mm] of the path from the centre of the arc of a shape."""
+    """Distances of the path from the centre of the shape's arc, near the middle of the arc [mm]."""
     write, turn = SHAPES[shape]
     machine = Machine.load("mill")
     program = read_gcode(f"G21 G90 G64 F1000\n{write(r)}\nM2\n".encode(), machine, shape)
@@ -132,13 +132,13 @@ def radii(shape: str, r: float, tolerance: float) -> Array:
     near = np.abs(distance - r) <= 2 * tolerance
     place, distance = place[near], distance[near]
     angle = np.arctan2(place[:, 0], -place[:, 1])
-    # Samples near the middle of the arc; arcs of one to three turns have it opposite to their ends.
+    # Keeps samples near the arc's middle; for one to three turns it is opposite to the arc's ends.
     off = np.abs(np.angle(np.exp(1j * (angle - turn / 2))))
     return distance[off <= MIDDLE * min(turn, 2 * math.pi) / 2]
 
 
 def _places(path: Path) -> Array:
-    """Points of the path in X and Y without rapids."""
+    """Points (n, 2) of the path in X and Y, without rapids [mm]."""
     piece = np.repeat(np.flatnonzero(np.isfinite(path.feed)), PLACES)
     part = np.tile(np.linspace(0.0, 1.0, PLACES), len(piece) // PLACES)
     places: Array = path.curve.evaluate(piece, part * path.width[piece], 0)[0]

@@ -1,13 +1,13 @@
 """The least time with limits of jerk on the grid of a profile, by two other solvers.
 
-w = v² is a C¹ cubic of the length between two stations; ramps w ∝ s^(4/3) lead from rest and to rest; limits
-hold at four points of each interval.
+w = v² is a C¹ cubic of the length in each interval; ramps w ∝ s^(4/3) lead from rest and to rest; limits hold
+at four points of each interval.
 
 - IPOPT solves this problem directly.
 - Clarabel solves a sequence of quadratic programs. The jerk constraint |L w| ≤ J w^(−1/2) has a convex right
-  side, which is replaced by its tangent, so that every plan is valid.
-- "pseudo-jerk" is the plan in one stage of controllers and earlier works: in the jerk constraint the optimum
-  without limits of jerk replaces w.
+  side; it is replaced by its tangent, which lies below, so that every plan keeps the limit.
+- "pseudo-jerk" is the plan of controllers and of earlier works, made in one stage: w on the right side of the
+  jerk constraint is the optimum without limits of jerk.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
-# Matrices for the unknowns, each with the upper limits of its rows.
+# Matrices for the scaled unknowns, each with the upper limits of its rows.
 Rows = list[tuple[Any, Array]]
 PLACES = np.array([0.0, 1 / 3, 2 / 3, 1.0])
 NODES, WEIGHTS = leggauss(4)
-# The initial w over that of the given plan.
+# The initial w, as a share of the given plan's w.
 START = 0.5
-# Most quadratic programs, and the relative gain at which they end.
+# Greatest number of quadratic programs, and the relative gain of time below which they end.
 PROGRAMS, GAIN = 60, 1e-8
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Intervals of length `h` (n,), derivatives by length `q` (3, 4 n, axes) at their four points, limits,
-    the lengths of the ramps, and a plan `x` (2 n + 2,): w and w' at the stations."""
+    """A grid of n intervals: lengths `h` (n,), derivatives of the axes by length `q` (3, 4 n, axes) at four
+    points of each, limits, lengths of both ramps, and a plan `x` (2 n + 2,): w and w' at the stations."""
 
     h: Array
     q: Array
@@ -53,13 +53,13 @@ class Grid:
 
     @cached_property
     def reference(self) -> Array:
-        """The scale of each unknown (2 n + 2,)."""
+        """The unit of each unknown (2 n + 2,)."""
         w = self.x[::2]
         step = np.maximum(np.append(self.h, 0.0), np.append(0.0, self.h))
         return np.stack([w, w / step], axis=1).ravel()
 
     def rows(self, t: Array, order: int) -> sp.csr_matrix:
-        """Matrix of w, w' or w'' at points t of every interval, for the scaled unknowns."""
+        """The matrix from scaled unknowns to w, w' or w'' (`order`) at t in [0, 1] of every interval."""
         hermite = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=float)
         basis = polyval(t, polyder(hermite.T, order)).T
         n, m = len(self.h), len(t)
@@ -72,7 +72,7 @@ class Grid:
 
     @cached_property
     def motion(self) -> tuple[Any, list[Any], list[Any]]:
-        """w over its limit; accelerations and L w of the axes over their limits."""
+        """Rows of w, and of each axis's acceleration and L w, all divided by their limits."""
         w, w1, w2 = (self.rows(PLACES, order) for order in range(3))
         diagonal = sp.diags
         accelerations, jerks = [], []
@@ -85,7 +85,7 @@ class Grid:
 
     @cached_property
     def ends(self) -> Any:
-        """Rows that are 0 if the ramps join smoothly."""
+        """Rows that are 0 if both ramps join the grid with continuous acceleration."""
         last = len(self.x) - 2
         rows = sp.lil_matrix((2, len(self.x)))
         rows[0, 0], rows[0, 1] = -4 / (3 * self.ramps[0]), 1
@@ -95,7 +95,7 @@ class Grid:
 
     @cached_property
     def pace(self) -> tuple[Any, Array]:
-        """Rows of w and weights: the time is Σ weights/√w."""
+        """Rows of w and weights of the time integral: the time is Σ weights/√w [s]."""
         rows = self.rows((NODES + 1) / 2, 0)
         weights = (self.h[:, None] / 2 * WEIGHTS).ravel()
         ends = sp.csr_matrix((len(self.x), len(self.x)))
@@ -103,13 +103,13 @@ class Grid:
         return sp.vstack([rows, ends]).tocsr(), np.append(weights, 3 * np.array(self.ramps))
 
     def time(self, z: Array) -> float:
-        """The time of scaled unknowns."""
+        """The time of the plan with these scaled unknowns [s]."""
         rows, weights = self.pace
         return float(np.sum(weights / np.sqrt(rows @ z)))
 
 
 def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
-    """The grid of a profile from rest to rest whose ramps are one phase each."""
+    """The grid of a profile from rest to rest in which each ramp is one phase."""
     cubic = np.flatnonzero(profile.kind == PhaseLaw.SPEED_CUBIC)
     assert len(cubic) == len(profile) - 2
     piece, u0, u1 = profile.piece, profile.u0, profile.u1
@@ -117,7 +117,7 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     arc = lengths(problem, piece, u0, u)[:, -1]
     places = np.clip(u[cubic].ravel(), 1e-12, None)
     pieces = np.repeat(piece[cubic], 4)
-    # At both ends of an interval the derivatives are those of its own piece.
+    # At the ends of an interval the derivatives are those of its own piece.
     q = np.stack(derivatives_by_length(problem, pieces, places))
     square = (problem.curve.evaluate(pieces, places, 1)[1] ** 2).sum(axis=1).reshape(-1, 4)
     with np.errstate(divide="ignore"):
@@ -136,7 +136,7 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
 
 
 def by_ipopt(grid: Grid) -> float:
-    """The least time [s] on a grid."""
+    """The least time on the grid by IPOPT [s]."""
     import casadi
 
     def of(matrix: Any) -> Any:
@@ -171,7 +171,7 @@ def by_ipopt(grid: Grid) -> float:
 
 
 def by_clarabel(grid: Grid) -> float:
-    """The time on a grid after which no tangent program gains more [s]."""
+    """The time on the grid by quadratic programs with tangents of the jerk constraint [s]."""
     jerks, w = grid.motion[2], grid.rows(PLACES, 0)
 
     def tangents(z: Array) -> Rows:
@@ -184,7 +184,7 @@ def by_clarabel(grid: Grid) -> float:
 
 
 def pseudo_jerk(grid: Grid) -> float:
-    """The time [s] of the plan in one stage: |L w| √w̄ ≤ J, w ≤ w̄, the optimum without limits of jerk."""
+    """The time [s] of the one-stage plan: |L w| √w̄ ≤ J, w ≤ w̄, with w̄ the optimum without jerk limits."""
     jerks, w = grid.motion[2], grid.rows(PLACES, 0)
     top = w @ _descent(grid, lambda _: [])
     rows = [(sign * row, top**-0.5) for row in jerks for sign in (1, -1)]
@@ -192,8 +192,8 @@ def pseudo_jerk(grid: Grid) -> float:
 
 
 def _descent(grid: Grid, jerk_rows: Callable[[Array], Rows]) -> Array:
-    """The scaled unknowns after which no quadratic program gains more; the rows are made from the unknowns of
-    the program before."""
+    """Scaled unknowns of least time, by quadratic programs until one gains less than `GAIN`. `jerk_rows`
+    makes the rows of each program from the unknowns of the previous one."""
     import clarabel
 
     speed, accelerations, _ = grid.motion

@@ -1,4 +1,4 @@
-"""The first plan of jerk-limited (time limit 0) against the best and s-curve, and the time after a plan."""
+"""The first plan of jerk-limited (time limit 0) against its best plan and s-curve; time after a plan."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FEEDS, LENGTH = (1.0, 10.0, 100.0), 100.0
 
 
 def run(quick: bool = False) -> Result:
-    """Makes the first plan, the best and s-curve on curves with and without a feed."""
+    """Times the first plan, the best plan and s-curve on curves with and without a feed."""
     rows = [_row(name, make(), FREE) for name, make in islice(CURVES.items(), 1 if quick else None)]
     if not quick:
         rows += [_row(f"winding at {feed:g} mm/s", winding(LENGTH), feed) for feed in FEEDS]

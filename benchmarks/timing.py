@@ -11,7 +11,7 @@ from dataclasses import dataclass
 class Taken:
     """`wall` time [s] and `processor` time of all threads [s].
 
-    On a computer with other work only the processor time is the cost of a call.
+    On a computer with other work only the processor time measures the cost of a call.
     """
 
     wall: float
@@ -26,12 +26,12 @@ def taken(call: Callable[[], object]) -> Taken:
 
 
 def best_of(call: Callable[[], object], times: int) -> Taken:
-    """The least wall time and the least processor time of 3 to 50 calls."""
+    """The least wall time and the least processor time of `times` calls, but of 3 to 50."""
     return best_of_each([call], min(max(times, 3), 50))[0]
 
 
 def best_of_each(calls: Sequence[Callable[[], object]], times: int) -> list[Taken]:
-    """The same for several alternating calls, so that other work of the computer affects all of them."""
+    """The least times of several calls. Calls alternate, so that other work of the computer affects all."""
     rounds = [[taken(call) for call in calls] for _ in range(times)]
     return [
         Taken(min(t.wall for t in measured), min(t.processor for t in measured))

@@ -1,4 +1,4 @@
-"""toppra on the same problem: the coarsest mesh whose time is close enough to a known one, and its cost."""
+"""toppra on the same problem: the coarsest mesh with about the exact time, and its computing time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.planners import toppra
 
 VERSION = metadata.version("toppra")
-# Error over accuracy from which a mesh counts as the coarsest one.
+# A mesh counts as the coarsest one if its error is at least this share of the accuracy.
 USED = 0.8
 
 
@@ -25,8 +25,7 @@ class Solution:
 
 
 def solve(problem: Problem, cells: int) -> Solution:
-    """Plans by collocation on `cells` intervals in every piece; `processor` is the time of the whole
-    planner."""
+    """Plans by collocation on `cells` intervals of every piece; `processor` is the time of the whole call."""
     begin = time.process_time()
     profile = toppra.plan(problem, cells=cells, scheme="collocation")
     return Solution(profile.time, cells, time.process_time() - begin)

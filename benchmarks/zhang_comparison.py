@@ -1,4 +1,4 @@
-"""Gain of the optimum on fitted splines over transitions at corners, as in Zhang et al. 2010, section 5."""
+"""Gain of the optimum on fitted splines over corner transitions, as in Zhang et al. 2010, section 5."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from benchmarks.named import part
 from benchmarks.results import Cell, Result
 from feedplan import Program, plan
 
-# Our examples of the parts in the paper's figure 8, with their number of blocks.
+# Our examples that resemble the parts in the paper's figure 8, with their number of blocks.
 PARTS = {"vase": 20_000, "lettering": 10_000, "head": 20_000}
 QUICK = 20  # times fewer blocks
 MACHINE = "vase"  # the accelerations of section 4.3
-# The paper states neither feed nor period. None is the programmed feed of the examples.
+# The paper gives neither feed nor period. None: the feed that the example programs.
 FEEDS = (None, 200.0)  # [mm/s]
 PERIODS = (0.001, 0.002)  # [s]
 METHODS = {"constant velocity": "constant-velocity-transition", "arcs": "arc-transition"}

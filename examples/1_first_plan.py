@@ -26,7 +26,7 @@ def rosette(petals: int = 24, radius: float = 30.0) -> str:
         (radius * math.cos(2.0 * math.pi * k / petals), radius * math.sin(2.0 * math.pi * k / petals))
         for k in range(petals + 1)
     ]
-    # A petal is a sixth of a circle, whose radius is equal to its chord.
+    # A petal is a sixth of a circle, so its chord is equal to its radius.
     petal = 2.0 * radius * math.sin(math.pi / petals)
     lines = ["(Rosette)", "G21 G90 G17 G94", "S12000 M3", "G0 Z5", f"G0 X{radius:.4f} Y0", "G1 Z-0.5 F600"]
     lines.append(f"F{FEED:g}")

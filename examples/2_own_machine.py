@@ -21,7 +21,7 @@ import feedplan
 from feedplan.machine.kinematics import Kinematics, register
 from feedplan.machine.numbers import sqrt
 
-RADIUS, ROD = 120.0, 300.0  # of the circle through the rails, and the length of a rod [mm]
+RADIUS, ROD = 120.0, 300.0  # radius of the circle through the rails, length of a rod [mm]
 FEED = 30_000.0  # [mm/min]
 
 MACHINE = """
@@ -40,7 +40,8 @@ max_acceleration = 4000.0      # [mm/s^2]
 
 
 class Delta(Kinematics):
-    """Carriages T1, T2, T3 for the nozzle at X, Y, Z: each is √(rod² − distance²) above the nozzle."""
+    """Carriages T1, T2, T3 for the nozzle at X, Y, Z. Each is √(rod² − distance²) above the nozzle;
+    `distance` is the horizontal one between its rail and the nozzle."""
 
     tip_names, joint_names = ("X", "Y", "Z"), ("T1", "T2", "T3")
 
@@ -52,7 +53,7 @@ class Delta(Kinematics):
 
 
 def circle(radius: float) -> str:
-    """The part program: a full circle at z = 0."""
+    """The part program: a full circle about the origin at z = 0."""
     return (
         f"G21 G90 G17 G94\nG0 X{radius:g} Y0 Z5\nG1 Z0 F{FEED:g}\n"
         f"G3 X{radius:g} Y0 I{-radius:g} J0\nG0 Z100\nM2\n"

@@ -26,15 +26,15 @@ JOINTS = [f"j{k}" for k in range(1, 8)]
 
 
 def quick_start() -> Problem:
-    """Parameters (5,) and positions (5, 7) [rad] of the waypoints, and the greatest velocities [rad/s] and
-    accelerations [rad/s²] of the joints (7,)."""
+    """Parameters (5,) and positions (5, 7) [rad] of the waypoints, and the greatest velocities (7,) [rad/s]
+    and accelerations (7,) [rad/s²] of the joints."""
     random = np.random.RandomState(9)
     points = random.randn(5, 7)
     return np.linspace(0, 1, 5), points, 10 + random.rand(7) * 20, 10 + random.rand(7) * 2
 
 
 def best_of_three(call: Callable[[], Any]) -> tuple[Any, float]:
-    """The result of a call, and the least computing time of three calls [s]."""
+    """The result of a call, and the least of three computing times [s]."""
     seconds = []
     for _ in range(3):
         begin = time.perf_counter()
@@ -44,7 +44,7 @@ def best_of_three(call: Callable[[], Any]) -> tuple[Any, float]:
 
 
 def by_toppra(problem: Problem, cells: int) -> tuple[float, float, float]:
-    """Time [s], computing time [s] and greatest use of a limit of toppra's trajectory on a grid."""
+    """Time [s], computing time [s] and greatest use of a limit by toppra, on a grid of `cells` intervals."""
     import toppra
     from toppra import algorithm, constraint
 

@@ -42,9 +42,9 @@ CLOSE = 4.0  # duration of the detailed figure, as in the thesis [s]
 
 @dataclass(frozen=True)
 class Motion:
-    """The setpoints: `t` (n,) [s]; `use` of each axis's velocity, acceleration and jerk (3, n, axes); the
-    `speed` along the path, and the speed that feed, velocities and chord error `allow` (n,) [mm/s]; the
-    `chord` error (n,) [mm]; the greatest error of the interpolated step over the step."""
+    """The motion at the setpoints: `t` (n,) [s]; `use` of the limits of velocity, acceleration and jerk by
+    each axis (3, n, axes); the `speed` along the path, and the speed that feed, velocities and chord error
+    `allow` (n,) [mm/s]; the `chord` error (n,) [mm]; the greatest relative error of the interpolated step."""
 
     t: Array
     use: Array
@@ -69,7 +69,7 @@ def motion_of(plan: feedplan.Plan) -> Motion:
     tangent = first / length[:, None]
     across = second - tangent * (second * tangent).sum(axis=1)[:, None]
     curvature = np.linalg.norm(across, axis=1) / length**2
-    # The chord of a circle: δ = 1/κ − √(1/κ² − (v T/2)²), about κ (v T)²/8.
+    # The chord error on a circle: δ = 1/κ − √(1/κ² − (v T/2)²), about κ (v T)²/8.
     chord = curvature * (speed * plan.machine.period) ** 2 / 8.0
     with np.errstate(divide="ignore"):
         allow = np.minimum.reduce(
@@ -120,7 +120,7 @@ def draw_speed(motions: dict[str, Motion], path: Path) -> Path:
 
 
 def draw_use(motion: Motion, order: int, title: str, path: Path) -> Path:
-    """Draws a derivative of every axis over its limit."""
+    """Draws a derivative of every axis, divided by its limit."""
     drawing, rows = plt.subplots(len(motion.axes), 1, figsize=(9.0, 6.0), sharex=True)
     for axes, use, name in zip(rows, motion.use[order].T, motion.axes, strict=True):
         for limit in (-1.0, 1.0):

@@ -25,7 +25,7 @@ TOOLTIP_ARGS = "--feedplan FILE, --unplanned, and all options of: feedplan plan"
 BEGIN = "G21 G90 G17 G94 G40 G49 G80 G54"
 END = "M5\nM9\nM2"
 DIGITS = 6
-# The order of words in a block, and the words whose values are whole numbers.
+# The order of words in a block; below, the words whose values are whole numbers.
 WORDS = "XYZABCIJKRQPLHDTSF"
 WHOLE = "LHDTS"
 RAPIDS = ("G0", "G00")
@@ -35,14 +35,14 @@ COOLANT = {"Flood": "M8", "Mist": "M7"}
 def export(objects, filename: str, arguments: str = "") -> str:
     """Writes the operations and tool changes in `objects`, in order, to a file; returns the text.
 
-    FreeCAD calls it. If feedplan refuses the program, it raises RuntimeError with feedplan's sentence and
-    writes nothing.
+    FreeCAD calls this function. If feedplan refuses the program, it raises RuntimeError with feedplan's
+    sentence and writes nothing.
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--feedplan", default="feedplan")
     parser.add_argument("--unplanned", action="store_true")
     own, options = parser.parse_known_args(shlex.split(arguments))
-    # FreeCAD's dialog gives this option to all post-processors.
+    # FreeCAD's dialog passes this option to all post-processors.
     options = [option for option in options if option != "--no-show-editor"]
     text = program(objects)
     if not own.unplanned:
@@ -66,11 +66,11 @@ def program(objects) -> str:
 
 
 def block(command) -> str:
-    """A block of G-code; feeds, in mm/s inside of FreeCAD, become mm/min."""
+    """A block of G-code; FreeCAD has feeds in mm/s, the block in mm/min."""
     if command.Name.startswith("("):
         return comment(command.Name[1:-1])
     words = [command.Name]
-    # Arcs in the plane XY have no word K.
+    # FreeCAD also gives K0 for arcs in the plane XY, which have no word K.
     given = {word: value for word, value in command.Parameters.items() if (word, value) != ("K", 0.0)}
     for word in WORDS:
         if word not in given or (word == "F" and (command.Name in RAPIDS or not given[word])):
@@ -90,7 +90,7 @@ def comment(text: str) -> str:
 
 def planned(text: str, command: list[str], options: list[str]) -> str:
     """The program with planned feeds. Raises RuntimeError with feedplan's sentence."""
-    # The variables of FreeCAD's Python are not valid for feedplan's.
+    # feedplan runs in another Python, for which the variables of FreeCAD's Python are not valid.
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     with tempfile.TemporaryDirectory() as folder:
         source, result = Path(folder, "program.ngc"), Path(folder, "planned.ngc")

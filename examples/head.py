@@ -84,8 +84,8 @@ def pass_points(x: float, chord: float) -> Array:
     turn = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
     curvature = np.concatenate(([0.0], turn / (0.5 * (lengths[1:] + lengths[:-1]))))
 
-    # The error of a chord of length l is κ l²/8, with the greatest κ nearby, because a block spans several
-    # samples.
+    # The error of a chord of length l is κ l²/8, with the greatest κ of the samples nearby, because a block
+    # spans several samples.
     padded = np.pad(curvature, 2, mode="edge")
     curvature = np.max([padded[i : i + len(curvature)] for i in range(5)], axis=0)
     spacing = np.clip(np.sqrt(8.0 * chord / np.maximum(curvature, 1e-9)), *BLOCK_LENGTHS)
@@ -97,7 +97,7 @@ def pass_points(x: float, chord: float) -> Array:
 def program(
     blocks: int = 5000, *, chord: float = 0.002, feed: float = 4000.0, tolerance: float = 0.01
 ) -> str:
-    """The part program with about `blocks` blocks, which decide the number of passes over the head.
+    """The part program with about `blocks` blocks; they determine the number of passes over the head.
 
     `chord` error of a block [mm], `feed` [mm/min], `tolerance` of the path control [mm].
     """

@@ -34,12 +34,12 @@ HEIGHT = 18.0  # height of a blade along its rulings [mm]
 THICKNESS = 1.6  # [mm]
 TOOL_RADIUS = 4.0  # [mm]
 CLEARANCE = 40.0  # distance from the hub between blades, along the tool [mm]
-EDGE_POINTS = 13  # points of the half circle around the edge of a blade
+EDGE_POINTS = 13  # number of points of the half circle around the edge of a blade
 
 
 def ruling(u: Array, blade: int) -> tuple[Array, Array]:
-    """Points of a blade's middle line on the hub (n, 3) [mm] and unit directions of its rulings (n, 3), u in
-    0 to 1."""
+    """Points of a blade's middle line on the hub (n, 3) [mm] and unit directions of its rulings (n, 3), for
+    parameters u (n,) from 0 to 1."""
     angle = 2.0 * np.pi * blade / BLADES + 0.9 * u**2
     radius, height = 18.0 + 32.0 * u, 46.0 - 30.0 * u**2
     hub = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
@@ -51,7 +51,7 @@ def ruling(u: Array, blade: int) -> tuple[Array, Array]:
 
 
 def blade_pass(blade: int, level: float, points: int) -> tuple[Array, Array]:
-    """Tips and directions (n, 3) around a blade, `level` mm up its rulings, with `points` a side."""
+    """Tips and directions (n, 3) around a blade, `level` mm up its rulings, with `points` on each side."""
     u = np.linspace(0.0, 1.0, points)
     hub, direction = ruling(u, blade)
     middle = hub + level * direction
@@ -59,7 +59,7 @@ def blade_pass(blade: int, level: float, points: int) -> tuple[Array, Array]:
     across = np.cross(direction, along)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     beside = (TOOL_RADIUS + 0.5 * THICKNESS) * across
-    # Around the edge, across the last ruling.
+    # A half circle around the edge, at right angles to the last ruling.
     turn = np.linspace(0.0, np.pi, EDGE_POINTS)[1:-1, None]
     ahead = np.cross(across[-1], direction[-1])
     edge = middle[-1] + np.cos(turn) * beside[-1] + np.sin(turn) * np.linalg.norm(beside[-1]) * ahead
@@ -69,7 +69,7 @@ def blade_pass(blade: int, level: float, points: int) -> tuple[Array, Array]:
 
 
 def passes(blocks: int, levels: int) -> list[tuple[Array, Array]]:
-    """All passes, with about `blocks` points in all; each approaches and retracts along the tool."""
+    """All passes, with about `blocks` points in total; each approaches and retracts along the tool."""
     points = max(4, round((blocks / (BLADES * levels) - EDGE_POINTS) / 2.0))
     found = []
     for blade in range(BLADES):
@@ -86,9 +86,9 @@ def passes(blocks: int, levels: int) -> list[tuple[Array, Array]]:
 
 
 def rotary_words(machine: Machine, directions: Array) -> Array:
-    """The angles (n, 2) [deg] of the two rotary axes that point the tool, by shortest turns.
+    """The angles (n, 2) [deg] by which the two rotary axes point the tool, without jumps.
 
-    Of the two poses, and of whole turns at the start, those within the axes' travel are taken.
+    Takes the first of the two poses, perhaps with one turn of C less, that stays within the axes' travel.
     """
     chain = five_axis(machine)
     axes = machine.axes[3:]
@@ -117,7 +117,7 @@ def program(
 ) -> str:
     """The part program with about `blocks` blocks in one of the `FORMS`; `feed` of the tip [mm/min].
 
-    In the form `joints` each block has its feed as inverse time (G93), so that the tip keeps its feed.
+    In the form `joints` each block has its feed as inverse time (G93), so that the tip moves at its feed.
     """
     chain = five_axis(machine)
     names = machine.axis_names
@@ -165,7 +165,7 @@ def program(
 
 
 def words(letters: Sequence[str], values: Sequence[float] | Array, decimals: int = 4) -> str:
-    """`X1.0000 Y2.0000`."""
+    """Words of a block, such as `X1.0000 Y2.0000`."""
     return " ".join(
         f"{letter}{round(float(value), decimals) + 0.0:.{decimals}f}"
         for letter, value in zip(letters, values, strict=True)

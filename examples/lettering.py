@@ -16,8 +16,8 @@ from itertools import pairwise
 from pathlib import Path
 
 # Strokes of each glyph, separated by "|", as points on a grid 4 wide and 6 high. A third number is the bulge
-# of the arc that leads to the point: the tangent of a quarter of its angle, positive counter-clockwise
-# (1 is a half circle, 0.4142 a quarter).
+# of the arc that leads to the point: the tangent of a quarter of the arc's angle, positive counter-clockwise
+# (1 is a half circle, 0.4142 a quarter circle).
 FONT = {
     "A": "0,0 2,6 4,0 | 0.6667,2 3.3333,2",
     "B": "0,3 2.5,3 2.5,6,1 0,6 0,0 2.5,0 2.5,3,1",
@@ -137,7 +137,7 @@ def program(
         f"G0 Z{SAFE_HEIGHT:.4f}",
     ]
     per_letter = sum(len(list(letter(c, 0.0, 0.0, 1.0, 1.0, 1.0))) for c in text) / len(text)
-    # The number of letters in a line makes the field about square.
+    # The number of letters in a line is chosen so that the field is about square.
     columns = math.ceil(math.sqrt(blocks / per_letter * LINE_ADVANCE / ADVANCE))
     count = 0
     while len(lines) < blocks or count < len(text):

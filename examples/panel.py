@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 JOINTS = ("tangent", "curvature")
 LENGTH, WIDTH = 420.0, 260.0  # size of the panel along x and y [mm]
-STEP = 3.0  # distance of passes, unless there are too many [mm]
-MIDDLE = 95.0  # x of the middle of few passes, over the handle [mm]
+STEP = 3.0  # distance of passes; smaller if there are too many for the panel [mm]
+MIDDLE = 95.0  # x of the middle of the passes if there are few, over the handle [mm]
 TOOL_RADIUS = 6.0  # radius of the ball [mm]
 SPACING = 4.0  # distance of the interpolated points along a pass [mm]
 REACH = 12.0  # length of the loops' handles [mm]
@@ -74,12 +74,12 @@ def chord_lengths(points: Array) -> Array:
 def loop(before: BSpline, after: BSpline, joint: str) -> Array:
     """Control points of the Bézier loop from the end of a pass to the start of the next.
 
-    Both ends have the passes' directions; quintic loops have the passes' curvature too.
+    The loop has the direction of the pass at each end; a quintic loop also has its curvature.
     """
     (start, out, bend_out), (end, into, bend_into) = at_end(before, 1.0), at_end(after, 0.0)
     if joint == "tangent":
         return np.array([start, start + REACH * out, end - REACH * into, end])
-    # C'' = 20 (P0 − 2 P1 + P2) = |C'|² κ with |C'| = 5 a.
+    # At the start C'' = 20 (P0 − 2 P1 + P2) = |C'|² κ with |C'| = 5 a, and correspondingly at the end.
     a = 0.6 * REACH
     b = (5.0 * a) ** 2 / 20.0
     return np.array(
@@ -103,7 +103,7 @@ def at_end(spline: BSpline, u: float) -> tuple[Array, Array, Array]:
 
 
 def panel(passes: int = 8, joint: str = "tangent", feed: float = FEED) -> dict[str, Any]:
-    """The data of the path file with this number of passes, STEP apart or closer if they do not fit."""
+    """The data of the path file with this number of passes, STEP apart, or less if they do not fit."""
     step = min(STEP, LENGTH / passes)
     width = step * (passes - 1)
     first = min(max(MIDDLE - 0.5 * width, 0.0), LENGTH - width)
@@ -111,7 +111,7 @@ def panel(passes: int = 8, joint: str = "tangent", feed: float = FEED) -> dict[s
     last: BSpline | None = None
     for i in range(passes):
         spline = pass_spline(first + i * step)
-        if i % 2 == 1:  # back: the same spline from its other end
+        if i % 2 == 1:  # back: the same spline, reversed
             spline = BSpline(1.0 - spline.t[::-1], spline.c[::-1], 3)
         if last is not None:
             curves.append(_curve(loop(last, spline, joint)))

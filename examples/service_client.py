@@ -30,7 +30,7 @@ class Service:
         self.headers = {} if token is None else {"Authorization": f"Bearer {token}"}
 
     def open(self, path: str, body: Any = None, **headers: str) -> Any:
-        """The answer to a GET, or to a POST of JSON."""
+        """The answer to a GET request, or to a POST request of JSON."""
         data = None if body is None else json.dumps(body).encode()
         content = {} if body is None else {"Content-Type": "application/json"}
         request = urllib.request.Request(self.address + path, data, {**self.headers, **content, **headers})

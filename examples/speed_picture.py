@@ -30,7 +30,7 @@ import feedplan
 Array = NDArray[np.float64]
 
 PERIOD = 0.004  # time between drawn points [s]
-SIDEWAYS, DOWNWARD = np.radians(24.0), np.radians(16.0)  # angles between the view and straight above
+SIDEWAYS, DOWNWARD = np.radians(24.0), np.radians(16.0)  # angles of the view from straight above
 LINE_WIDTH = 1.3
 TABLE = 2.0  # points below this height are not drawn [mm]
 SLOW_TO_FAST = LinearSegmentedColormap.from_list(
@@ -40,7 +40,7 @@ BACKGROUND, INK = "#10151c", "#dfe6ee"
 
 
 def project(points: Array) -> tuple[Array, Array]:
-    """Positions of points (n, 3) on the picture (n, 2), and their nearness to the viewer (n,)."""
+    """Positions (n, 2) on the picture of points (n, 3), and their nearness to the viewer (n,)."""
     x, y, z = points.T
     side, down = (
         np.array([np.cos(SIDEWAYS), np.sin(SIDEWAYS)]),
@@ -51,8 +51,7 @@ def project(points: Array) -> tuple[Array, Array]:
 
 
 def brightness(points: Array) -> Array:
-    """Brightness of the surface under the points (n, 3) with light from the upper left: 0 to 1, shape
-    (n,)."""
+    """Brightness (n,), 0 to 1, of the surface under the points (n, 3), with light from the upper left."""
     x, y = points[:, 0], points[:, 1]
     slope_x = (head.height(x + 0.05, y) - head.height(x - 0.05, y)) / 0.1
     slope_y = (head.height(x, y + 0.05) - head.height(x, y - 0.05)) / 0.1
@@ -69,7 +68,7 @@ def draw(points: Array, speed: Array, output: Path) -> None:
     colours = scale.to_rgba(speed)
     colours[:, :3] *= brightness(points)[:, None]
 
-    # The farthest first, without the steps from pass to pass and without points on the table.
+    # Farthest segments first; without the steps from pass to pass, and without points on the table.
     drawn = np.flatnonzero((np.abs(np.diff(points[:, 1])) > 1e-9) & (points[1:, 2] > TABLE))
     drawn = drawn[np.argsort(near[drawn], kind="stable")]
     segments = np.stack((place[drawn], place[drawn + 1]), axis=1)
@@ -107,7 +106,7 @@ def main() -> None:
     source.write_text(program, encoding="ascii")
     plan = feedplan.plan(source, feedplan.Machine.load(arguments.machine))
     setpoints = plan.setpoints(period=PERIOD).all()
-    # Only the passes, without approach and retract.
+    # Only the passes, without the first approach and the last retract.
     lines = program.splitlines()
     on_part = (setpoints.line > lines.index("(pass 1)") + 2) & (setpoints.line < lines.index("M5"))
     draw(setpoints.position[on_part], np.linalg.norm(setpoints.velocity[on_part], axis=1), arguments.output)

@@ -25,8 +25,8 @@ HALF_WIDTH = 32.0  # slightly more than half the greatest width [mm]
 TOOL_RADIUS = 1.5  # [mm]
 SAMPLES = 4096  # samples of the surface along a pass, from which the points are chosen
 
-# Rows of beads on the path of the tip: first and last centre along y, number, height over the body, half
-# width including the ball [mm].
+# Rows of beads on the path of the tip: first and last centre along y, number of beads, height over the body,
+# half width including the ball [mm].
 BEADS = (
     (2.0, 7.0, 2, 0.8, 3.6),
     (20.0, 29.0, 4, 0.8, 2.4),
@@ -43,7 +43,7 @@ def height(x: float, y: Array) -> Array:
     body = _body(y)
     angle = np.arcsin(np.clip(x / (body + TOOL_RADIUS), -1.0, 1.0))
 
-    # Reeds on the belly meet in creases; the waves on the collars are smooth. Both fade towards the
+    # The reeds on the belly meet in creases; the waves on the collars are smooth. Both fade out towards the
     # silhouette, where the walls are steep.
     turns = y / REED_PITCH + REEDS * angle / (2.0 * np.pi)
     reeds = 1.0 - 4.0 * (turns - np.round(turns)) ** 2
@@ -66,8 +66,8 @@ def height(x: float, y: Array) -> Array:
 def pass_points(x: float, points: int = POINTS_PER_PASS) -> Array:
     """The points (y, z) of the pass in the plane `x` [mm], foot to lip, shape (points, 2).
 
-    They are closer where the path curves, as with a chord tolerance, but not at the creases: these fall
-    between points, as in a real program.
+    They are closer where the path curves, as with a chord tolerance, but not at the creases, which therefore
+    lie between points, as in a real program.
     """
     y = np.linspace(0.0, LENGTH, SAMPLES)
     z = height(x, y)
@@ -81,7 +81,7 @@ def pass_points(x: float, points: int = POINTS_PER_PASS) -> Array:
 
 
 def planes(count: int, step_over: float) -> Array:
-    """The planes x = const of `count` passes about the middle, closer if the vase is too narrow [mm]."""
+    """The planes x = const of `count` passes about the middle [mm]; closer if the vase is too narrow."""
     step = min(step_over, 2.0 * HALF_WIDTH / max(count - 1, 1))
     return np.asarray(step * (np.arange(count) - 0.5 * (count - 1)))
 
@@ -129,7 +129,7 @@ def _body(y: Array) -> Array:
 
 
 def _window(y: Array, first: float, last: float, edge: float = 1.5) -> Array:
-    """1 between `first` and `last`, falling smoothly to 0 over `edge` inside them."""
+    """A window over y: 1 between `first` and `last`, falling smoothly to 0 within `edge` inside both ends."""
     inside = np.clip(np.minimum(y - first, last - y) / edge, 0.0, 1.0)
     return np.asarray(inside**2 * (3.0 - 2.0 * inside))
 

@@ -35,8 +35,8 @@ Array = NDArray[np.float64]
 PLANE = 0.0  # x of the pass [mm]
 FEED = 6000.0  # [mm/min]
 DETAIL = (57.0, 69.0)  # y of the detail [mm]
-FINE = 2e-5  # period of the points of drawn curves [s]
-SAMPLES = 24  # points at which a piece is drawn
+FINE = 2e-5  # time between the points of drawn curves [s]
+SAMPLES = 24  # number of points at which a piece is drawn
 
 INK, SHADE, BLUE, RED = "#1b1f24", "#9aa3ad", "#1f6fd0", "#d1495b"
 
@@ -52,7 +52,7 @@ def program() -> str:
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion: `y` [mm], `speed` [mm/s], `acceleration` (n, 2) in y and z [mm/s²]."""
+    """The motion at times: `y` [mm], `speed` [mm/s], `acceleration` (n, 2) in y and z [mm/s²]."""
 
     y: Array
     speed: Array
@@ -60,8 +60,8 @@ class Motion:
 
 
 def curve_of(path: feedplan.Path, begin: int, samples: int) -> tuple[Array, Array, Array]:
-    """The pass from piece `begin` on at even parameters of each piece: y and z and their derivatives to the
-    second, each (pieces, samples, 2)."""
+    """The pass from piece `begin` on, at equally spaced parameters of each piece: y and z and their first and
+    second derivatives, each (pieces, samples, 2)."""
     piece = np.arange(begin, len(path))
     u = path.width[begin:, None] * np.linspace(0.0, 1.0, samples)
     found = path.curve.evaluate(np.repeat(piece, samples), u.ravel(), 2)
@@ -71,7 +71,7 @@ def curve_of(path: feedplan.Path, begin: int, samples: int) -> tuple[Array, Arra
 
 
 def speed_limit(first: Array, second: Array, acceleration: Array) -> Array:
-    """The limit curve [mm/s]: above it no acceleration keeps both limits.
+    """The limit curve [mm/s]: at a higher speed no acceleration along the path keeps both limits.
 
     By equations 7 and 8 of the paper the squared parameter speed is at most
     (A_y |z'| + A_z |y'|) / |y'' z' - z'' y'|.
@@ -84,7 +84,7 @@ def speed_limit(first: Array, second: Array, acceleration: Array) -> Array:
 
 
 def motion_of(plan: feedplan.Plan, begin: int, period: float) -> Motion:
-    """The setpoints from piece `begin` on."""
+    """The motion at the setpoints from piece `begin` on."""
     setpoints = plan.setpoints(period=period).all()
     kept = (setpoints.piece >= begin) & (setpoints.t <= plan.time)
     axes = [setpoints.axes.index("Y"), setpoints.axes.index("Z")]

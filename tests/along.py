@@ -1,4 +1,4 @@
-"""Paths along curves as they are, problems with no limits but those given, profiles from rows of numbers."""
+"""Helpers: paths along given curves, problems with only the given limits, profiles from rows of numbers."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.profile import OF_PHASES, PhaseLaw, SpeedProfile
 
-# A speed [mm/s] and an acceleration [mm/s²] that limit nothing.
+# A speed [mm/s] and an acceleration [mm/s²] so high that they limit nothing.
 FREE = 1e9
-# Piece, law, axis, value, u0, u1, p0, p1 and duration of a phase; a0 and a1 may follow.
+# Piece, law, axis, value, u0, u1, p0, p1 and duration of a phase; a0 and a1 may be added.
 Phase = tuple[int, PhaseLaw, int, float, float, float, float, float, float]
 
 
 def path_along(curve: CompositeCurve, axes: Sequence[str] = "XYZABC", **columns: Any) -> Path:
-    """One run over the curve's own pieces, each on a line and a move of its own, at no feed but a given one.
+    """One run over the curve's own pieces; each piece has its own line and move, and no effective feed.
 
-    `Path.from_curve` cuts pieces at corners and joins lines. `columns` are others of the path; one number of
-    `feed` or `tolerance` is that of all pieces.
+    Unlike `Path.from_curve` it neither cuts pieces at corners nor joins lines. `columns` are further columns
+    of the path; a single number for `feed` or `tolerance` holds for all pieces.
     """
     number, runs = np.arange(len(curve)), columns.pop("runs", [0, len(curve)])
     own = {"feed": FREE, "tolerance": 0.0, "line": 10 * (number + 1), "dwell": np.zeros(len(runs) - 1)}
@@ -34,9 +34,9 @@ def path_along(curve: CompositeCurve, axes: Sequence[str] = "XYZABC", **columns:
 
 
 def problem_along(path: Path, velocity: Any = FREE, acceleration: Any = FREE, **others: Any) -> Problem:
-    """The path at its feeds within a velocity and an acceleration of all axes or of each, from rest to rest.
+    """The problem of the path with its feeds, from rest to rest; a single limit holds for every axis.
 
-    `others` are more limits of the problem, and speeds at its ends.
+    `others` are further limits of the problem, and speeds at its ends.
     """
     junction = np.full(len(path) + 1, math.inf)
     junction[0], junction[-1] = (others.get(f"{end}_speed", 0.0) for end in ("start", "end"))
@@ -46,6 +46,6 @@ def problem_along(path: Path, velocity: Any = FREE, acceleration: Any = FREE, **
 
 
 def profile_of(*phases: tuple[Any, ...], runs: Sequence[int] | None = None) -> SpeedProfile:
-    """The profile of these phases in their order, as one run or as those between the offsets `runs`."""
+    """The profile of these phases in order, as one run or split into runs at the offsets `runs`."""
     columns = dict(zip(OF_PHASES, zip(*phases, strict=True), strict=False))
     return SpeedProfile(**columns, runs=[0, len(phases)] if runs is None else runs)

@@ -1,7 +1,7 @@
-"""The number of random cases of a test: its own number, always the same cases, or more in a campaign.
+"""The number of random cases of a test: a fixed number with fixed seeds, or more cases in a campaign.
 
-FEEDPLAN_SEEDS is the number of seeds of a test with seeds; FEEDPLAN_EXAMPLES is the number of new examples of
-a property test for each 100 of its usual ones.
+FEEDPLAN_SEEDS replaces the number of seeds of a test. FEEDPLAN_EXAMPLES is the number of new examples of a
+property test, in percent of its usual number.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ EXAMPLES = os.environ.get("FEEDPLAN_EXAMPLES")
 
 
 def seeds(count: int) -> int:
-    """The number of seeds, from 0 on."""
+    """The number of seeds of a test; the seeds are 0, 1, 2, …"""
     return int(SEEDS or count)
 
 
 def examples(count: int) -> int:
-    """The number of examples."""
+    """The number of examples of a property test."""
     return count * int(EXAMPLES or 100) // 100

@@ -1,4 +1,4 @@
-"""Dask clusters on this computer as users start them: processes of a scheduler and of workers."""
+"""Dask clusters on this computer as users start them: one process for the scheduler and for each worker."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-# A worker that gets a program of this name is killed, as if its memory ran out.
+# A worker that gets a program of this name is killed, as if it had run out of memory.
 DEADLY = "deadly.ngc"
-# A worker that gets a program of this name reads it until `LocalCluster.release`.
+# A worker that gets a program of this name waits in its reader until `LocalCluster.release`.
 HELD = "held.ngc"
 _RELEASED = "released"
 _PRELOAD = f"""
@@ -34,7 +34,7 @@ cluster_task.work_on = work_or_end
 
 
 class LocalCluster:
-    """A scheduler with workers of one thread each; `options` are those of the command `feedplan` for it."""
+    """A scheduler and workers with one thread each; `options` connect the command `feedplan` to it."""
 
     def __init__(
         self, folder: Path, workers: int, certificates: Path | None = None, **variables: str
@@ -46,7 +46,7 @@ class LocalCluster:
             **os.environ,
             "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",
             "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
-            # Measuring the delays of its loop every 20 ms takes 6 % of a processor for two workers.
+            # By default it measures its delays every 20 ms, which takes 6 % of a processor for two workers.
             "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
             **variables,
         }
@@ -83,7 +83,7 @@ class LocalCluster:
             )
 
     def start_scheduler(self) -> None:
-        """Starts the scheduler, also after an end, and waits until it can be reached."""
+        """Starts the scheduler, perhaps again, and waits until it can be reached."""
         scheme = self.url.partition(":")[0]
         where = ["--host", "127.0.0.1", "--port", str(self._port), "--protocol", scheme]
         self.scheduler = self._start("scheduler", *where)
@@ -95,17 +95,17 @@ class LocalCluster:
         raise AssertionError((self.folder / "scheduler.log").read_text())
 
     def start_worker(self, **variables: str) -> None:
-        """Adds a worker that is started again when it is killed, with `variables` in its environment."""
+        """Adds a worker, which is restarted when it is killed; its environment gets `variables`."""
         own = ["--nthreads", "1", "--nworkers", "1", "--preload", str(self.folder / "preload.py")]
         own += ["--local-directory", str(self.folder)]
         self._workers.append(self._start("worker", self.url, *own, **variables))
 
     def release(self) -> None:
-        """Lets the workers go on with programs that are held."""
+        """Lets the workers continue with the programs that they hold."""
         (self.folder / _RELEASED).touch()
 
     def kill_a_worker(self) -> None:
-        """Sends kill -9 to a worker that has work."""
+        """Kills (kill -9) a worker that has work."""
         with self.client() as client:
             found = client.run(lambda dask_worker: (len(dask_worker.state.tasks), os.getpid()))
         count, process = max(found.values())
@@ -130,7 +130,7 @@ class LocalCluster:
         return distributed.Client(self.url, security=security, set_as_default=False, timeout=20)
 
     def wait_for(self, workers: int) -> None:
-        """Waits for `count` workers."""
+        """Waits for this many workers."""
         with self.client() as client:
             client.wait_for_workers(workers, timeout=30)
 
@@ -164,7 +164,7 @@ def running(folder: Path, workers: int, **more: Any) -> Iterator[LocalCluster]:
 
 
 def make_certificates(folder: Path) -> Path:
-    """A folder with the certificate of an authority, and one certificate and key for all of a cluster."""
+    """A folder with an authority's certificate, and one certificate with its key for the whole cluster."""
     folder.mkdir()
     request = [
         "openssl",

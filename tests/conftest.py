@@ -1,4 +1,4 @@
-"""A plan that a person can check by hand, for tests of files and figures of plans."""
+"""A plan that a person can check by hand, for the tests of files and of figures."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from feedplan.report.account import Account, account
 from feedplan.setpoints import SetpointChunk
 from tests.campaign import EXAMPLES, examples
 
-# No test depends on the speed of the computer or on chance; a campaign draws more and new cases.
+# Tests are independent of the computer's speed and of chance; a campaign draws more and new cases.
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("campaign", deadline=None, database=None, max_examples=examples(100))
 settings.load_profile("campaign" if EXAMPLES else "same")
-# Else Hypothesis draws constants of the loaded modules too, which depend on the tests before.
+# Otherwise Hypothesis also draws constants of the loaded modules, which depend on the tests run before.
 providers.is_local_module_file = lambda file: False
 
 SIDE, FEED, ACCELERATION = 20.0, 50.0, 500.0

@@ -1,4 +1,4 @@
-"""How the pieces of a curve meet, and places on it by the parameter from its start."""
+"""How smoothly the pieces of a curve meet, and evaluation by the parameter from the curve's start."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan.curves.composite import CompositeCurve
 
-# Derivatives that differ by less than this share of their expected size are equal; so are points [mm].
+# Derivatives are equal within SAME of their expected size, points within GAP [mm].
 SAME, GAP = 1e-9, 1e-6
 
 
 class Joint(IntEnum):
-    """The continuity where two pieces meet; each implies those before it."""
+    """The continuity where two pieces meet; each level includes the ones before it."""
 
     APART = 0
     CORNER = 1
@@ -25,7 +25,7 @@ class Joint(IntEnum):
 
 
 def joints(curve: CompositeCurve, closed: bool = False) -> list[Joint]:
-    """The joints of neighbouring pieces, and with `closed` that of the last and the first one."""
+    """The continuity where neighbouring pieces meet; with `closed` also from the last to the first."""
     last = np.arange(len(curve) if closed else len(curve) - 1)
     first = (last + 1) % len(curve)
     before = curve.evaluate(last, curve.width[last], 3)
@@ -49,7 +49,7 @@ def _joint(before: NDArray[np.float64], after: NDArray[np.float64], size: NDArra
 
 
 def breakpoints(curve: CompositeCurve) -> NDArray[np.float64]:
-    """The parameter from the start of the curve to each joint (n + 1,)."""
+    """The parameter from the start of the curve at the ends of all pieces (n + 1,)."""
     return np.concatenate([[0.0], np.cumsum(curve.width)])
 
 

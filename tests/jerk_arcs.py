@@ -1,4 +1,4 @@
-"""Profiles of limited jerk made by hand: sections of constant jerk, and v² a cubic of the length."""
+"""Profiles with limited jerk made by hand: sections of constant jerk, or v² as a cubic of the length."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 
 def rest_to_rest(length: float, jerk: float, share: float = 1.0) -> list[tuple[float, float]]:
-    """Durations [s] and jerks [mm/s³]: a rise and a fall on this share of the way, constant speed between."""
-    # Each of the two changes takes half of the share, at half the speed that it reaches: 2 h · J h² / 2.
+    """Durations [s] and jerks [mm/s³]: rise and fall over `share` of the length, constant speed between."""
+    # The rise and the fall each cover half of the share in 2 h, at half of the speed reached: 2 h · J h² / 2.
     h = (0.5 * share * length / jerk) ** (1 / 3)
     speed = jerk * h**2
     return [(h, jerk), (h, -jerk), ((1.0 - share) * length / speed, 0.0), (h, -jerk), (h, jerk)]
@@ -28,7 +28,7 @@ def rest_to_rest(length: float, jerk: float, share: float = 1.0) -> list[tuple[f
 def constant_jerk(
     curve: CompositeCurve, sections: Iterable[tuple[float, float]], start: tuple[float, float] = (0.0, 0.0)
 ) -> SpeedProfile:
-    """The sections along a curve from a speed and an acceleration, cut where pieces meet."""
+    """The sections as phases along a curve, from a speed and an acceleration, cut where pieces meet."""
     table = CurveLength(curve)
     ends = table.length(np.arange(len(curve)), curve.width)
     rows = []
@@ -62,7 +62,7 @@ def constant_jerk(
 def cubic_speed(
     curve: CompositeCurve, speed_sq: Callable[[float], float], slope: Callable[[float], float], arcs: int
 ) -> SpeedProfile:
-    """Arcs, so many a piece, whose v² and its slope by the length are given at their ends."""
+    """Phases, `arcs` per piece, with the given v² and its slope by the length at their ends."""
     table = CurveLength(curve)
     rows = []
     for piece in range(len(curve)):
@@ -79,7 +79,7 @@ def cubic_speed(
 
 
 def hermite(s: float, way: float, w0: float, w1: float, dw0: float, dw1: float) -> float:
-    """The cubic on [0, way] with these values and slopes at its ends."""
+    """The cubic on [0, way] with these values and slopes at its ends, at s."""
     x = s / way
     y = 1.0 - x
     return w0 * y * y * (1 + 2 * x) + w1 * x * x * (1 + 2 * y) + way * x * y * (dw0 * y - dw1 * x)

@@ -1,10 +1,10 @@
-"""What a command says where it fails."""
+"""Checks of the messages of commands."""
 
 from __future__ import annotations
 
 
 def assert_one_sentence(err: str, words: str) -> None:
-    """The text of the error is one line, with these words in it."""
+    """Asserts that the error output is one line that contains `words`."""
     assert err.startswith("error: ")
     assert err.count("\n") == 1
     assert words in err

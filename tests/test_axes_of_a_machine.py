@@ -1,4 +1,4 @@
-"""Machines of any axes, such as a laser or one rotary axis: programs, path files and paths are planned."""
+"""Machines with any set of axes, such as a laser or one rotary axis, plan programs, path files and paths."""
 
 import json
 from pathlib import Path as FilePath
@@ -20,13 +20,13 @@ def machine_of(names: str) -> Machine:
 
 
 def points_of(names: str) -> list[list[float]]:
-    """Four points, not on a line if there are several axes."""
+    """Four points, not on one line if there are several axes."""
     rows = [[0.0] * len(names), [9.0] * len(names), [14.0 + 3.0 * k for k in range(len(names))]]
     return [*rows, [22.0] * len(names)]
 
 
 def gcode(names: str) -> str:
-    """Lines, and a half circle if the machine has a plane."""
+    """A program of lines, with a half circle if the machine has its plane."""
     rows = [" ".join(f"{name}{q:g}" for name, q in zip(names, row, strict=True)) for row in points_of(names)]
     text = "G21 G90 F600\nG1\n" + "\n".join(rows) + "\n"
     if {"X", "Y"} <= set(names):

@@ -1,4 +1,4 @@
-"""feedplan in an environment with numpy, click and rich alone."""
+"""feedplan in an environment with only numpy, click and rich."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import feedplan
 from feedplan.report.page import missing_pictures
 
 NEEDED = ("numpy", "click", "rich", "tomli")
-# Missing packages of methods, with the command that installs each.
+# Packages that methods need, with the command that installs each.
 INSTALLS = {name: f"`pip install {name}`" for name in ("casadi", "clarabel", "ruckig", "toppra")}
 NATIVE = [name for name in feedplan.methods() if name not in INSTALLS]
 PROGRAM = "G21 G90 G64 P0.05\nG1 F1000\nX10 Y0 Z0\nY10\nG2 X20 Y0 R10\nM2\n"
@@ -31,7 +31,7 @@ def _with_dependencies(names: tuple[str, ...]) -> set[str]:
         try:
             needs = distribution(name).requires or []
         except PackageNotFoundError:
-            continue  # for another platform or another Python
+            continue  # it is for another platform or another Python
         if name not in found:
             found.add(name)
             waiting += [re.split(r"[^\w.-]", need)[0] for need in needs if "extra ==" not in need]
@@ -40,7 +40,7 @@ def _with_dependencies(names: tuple[str, ...]) -> set[str]:
 
 @pytest.fixture(scope="module")
 def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The interpreter of a virtual environment without pip: links to these packages and to feedplan."""
+    """The Python of a virtual environment without pip that has links to these packages and to feedplan."""
     home: Path = tmp_path_factory.mktemp("bare")
     venv.create(home, symlinks=True, with_pip=False)
     site = next(home.glob("lib/python*/site-packages"))

@@ -1,4 +1,4 @@
-"""The benchmarks run, and compare solvers on equal problems."""
+"""The benchmarks run, and compare solvers on the same problems."""
 
 from __future__ import annotations
 

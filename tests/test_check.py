@@ -1,4 +1,4 @@
-"""`feedplan.check` of a plan's folder, also after changes of its files."""
+"""`feedplan.check` of a plan's folder, unchanged and after changes of its files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ max_jerk = 20000.0
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folders of plans by two methods, whose program and machine file are removed afterwards."""
+    """Folders of plans by two methods; their program and machine file are removed afterwards."""
     home = tmp_path_factory.mktemp("made")
     program, machine = home / "part.ngc", home / "own.toml"
     program.write_text(PROGRAM)
@@ -307,7 +307,7 @@ def test_the_check_of_every_format_agrees_with_the_audit_for_each_method(
     made = planned(method)
     write_plan(made, tmp_path, [name], step=made.machine.period if name == "pvt" else None)
     audit = check(tmp_path)
-    # Two heuristics break limits; setpoints alone do not show feed, chord error and path.
+    # Methods that break limits must fail here too, except for checks that setpoints alone do not allow.
     expected = {(c.name, c.axis) for c in made.audit().broken} & {(c.name, c.axis) for c in audit.checks}
     assert {(c.name, c.axis) for c in audit.broken} >= expected
     assert audit.ok or not made.audit().ok
@@ -320,7 +320,7 @@ def planned(method: str) -> Any:
     if method not in PLANS:
         from feedplan.program.gcode import read_gcode
 
-        # A circle as a polygon: methods that pass corners have a velocity jump at each.
+        # A circle as a polygon: methods that pass corners make a velocity jump at each.
         angles = np.linspace(0.0, 2.0 * np.pi, 60)
         points = "".join(f"G1 X{10 * np.cos(a):.4f} Y{10 * np.sin(a):.4f}\n" for a in angles)
         PLANS[method] = plan(
@@ -330,7 +330,7 @@ def planned(method: str) -> Any:
 
 
 class Leaning(Kinematics):
-    """A machine whose axis Y is not perpendicular to X."""
+    """A kinematics whose axis Y is not perpendicular to X."""
 
     tip_names, joint_names = ("X", "Y"), ("X", "Y")
 

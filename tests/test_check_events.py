@@ -25,7 +25,7 @@ def change_event(number: int, **entries: Any) -> Callable[[list[dict[str, Any]]]
 
 
 def later(events: list[dict[str, Any]]) -> None:
-    """Moves the coolant event to a time after the dwell, while the tool moves."""
+    """Moves the coolant event behind the dwell, to a time at which the tool moves."""
     events[3]["time"] += 0.1
 
 
@@ -64,7 +64,7 @@ def test_changed_events_are_refused(
     assert_one_sentence(capsys.readouterr().err, "its events are not those that")
     (tmp_path / "plan.json").unlink()
     machine = ["-m", "mill"]
-    # A single setpoint without velocities does not show that the tool moves.
+    # From positions alone a single setpoint does not show that the tool moves.
     if why is None or (change is later and name == "halstreamer"):
         assert main(["check", str(file), *machine]) == 0
     else:
@@ -82,7 +82,7 @@ def test_knots_of_another_plan_are_refused(tmp_path: Path) -> None:
         shutil.copy(table, tmp_path / other / "setpoints.pvt")
         with pytest.raises(InputError, match=sentence):
             check(tmp_path / other / "setpoints.pvt")
-    # A knot that no axis can reach fails the audit.
+    # The audit fails if a knot is so far away that no axis can reach it.
     lines = table.read_text().splitlines()
     knots = [number for number, line in enumerate(lines) if line[0] not in "#t"]
     fields = lines[knots[5]].split(",")

@@ -1,4 +1,4 @@
-"""The command line: results on standard output, everything else on standard error, and the exit codes."""
+"""The command line: results on standard output, all else on standard error, and exit codes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.sentences import assert_one_sentence
 
 @pytest.fixture
 def planned(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Replaces the planner by one that returns or raises `result` and keeps its arguments."""
+    """Replaces the planner by one that records its arguments and returns or raises `result`."""
     box: dict[str, Any] = {}
 
     def fake(program: str, machine: Any, **options: Any) -> Any:
@@ -35,7 +35,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             raise box["result"]
         return box["result"]
 
-    # It keeps the planner that it finds when it is imported first.
+    # This module binds the planner when it is first imported, so it is imported before.
     importlib.import_module("feedplan.one_step_more")
     monkeypatch.setattr("feedplan.planning.plan", fake)
     return box
@@ -136,7 +136,7 @@ def test_a_broken_limit_is_written_reported_and_exits_1(
     assert main(["plan", "a.ngc", "-o", str(tmp_path)]) == 1
     out, err = capsys.readouterr()
     assert "FAILED, 1 of 2 limits broken" in out
-    # Such a plan may be faster than the bound: there is no gap.
+    # A plan that breaks limits may be faster than the bound: it has no gap.
     assert " s for this path, which keeps the limits\n" in out
     assert err == f"error: the audit failed: {broken_square.verdict.failures[0]}\n"
     assert "Audit FAILED" in (tmp_path / "report.html").read_text()

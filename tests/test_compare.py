@@ -1,4 +1,4 @@
-"""Comparison of methods: the rows, and the files and the table of the command."""
+"""The comparison of methods: its rows, and the files and the table of the command."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from feedplan.planners import bang_bang, planner, tangential
 from feedplan.report.page import missing_pictures
 from tests.report.drawn import data_of
 
-# A right angle with a tolerance, and half a circle.
+# A right angle with a tolerance, and a half circle.
 PROGRAM = "G21 G90 G64 P0.05 F3000\nG0 X0 Y0 Z0\nG1 X20\nY10\nG3 X0 Y10 I-10\nM2\n"
 METHODS = ("bang-bang", "tangential", "junction-deviation")
 
@@ -42,13 +42,13 @@ def test_the_gap_is_0_at_the_optimum_and_none_where_a_limit_is_broken(program: P
     acceleration = exact.worst("acceleration")
     assert acceleration is not None
     assert acceleration.ratio == pytest.approx(1.0, abs=1e-6)
-    # The acceleration keeps its limit along the path, but not across it, on the circle.
+    # On the circle the acceleration keeps its limit along the path, but not across it.
     broken = tangential.worst("acceleration")
     assert broken is not None
     assert broken.ratio > 1.0
     assert tangential.gap is None
     assert tangential.time < exact.time
-    # Both follow the same path, so the lower bound of one holds for the other; the third follows the corners.
+    # The first two follow the same path and have the same lower bound; the third one follows the corners.
     assert tangential.lower_bound == exact.lower_bound
     assert corners.lower_bound != exact.lower_bound
 

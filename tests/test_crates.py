@@ -1,4 +1,4 @@
-"""The files of a native crate use one another in one direction: each is read on top of those below it."""
+"""The files of a native crate depend on each other without cycles: each can be read after those it uses."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def code_of(file: Path) -> str:
 
 
 def used_paths(code: str, children: set[str]) -> Iterator[list[str]]:
-    """The paths into the crate of `use` lines, with their braces opened, and of names in the code."""
+    """Paths into the crate: from `use` lines, with braces expanded, and from names in the code."""
     first = "|".join(["crate", "self", "super", *sorted(children)])
     for line in re.findall(rf"\buse ((?:{first})\b[^;]*);", code):
         while "{" in line:

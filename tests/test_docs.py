@@ -1,4 +1,4 @@
-"""The documentation is complete and its links resolve; `make docs` checks the built pages too."""
+"""The documentation is complete and its links resolve; `make docs` also checks the built pages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
 TEXTS = [*PAGES, *ROOT.glob("*.md")]
-# Where `make docs` has built the pages.
+# The folder in which `make docs` has built the pages.
 BUILT = os.environ.get("FEEDPLAN_DOCS")
 built = pytest.mark.skipif(BUILT is None, reason="make docs builds the pages and checks them")
 
@@ -73,7 +73,7 @@ def test_included_parts_of_other_files_exist(page: Path) -> None:
 
 
 def test_each_section_of_the_first_page_is_shown() -> None:
-    """Every section of README.md but the first, which begins the first page, and the last is in some page."""
+    """Every section of README.md except the first, which begins the first page, and the last is on a page."""
     shown = "".join(page.read_text("utf-8") for page in PAGES)
     headings = re.findall(r"^###? .*", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
     missing = [heading for heading in headings[1:-1] if f':start-after: "{heading}"' not in shown]
@@ -101,7 +101,7 @@ def test_files_and_commands_named_to_contributors_exist() -> None:
 
 
 class Page(HTMLParser):
-    """What a page loads, the targets of its links, and the ids in it."""
+    """What a page loads, the targets of its links, and its ids."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()

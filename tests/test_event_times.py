@@ -1,4 +1,4 @@
-"""Events of a program happen when the tool is where the program has them, in its order, on both clocks."""
+"""Events happen at the tool's place and in the order of the program, both in the plan and in setpoints."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_the_tool_stops_for_an_event_just_where_it_says(word: str) -> None:
     stops = any(event.stops for event in own)
     assert stops is (word in STOPPING)
     assert len(made.path.runs) - 1 == (2 if stops else 1)
-    # 20 mm in one: 0.1 s up, 0.3 s, 0.1 s down.
+    # 20 mm in one run: 0.1 s up, 0.3 s, 0.1 s down.
     assert made.time == pytest.approx(0.6 if stops else 0.5, abs=1e-9)
     for event in own:
         assert event.time == pytest.approx(0.3 if stops else 0.25, abs=1e-9)
@@ -144,7 +144,7 @@ def test_events_along_fitted_points_change_no_plan_and_are_at_the_points(method:
     assert [event.value for event in events] == list(range(80))
     times = np.array([event.time for event in events])
     assert (np.diff(times) > 0).all()
-    # The first point is where the program starts.
+    # The first point is the start of the program.
     targets = np.concatenate((made.program.start[None], made.program.target))
     assert len(targets) == 80
     away = np.linalg.norm(made.at(times).position - targets, axis=1)
@@ -155,7 +155,7 @@ def test_events_along_fitted_points_change_no_plan_and_are_at_the_points(method:
 
 
 def test_the_clock_of_setpoints_waits_and_the_events_with_it() -> None:
-    # Runs of 0.3 s and √(4 · 3.3/500) s: the second takes no whole number of periods.
+    # Runs of 0.3 s and √(4 · 3.3/500) s: the second one is no whole number of periods.
     made = planned("G1 X10\nM8\nG4 P0.0011\nM9\nX13.3\nM62 P0\nM5\nG4 P0.01\nY10\nM2")
     points = made.setpoints()
     own, waiting = made.events.time, points.events.time
@@ -167,7 +167,7 @@ def test_the_clock_of_setpoints_waits_and_the_events_with_it() -> None:
     np.testing.assert_allclose(own, plans, atol=1e-9)
     assert waiting[-1] <= points.duration + 1e-9
     assert points.duration - after - 0.3 < 0.004
-    # Who acts on each event at the first setpoint at or after it finds the tool at rest.
+    # At the first setpoint at or after an event that stops, the tool is at rest.
     chunk = points.all()
     for event in points.events:
         at = int(np.searchsorted(chunk.t, event.time - 1e-12))
@@ -200,7 +200,7 @@ def test_a_path_has_no_events_and_a_plan_can_be_pickled_with_its_own() -> None:
     made = planned("M3\nG1 X10\nM5\nM2")
     assert "4 events" not in repr(made.events)
     assert repr(made.events) == "<3 events: 2 spindle, 1 stop>"
-    assert made.account is not None  # its table of lengths is made again
+    assert made.account is not None  # makes its table of lengths again
     again = pickle.loads(pickle.dumps(made))
     assert again.account.to_json() == made.account.to_json()
     assert again.events.sha256() == made.events.sha256()

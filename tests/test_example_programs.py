@@ -19,7 +19,7 @@ from feedplan.program.read import read_program
 from feedplan.program.tools import read_tools
 from tests.program.linuxcnc import difference, moves_of, needs_linuxcnc, reference
 
-# For each file: its machine, its tools, and its operations.
+# For each file: its machine, its tools and its operations.
 PROGRAMS: dict[str, tuple[str, list[int | None], list[str]]] = {
     "part.ngc": ("mill", [1, 2, 3], ["FACE", "FOUR HOLES"]),
     "bracket.nc": (

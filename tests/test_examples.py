@@ -1,4 +1,4 @@
-"""Every script in examples/ runs, and the programs that the scripts write agree with their descriptions."""
+"""Every script in examples/ runs, and the programs that they write agree with their descriptions."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 from tests.service.servers import running
 
-# Post-processors run in CAM systems (test_freecad.py).
+# Post-processors run inside CAM systems (test_freecad.py).
 SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py") if not path.stem.endswith("_post"))
 
 
 def moves(text: str, words: str) -> NDArray[np.float64]:
-    """The numbers in the lines that have all of `words`, one row for each line."""
+    """The numbers in the lines that contain all of `words`, one row for each line."""
     pattern = ".*".join(
         rf"\b{word}(-?[\d.]+)" if i == 0 else rf"{word}(-?[\d.]+)" for i, word in enumerate(words)
     )
@@ -70,7 +70,7 @@ def test_the_client_of_the_service_tells_a_file_that_is_missing(tmp_path: Path) 
 def test_the_script_runs_and_writes_below_out(script: str, tmp_path: Path) -> None:
     if "matplotlib" in (EXAMPLES / script).read_text(encoding="utf-8"):
         pytest.importorskip("matplotlib")
-    # A package that is compiled at its first import may have an old spelling of a backslash in it.
+    # A package that is compiled at its first import may contain invalid escape sequences.
     warnings = "error,ignore:invalid escape sequence"
     environment = dict(os.environ, PYTHONWARNINGS=warnings, MPLCONFIGDIR=str(tmp_path / "matplotlib"))
     with contextlib.ExitStack() as stack:
@@ -131,7 +131,7 @@ def test_a_vase_pass_has_creases_and_smooth_stretches_between_them() -> None:
     edges = np.diff(points, axis=0)
     turn = np.abs(np.diff(np.arctan2(edges[:, 1], edges[:, 0])))
     curvature = turn / (0.5 * np.linalg.norm(points[2:] - points[:-2], axis=1))
-    # Zhang's equation 2 with α = 4 at 100 mm/s and the two axes' accelerations together.
+    # Equation 2 of Zhang et al. with α = 4 at 100 mm/s, with the accelerations of both axes together.
     threshold = 4.0 * math.hypot(3000.0, 1000.0) / 100.0**2
     creases = np.count_nonzero(curvature > threshold)
     assert 25 <= creases <= 70, "each crease shows at one point or two"
@@ -193,7 +193,7 @@ def test_blocks_of_the_head_are_as_long_as_their_curvature_allows() -> None:
     assert lengths.min() >= 0.9 * 0.05
     assert lengths.max() <= 1.001
     assert lengths.max() > 5.0 * lengths.min()
-    # The chord error: the distance of the middle of a block from the path through the points.
+    # The chord error: the distance from the middle of a block to the path of the tool tip.
     path = head.tool_tip(0.3, np.linspace(points[0, 1], points[-1, 1], 20_000))
     middle = 0.5 * (points[1:] + points[:-1])
     beside = np.column_stack([np.interp(middle[:, 1], path[:, 1], path[:, k]) for k in range(3)])
@@ -216,7 +216,7 @@ def test_the_head_moves_all_three_axes() -> None:
 
 
 def joint_positions(program: Program, machine: Machine) -> NDArray[np.float64]:
-    """The joints at the end of every move."""
+    """Joint positions at the end of every move."""
     assert program.coordinate_mode is not None
     found = np.empty((len(program), len(machine.axes)))
     for coordinate_mode in CoordinateMode:
@@ -235,14 +235,14 @@ def test_the_impeller_is_the_same_motion_in_every_form(name: str) -> None:
     tip, vector, joints = (joint_positions(program, machine) for program in programs)
     assert len(joints) > 500
     assert np.abs(tip - joints).max() < 1e-3
-    # A direction does not decide whole turns of the angles, nor which of two poses is taken.
+    # A direction determines the angles only up to whole turns and one of two poses.
     assert programs[1].coordinate_mode is not None
     pointed = programs[1].coordinate_mode == CoordinateMode.VECTOR
     kinematics = axis_words(machine, programs[1].axes, CoordinateMode.VECTOR).kinematics
     directions = np.array([kinematics.tip(row) for row in joints])
     assert np.abs(directions[pointed] - programs[1].target[pointed][:, [0, 1, 2, 5, 6, 7]]).max() < 1e-3
     assert np.abs(vector - joints)[~pointed].max() < 1e-3
-    # The forms agree after the end of the tip words: the last move is of joints in all forms.
+    # After the end of the tip words all forms agree: their last move is one of joints.
     starts = [program.starts()[-1][:5] for program in programs]
     assert starts[0] == pytest.approx(starts[2], abs=1e-3)
     assert starts[1] == pytest.approx(starts[2], abs=1e-3)

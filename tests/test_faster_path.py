@@ -1,4 +1,4 @@
-"""A path fitted to the speed of a plan: never slower, within the tolerance, each section the faster one."""
+"""Paths fitted to a plan's speed: never slower, within the tolerance, the faster one in each section."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def made(lines: str, machine: Machine = FAST, method: Any = "jerk-limited", **op
 
 
 def distances(found: Plan, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of setpoints from the polyline."""
+    """Distances of setpoints from the polyline [mm]."""
     places = found.setpoints().all().position[:, None, :]
     start, way = points[:-1], np.diff(points, axis=0)
     along = np.clip(((places - start) * way).sum(axis=2) / (way**2).sum(axis=1), 0.0, 1.0)
@@ -34,7 +34,7 @@ def distances(found: Plan, points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def test_a_corner_is_passed_sooner_the_more_the_path_may_leave_it() -> None:
-    # Least times of path and speed together: 0.3408, 0.3216 and 0.3107 s.
+    # The least times when path and speed are optimised together: 0.3408, 0.3216 and 0.3107 s.
     corner = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
     for tolerance, most in ((0.01, 0.345), (0.05, 0.329), (0.1, 0.319)):
         found = made(CORNER, tolerance=tolerance, path="fastest")
@@ -53,13 +53,13 @@ def test_a_turn_of_170_degrees_is_no_stop() -> None:
 
 
 def test_each_section_between_stops_follows_the_faster_path() -> None:
-    """A line, on which there is nothing to gain, and a corner, with a pause between them."""
+    """A line, which cannot become faster, and a corner, with a pause between them."""
     lines = "G1 X-20\nG4 P0.1\nG1 X-10\nG1 Y10\n"
     first, found = made(lines, tolerance=0.05), made(lines, tolerance=0.05, path="fastest")
     assert found.gain is not None
     assert (found.gain.sections, found.gain.faster) == (2, 1)
     assert found.gain.times == (pytest.approx(first.time, rel=1e-12), pytest.approx(found.time, rel=1e-12))
-    # The line is that of the first plan, piece by piece.
+    # The line is the one of the first plan, piece by piece.
     assert found.profile.run_times[0] == first.profile.run_times[0]
     assert found.profile.run_times[1] < 0.9 * first.profile.run_times[1]
     pieces = int(first.path.runs[1])
@@ -97,7 +97,7 @@ def test_bang_bang_takes_the_smooth_path_on_noise() -> None:
         for more in ({}, {"path": "fastest"}, {"path": "fastest", "path_rounds": 3})
     )
     assert one.time < 0.95 * first.time
-    # The least time of path and speed together is 0.880 s.
+    # The least time when path and speed are optimised together is 0.880 s.
     assert three.time < 0.925
     for found in (one, three):
         assert found.audit().ok
@@ -111,7 +111,7 @@ def test_steps_along_the_gradient_keep_what_they_promise() -> None:
     assert one.gain.promised == ()
     assert three.gain.times[:2] == one.gain.times
     assert list(three.gain.times) == sorted(three.gain.times, reverse=True)
-    # Each step with what it promised, and one more that is not taken.
+    # Each step that was taken has the gain that was promised for it; one more step is promised but not taken.
     assert len(three.gain.promised) == 3
     assert len(three.gain.times) == 4
     assert all(promised >= 0.0 for promised in three.gain.promised)
@@ -122,7 +122,7 @@ def test_steps_along_the_gradient_keep_what_they_promise() -> None:
 
 
 def test_two_steps_round_the_facets_of_a_circle_within_the_tolerance() -> None:
-    # Chords of 0.3 mm, 0.01 mm from the circle; the least time of path and speed together is 0.329 s.
+    # Chords of 0.3 mm, 0.01 mm from the circle; least time with path and speed optimised together: 0.329 s.
     count = 24
     angle, radius = np.arange(count + 1) * 2.0 * np.pi / count, 0.3**2 / 0.08 + 0.005
     points = np.round(radius * np.column_stack((np.sin(angle), 1.0 - np.cos(angle))), 6)

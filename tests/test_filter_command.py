@@ -1,4 +1,4 @@
-"""`feedplan filter` as LinuxCNC runs it: the program on standard output, progress on standard error."""
+"""`feedplan filter` as LinuxCNC calls it: the program on standard output, progress on standard error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LINEAR_UNITS = mm
 
 
 def run(*arguments: str, **environment: str) -> tuple[int, bytes, str]:
-    # As LinuxCNC's AXIS does, without standard input.
+    # Without standard input, as LinuxCNC's AXIS starts it.
     done = subprocess.run(
         [sys.executable, "-m", "feedplan", "filter", *arguments],
         stdin=subprocess.DEVNULL,

@@ -1,4 +1,4 @@
-"""Child processes of every start method can plan, whatever the parent has done before."""
+"""Child processes of every start method can plan, whatever their parent has done before."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan import lazy
 
 ROOT = Path(__file__).parent.parent
 
-# A script of its own, as users have them: children import it again, and a pool that hangs ends with it.
+# A script as users write them: children import it again, and a pool that hangs ends with the script.
 SCRIPT = """
 import multiprocessing, os, sys, threading
 import feedplan
@@ -61,7 +61,7 @@ def test_children_plan_after_their_parent_has_planned(method: str, busy: bool, t
         pytest.fail("the children hang")
     assert done.returncode == 0, done.stderr
     if sys.platform == "linux":
-        # Python's own thread, and the threads of the child's own pool.
+        # More than Python's own thread: the child has its own pool of threads.
         assert int(done.stdout) > 1
 
 

@@ -19,7 +19,7 @@ from feedplan.program.program import MoveKind
 ROOT = EXAMPLES.parent
 FREECAD = shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
 
-# The outline of a box in three levels, and three holes beside it.
+# The outline of a box at three levels, and three holes beside it.
 JOB = """
 import json, sys
 sys.path.insert(0, {examples!r})

@@ -1,4 +1,4 @@
-"""Files that are damaged or made to do harm give one short sentence, in bounded memory."""
+"""Files that are damaged or malicious give one short sentence, in bounded memory."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from tests.hostile import DRAWING, MACHINE, OF_CONTROLLERS, PATH_FILE, PROGRAM, 
 
 SEEDS = seeds(100)
 SMALL = "G21 G90\nF1200\nG1 X1 Y0.5\nX2\nM2\n"
-# Greatest growth of memory for small files [bytes].
+# Greatest allowed growth of memory for small files [bytes].
 GROWTH = 1 << 29
 WORDS = len("error: ")
 
 
 def outcome(*arguments: str) -> str:
-    """An error in the exit code or the output of a command; None if there is none."""
+    """What is wrong with the exit code or the output of a command; empty if nothing is."""
     said, errors = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(errors):
         code = cli.main(list(arguments))
@@ -43,7 +43,7 @@ def outcome(*arguments: str) -> str:
 
 
 def of_all(content: bytes, file: Path, run: Callable[[], str], change: Callable[[bytes, int], bytes]) -> None:
-    """Runs a command on each mutation of a file."""
+    """Runs a command on a file and on mutations of it; asserts right outcomes and bounded memory."""
     file.write_bytes(content)
     assert run() == ""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -293,7 +293,7 @@ def _is_a_sentence(error: str) -> None:
 
 
 def _alone(*arguments: str, stdout: object = subprocess.DEVNULL) -> tuple[int, str]:
-    """Runs a command in a process with little memory."""
+    """Exit code and error output of a command that runs in a process with little memory."""
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30));"
         "from feedplan.cli import main; sys.exit(main(sys.argv[1:]))"

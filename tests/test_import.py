@@ -70,7 +70,7 @@ def test_the_package_imports_no_slow_package() -> None:
 
 
 def test_nothing_is_imported_before_a_name_is_used() -> None:
-    """So `main`, which ends Ctrl-C in a sentence, runs before anything slow is imported."""
+    """`main` must run before slow imports, so that Ctrl-C during them ends in one sentence."""
     code = """
 import sys, feedplan, feedplan.__main__
 print(sorted(name for name in sys.modules if name == "numpy" or name.startswith("feedplan.")))
@@ -126,7 +126,7 @@ def test_literal_types_list_all_names() -> None:
 
 def test_help_tells_the_options_of_every_method_with_their_defaults() -> None:
     text = pydoc.render_doc(feedplan.plan, renderer=pydoc.plaintext)
-    text = re.sub(r",\n +(?=\w+=)", ", ", text)  # options in several lines
+    text = re.sub(r",\n +(?=\w+=)", ", ", text)  # joins options that are written in several lines
     rows = {
         name: row
         for names, row in re.findall(r"^ *((?:[a-z]+(?:-[a-z]+)*(?:, )?)+)  +(\w+=.*)$", text, flags=re.M)

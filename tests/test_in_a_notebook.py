@@ -1,4 +1,4 @@
-"""Plans at a prompt: short texts, a card in a notebook, copies in other processes."""
+"""Plans in interactive use: short texts, a card in a notebook, copies in other processes."""
 
 from __future__ import annotations
 

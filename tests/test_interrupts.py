@@ -1,4 +1,4 @@
-"""Signals and listeners of progress can end every stage of the work, and the progress only rises."""
+"""Signals and progress listeners can end every stage of the work; progress never decreases."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Progress = Callable[[str, float], None]
 
 
 class StoppedError(Exception):
-    """The exception of a listener."""
+    """Raised by a listener."""
 
 
 def wave(blocks: int) -> str:
@@ -55,7 +55,7 @@ def machine() -> Machine:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Long enough for several reports of progress in each stage."""
+    """A program with several reports of progress in each stage."""
     place = tmp_path_factory.mktemp("wave") / "wave.ngc"
     place.write_text(wave(20_000), encoding="ascii")
     return place
@@ -63,7 +63,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def long_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Long enough for reports of progress while reading."""
+    """A program long enough for reports of progress while it is read."""
     place = tmp_path_factory.mktemp("wave") / "long.ngc"
     place.write_text(wave(300_000), encoding="ascii")
     return place
@@ -161,7 +161,7 @@ def test_the_reader_is_ended_too(long_file: Path, machine: Machine) -> None:
 
 
 def spent(work: Callable[[], Any], until: float = 0.0) -> float:
-    """Processor time until the work ended [s]; a signal comes after the time `until` [s], if it is not 0."""
+    """Processor time until the work ends [s]; a signal comes after the time `until` [s], unless it is 0."""
     before = signal.signal(signal.SIGPROF, signal.default_int_handler)
     begun = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, until)
@@ -185,8 +185,8 @@ def test_a_signal_ends_native_work_long_before_it_is_done(file: Path, machine: M
         lambda: planner("jerk-limited")(problem),
         lambda: planner("s-curve")(problem),
     ):
-        # Processor time, because the computer may have other work. Without the signal it would be the whole
-        # time.
+        # Processor time, because other work may run on the computer. If the signal had no effect, both times
+        # would be equal.
         whole = spent(work)
         assert spent(work, 0.1 * whole) < 0.7 * whole
 
@@ -214,7 +214,7 @@ def test_threads_that_plan_at_once_do_not_disturb_each_other(file: Path, machine
 
 
 def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> None:
-    """On a terminal: the bar moves; after the signal one line is printed, and no file is left."""
+    """On a terminal: the bar moves; after the signal one line is printed and no file is left."""
     program = tmp_path / "wave.ngc"
     program.write_text(wave(60_000), encoding="ascii")
     master, slave = pty.openpty()
@@ -249,7 +249,7 @@ def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> No
 
 
 def test_the_fork_server_leaves_ctrl_c_to_the_command() -> None:
-    """It imports feedplan when it starts, and printed a traceback where a terminal sends Ctrl-C to all."""
+    """It imports feedplan when it starts: a Ctrl-C that reached it would print a traceback."""
     code = """
 import signal
 from multiprocessing import forkserver

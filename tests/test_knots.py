@@ -1,4 +1,4 @@
-"""Knots of a plan: equal steps between stops, stops to the last digit, the plan's own times."""
+"""Knots of a plan: equal steps between stops, exact positions at stops, the times of the plan."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def joined(chunks: Any) -> SetpointChunk:
 
 
 def test_the_square_by_hand(square: Any) -> None:
-    # Four sides of 0.5 s: a step of 0.15 s goes four times into each.
+    # Four sides of 0.5 s: steps of at most 0.15 s are four steps of 0.125 s each.
     knots = square.knots(0.15)
     assert (knots.count, knots.duration) == (17, 2.0)
     found = joined(knots.chunks())
     np.testing.assert_allclose(found.t, np.arange(17) * 0.125, atol=1e-15)
-    # After 0.125 s: 2.5 mm in the ramp of 0.1 s, and 0.025 s at 50 mm/s.
+    # After 0.125 s: 2.5 mm in the ramp of 0.1 s, and 1.25 mm in 0.025 s at 50 mm/s.
     places = [0.0, 3.75, 10.0, 16.25, 20.0]
     np.testing.assert_allclose(found.position[:5, 0], places, atol=1e-12)
     np.testing.assert_allclose(found.velocity[:5, 0], [0.0, 50.0, 50.0, 50.0, 0.0], atol=1e-9)

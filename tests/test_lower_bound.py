@@ -1,5 +1,4 @@
-"""The lower bound of a plan's time: known times; never above the time of a plan and near it, on every
-path."""
+"""The lower bound of a plan's time: known times; never above a plan's time and near it, on every path."""
 
 from __future__ import annotations
 
@@ -29,12 +28,12 @@ plan = planner("bang-bang")
 
 
 def gap(problem: Problem, profile: SpeedProfile) -> float:
-    """The relative gap of the native lower bound."""
+    """The relative gap between the native lower bound and the profile's time."""
     return 1.0 - _solvers.lower_bound(problem, profile) / profile.time
 
 
 def bare(problem: Problem, width: float = 1.0) -> SpeedProfile:
-    """A profile without information: one phase for each piece, with too long a duration."""
+    """A profile without any information for the bound: one phase per piece, with too long a duration."""
     count = len(problem.path)
     nothing = np.zeros(count)
     return SpeedProfile(
@@ -54,7 +53,7 @@ def bare(problem: Problem, width: float = 1.0) -> SpeedProfile:
 def test_a_line_from_rest_to_rest_takes_its_bound() -> None:
     line = CompositeCurve.from_bezier([[0.0, 0.0], [30.0, 40.0]])
     for feed, time in ((10.0, 5.0 + 10.0 / 500.0), (1e9, 2.0 * math.sqrt(50.0 / 500.0))):
-        # The axis Y limits the acceleration: 400 of 500 mm/s² along the line.
+        # Axis Y limits the acceleration: its 400 mm/s² are 500 mm/s² along the line.
         planned = Planned(line, 1e9, np.array([1e4, 400.0]), feed)
         bound = lower_bound(planned.problem, planned.profile)
         assert time * (1 - 1e-12) < bound <= time * (1 + 1e-15)
@@ -64,12 +63,12 @@ def test_a_circle_takes_its_bound() -> None:
     r, a = 10.0, 3000.0
     planned = Planned(circle([0.0, 0.0], r), 1e9, a)
     assert lower_bound(planned.problem, planned.profile) == pytest.approx(0.412407376368, rel=3e-12)
-    # A circle with a flying start; each eighth is at the limit of one axis: 8 √((2 − √2) r/A).
+    # A circle passed at speed; on each eighth one axis is at its limit: 8 √((2 − √2) r/A).
     speed = math.sqrt(a * r)
     flying = replace(planned.problem, start_speed=speed, end_speed=speed)
     bound = lower_bound(flying, plan(flying))
     assert bound == pytest.approx(8.0 * math.sqrt((2.0 - math.sqrt(2.0)) * r / a), rel=1e-11)
-    # At the feed: length over feed.
+    # At the feed: length divided by feed.
     slow = Planned(circle([0.0, 0.0], r), 1e9, 1e9, 5.0)
     assert lower_bound(slow.problem, slow.profile) == pytest.approx(4.0 * math.pi, rel=2e-4)
 
@@ -155,6 +154,6 @@ def test_a_path_of_a_tool_on_plain_axes_has_the_same_bound_run_by_run() -> None:
     problem = problem_along(path_along(curve), FREE, 100.0)
     path: Path = replace(problem.path, runs=np.array([0, 1, 2]), dwell=np.zeros(2))
     stops = replace(problem, path=path)
-    # 10 mm from rest to rest twice, and 20 mm once.
+    # Twice 10 mm from rest to rest, compared with 20 mm once.
     assert lower_bound(stops, plan(stops)) == pytest.approx(4.0 * math.sqrt(0.1), rel=1e-14)
     assert lower_bound(problem, plan(problem)) == pytest.approx(2.0 * math.sqrt(0.2), rel=1e-14)

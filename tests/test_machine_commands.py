@@ -51,7 +51,7 @@ def test_the_template_loads_unchanged_and_with_all_commented_lines(tmp_path: Pat
     assert file.read_text(encoding="utf-8") == template()
     assert main(["machines", "new"]) == 0
     assert capsys.readouterr().out == template()
-    # The commented lines of the template are valid when they are made active.
+    # The commented lines of the template are valid when the comment signs are removed.
     offered = [
         line.removeprefix("# ") if " = " in line or "[" in line[:5] else line
         for line in template().splitlines()

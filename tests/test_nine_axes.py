@@ -1,4 +1,4 @@
-"""Up to nine axes of any names, through every method and every file; seven joints as toppra plans them."""
+"""Up to nine axes of any names, in every method and every file; seven joints as toppra plans them."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_an_axis_more_that_rests_changes_nothing() -> None:
 
 
 def test_the_order_of_nine_axes_changes_nothing() -> None:
-    """The ninth axis is as good as the first: no set of axes is cut off at eight."""
+    """The ninth axis is treated like the first: no set of axes ends at eight."""
     rng = np.random.default_rng(8)
     for _ in range(20):
         points = rng.standard_normal((6, 9)) * 10.0 ** rng.uniform(-1, 1, 9)
@@ -120,7 +120,7 @@ def test_a_program_that_moves_all_nine_letters(tmp_path: FilePath) -> None:
 
 
 def cubic_through(points: np.ndarray) -> tuple[Any, CompositeCurve]:
-    """The spline of toppra through waypoints at even parameters, and its pieces as Bézier curves."""
+    """toppra's spline through waypoints at even parameters, and its pieces as Bézier curves."""
     import toppra
 
     given = toppra.SplineInterpolator(np.linspace(0.0, 1.0, len(points)), points)
@@ -141,7 +141,7 @@ def cubic_through(points: np.ndarray) -> tuple[Any, CompositeCurve]:
 @LINUX
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_quick_start_of_toppra(seed: int) -> None:
-    """Seven joints through random waypoints: toppra's time falls to ours as its grid gets finer."""
+    """Seven joints through random waypoints: toppra's time falls towards ours as its grid is refined."""
     import toppra
     from toppra import algorithm, constraint
 
@@ -182,7 +182,7 @@ def test_a_name_that_is_none_is_refused(name: Any) -> None:
 
 @pytest.mark.parametrize("name", ["X", "x", "j1", "_", "elbow_joint", "j" * 32, "XY", "AB"])
 def test_a_name_that_is_one_is_taken(name: str) -> None:
-    """Names that lie within a row of letters, as XY and AB, are none of these letters."""
+    """Names that are part of a row of letters, such as XY and AB, do not mean these letters."""
     axis = Axis(name, 1.0, 1.0)
     assert axis.kind == "linear"
     path = Path.from_bezier([[0.0], [2.0]], axes=[name])
@@ -219,7 +219,7 @@ def test_names_and_columns_fit() -> None:
 
 
 def test_a_program_on_a_machine_with_other_axes_beside(tmp_path: FilePath) -> None:
-    """Axes that no letter moves rest; home has a number for each axis all the same."""
+    """Axes without a letter rest, and home has a number for each of them too."""
     machine = Machine(
         "cell",
         (Axis("X", 100, 1000), Axis("gripper", 10, 100), Axis("Y", 100, 1000)),

@@ -1,4 +1,4 @@
-"""Versions of everything that is installed are pinned exactly, by names and versions alone."""
+"""Versions of everything that is installed are pinned exactly, by name and version only."""
 
 from __future__ import annotations
 

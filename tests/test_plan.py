@@ -1,4 +1,4 @@
-"""The time of a plan of a whole program, with its pauses; and the computing time of its stages."""
+"""The time of a plan of a whole program, with its pauses, and the computing time of each stage."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def test_a_pause_before_the_first_move_counts_like_any_other(planned: dict[str, 
 def test_the_audit_expects_the_pause_before_the_first_move(planned: dict[str, Plan]) -> None:
     late = planned["late"]
     assert late.audit().ok
-    # The same stream with half of the pause, and with none.
+    # The same setpoints with half of the pause, and with no pause.
     for pause in (0.75, 0.0):
         path = replace(late.path, start_dwell=pause)
         hasty = replace(late, problem=replace(late.problem, path=path)).setpoints()
         assert not audit(late.problem, late.profile, MILL, late.program, hasty).ok
-    # With another period the pause does not end at a setpoint.
+    # With this period the pause does not end at a setpoint.
     slow = late.setpoints(period=0.0037)
     assert audit(late.problem, late.profile, MILL.with_period(0.0037), late.program, slow).ok
     assert np.isclose(slow.duration, late.time, atol=3 * 0.0037)

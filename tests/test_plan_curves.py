@@ -57,7 +57,7 @@ def planned(text: str, machine: feedplan.Machine | str, tmp_path: FilePath) -> f
 def assert_sound(plan: feedplan.Plan) -> None:
     verdict = plan.audit()
     assert verdict.ok, verdict.failures
-    # Bang-bang: some limit is used up.
+    # Plans are by bang-bang: some limit is used fully.
     used = [check.ratio for check in verdict.checks if check.name in ("acceleration", "velocity", "feed")]
     assert max(used) > 1 - 1e-6
     assert plan.lower_bound <= plan.time
@@ -85,7 +85,7 @@ def test_splines_and_arcs_are_planned_on_every_kind_of_machine(
 def test_the_butterfly_of_a_path_file_takes_its_known_time(tmp_path: FilePath) -> None:
     data = json.loads(BUTTERFLY.read_text(encoding="utf-8"))
     curve = {key: data[key] for key in ("degree", "control_points", "weights")}
-    # The figure belongs to the knots as they are mostly printed.
+    # The published time belongs to the knots as most publications print them.
     curve["knots"] = [round(knot, 4) for knot in data["knots"]]
     file = tmp_path / "butterfly.json"
     file.write_text(json.dumps({"unit": "mm", "curves": [curve], "feed": 250.0}))
@@ -113,7 +113,7 @@ def test_a_circle_is_followed_exactly(tmp_path: FilePath) -> None:
 
 @dataclass(frozen=True)
 class Skewed(Kinematics):
-    """Y leans by 30 degrees, and Z is a lever."""
+    """A kinematics whose axis Y leans by 30 degrees and whose Z moves by a lever."""
 
     joint_names: tuple[str, ...]
     tip_names: tuple[str, ...] = ("X", "Y", "Z")

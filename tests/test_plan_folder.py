@@ -1,4 +1,4 @@
-"""The folder of a plan: whole, exact, and never half-written."""
+"""The folder of a plan: complete, exact, and never half-written."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_folder_holds_summary_setpoints_and_report(square: Any, tmp_path: Path
 def test_the_setpoints_are_the_plans_in_every_format(name: str, square: Any, tmp_path: Path) -> None:
     write_plan(square, tmp_path, [name], step=0.001 if name == "pvt" else None)
     read = load_setpoints(tmp_path)
-    if name == "pvt":  # knots are computed, but the setpoints of the square are written by hand
+    if name == "pvt":  # knots are computed, but the square's setpoints are written by hand
         np.testing.assert_allclose(read.position, square.chunk.position, atol=1e-12)
         return
     np.testing.assert_array_equal(read.position, square.chunk.position)
@@ -43,7 +43,7 @@ def test_the_setpoints_are_the_plans_in_every_format(name: str, square: Any, tmp
 
 
 class _Counted:
-    """The native sampler; counts how many there are and how many setpoints they compute."""
+    """Wraps the native sampler; records all samplers, and how many setpoints each computes."""
 
     made: ClassVar[list[_Counted]] = []
 
@@ -80,11 +80,11 @@ def test_the_motion_is_laid_out_once_and_each_setpoint_computed_once(
     assert motion.rows == motion.count
     assert list(stages) == ["audit", "write"]
     assert all(done == sorted(done) and done[-1] == 1.0 for done in stages.values())
-    # Written again, they are read once more, and not audited.
+    # Writing again computes the setpoints once more, but does not audit them.
     write_plan(plan, tmp_path)
     assert _Counted.made == [motion]
     assert motion.rows == 2 * motion.count
-    # Another period has a layout of its own.
+    # Another period needs a sampler of its own.
     assert plan.setpoints(period=0.01).count < motion.count
     assert len(_Counted.made) == 2
 

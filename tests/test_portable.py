@@ -1,4 +1,4 @@
-"""The native module runs on other processors and older systems than its own builder, and gives equal plans.
+"""The native module runs on other processors and older systems than its builder, and gives equal plans.
 
 `make wheel` runs these tests on its wheel too.
 """
@@ -18,20 +18,20 @@ import pytest
 
 from feedplan import _solvers
 
-# Where `make wheel` has built the wheels.
+# The folder in which `make wheel` has built the wheels.
 WHEELS = os.environ.get("FEEDPLAN_WHEELS")
 wheels = pytest.mark.skipif(WHEELS is None, reason="make wheel builds wheels and checks them")
 linux = pytest.mark.skipif(sys.platform != "linux", reason="of ELF files")
 x86 = pytest.mark.skipif(platform.machine() != "x86_64", reason="of processors of another kind")
-# With the instructions of x86-64-v2 and no wider vectors.
-# The linear algebra of numpy takes the processor for that of the host, unless it is told.
+# A processor with the instructions of x86-64-v2 and no wider vectors. The linear algebra of numpy is told the
+# processor, because it would detect that of the host.
 NEHALEM = ("qemu-x86_64", "-cpu", "Nehalem", "-E", "OPENBLAS_CORETYPE=Nehalem")
 emulator = pytest.mark.skipif(shutil.which(NEHALEM[0]) is None, reason="needs Debian's package qemu-user")
 PYTHONS = [f"python3.{minor}" for minor in range(10, 15)]
 MACHINES = ["x86_64", "aarch64"]
 CONSTRAINTS = Path(__file__).parents[1] / "constraints.txt"
 PROGRAM = "G21 G90 G64 P0.05\nG1 F1000\nX10 Y0 Z0\nY10\nG2 X20 Y0 R10\nG1 X30 Y5\nM2\n"
-# Prints a time and the bits of all setpoints by each method; the methods name other planners and paths.
+# Prints time and hash of all setpoints for each method; these use different planners and paths.
 PLANS = """
 import hashlib, json, feedplan
 def shown(method):
@@ -43,7 +43,7 @@ print(json.dumps({method: shown(method) for method in ("bang-bang", "jerk-limite
 
 
 def plans(command: list[str], folder: Path, **settings: str) -> dict[str, list[object]]:
-    """The output of an interpreter for PLANS, with these settings in its environment."""
+    """The output of a Python for the script PLANS, with these settings in its environment."""
     (folder / "part.ngc").write_text(PROGRAM, encoding="ascii")
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(
@@ -55,7 +55,7 @@ def plans(command: list[str], folder: Path, **settings: str) -> dict[str, list[o
 
 
 def own_plans(folder: Path, emulator: tuple[str, ...] = ()) -> dict[str, list[object]]:
-    """The same by the native module of this package."""
+    """The output for PLANS with the native module of this package."""
     package = Path(_solvers.__file__).parent
     return plans([*emulator, sys.executable], folder, PYTHONPATH=str(package.parent))
 
@@ -63,7 +63,7 @@ def own_plans(folder: Path, emulator: tuple[str, ...] = ()) -> dict[str, list[ob
 @linux
 @x86
 def test_only_what_is_chosen_at_run_time_needs_wider_vectors_than_the_baseline() -> None:
-    # All instructions of AVX and later begin with v. The crates of these functions ask the processor first.
+    # All instructions of AVX and later begin with v. The crates of these functions check the processor first.
     chosen = re.compile("vectorize_avx2|vectorize_avx512|fma_with_fma")
     done = subprocess.run(
         ["objdump", "-d", "--no-show-raw-insn", _solvers.__file__], capture_output=True, text=True, check=True

@@ -1,4 +1,4 @@
-"""Work beside other work, with its listener."""
+"""Work that runs beside other work, and its progress listener."""
 
 from concurrent.futures import Future
 from threading import Event

@@ -18,7 +18,7 @@ README = (ROOT / "README.md").read_text("utf-8")
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with copies of the program and the machine, as README.md tells to make."""
+    """A folder with copies of the program and the machine, as README.md tells the reader to make."""
     for name in ("part.ngc", "mine.toml"):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -26,7 +26,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def section(title: str, language: str) -> str:
-    """The first block of code in a language under a heading of README.md."""
+    """The first code block in a language under a heading of README.md."""
     text = README.split(f"\n## {title}", 1)[1].split("\n## ", 1)[0]
     return text.split(f"```{language}\n", 1)[1].split("```", 1)[0]
 

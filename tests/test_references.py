@@ -1,4 +1,4 @@
-"""What comments and documents of the sources name exists: files, and names of the Python package."""
+"""Files and names of the Python package that comments and documents mention exist."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SOURCES = [KERNELS, *SOLVERS.glob("*/src/**/*.rs"), *(ROOT / "feedplan").rglob("
 
 
 def exists(name: str) -> bool:
-    """Whether a module, or a name in it, or a field or member of that, has this path."""
+    """Whether this dotted name is a module, a name in a module, or a field or member of that name."""
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
         try:

@@ -34,7 +34,7 @@ def path_of(control_points: list[list[list[float]]], width: list[float], **colum
 
 
 def line_arcs(piece: int, length: float, acceleration: float, speed: float) -> list[Phase]:
-    """Rest to rest along a piece in +X: trapezoid, or triangle where `speed` is out of reach."""
+    """From rest to rest along a piece in +X: a trapezoid, or a triangle if `speed` cannot be reached."""
     a, kind = acceleration, PhaseLaw.AXIS_ACCELERATION
     v = min(speed, math.sqrt(a * length))
     ramp = v * v / (2 * a)
@@ -53,7 +53,7 @@ def line_case(speed: float = 50.0) -> tuple[Path, SpeedProfile]:
 
 
 def parabola_case(feed: float = 20.0) -> tuple[Path, SpeedProfile]:
-    """x = u, y = u²/2 on [0, 4] at constant feed: it starts and ends in motion."""
+    """x = u, y = u²/2 on [0, 4] at constant feed; it starts and ends in motion."""
     path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0])
     duration = parabola_length(4.0) / feed
     ends = (feed**2, feed**2 / 17)
@@ -65,7 +65,7 @@ def parabola_length(u: float) -> float:
 
 
 def two_runs(dwell: float) -> tuple[Path, SpeedProfile]:
-    """10 mm in X in 0.25 s, a pause, then 4 mm on in about 0.126 s."""
+    """10 mm in X in 0.25 s, a pause, then another 4 mm in about 0.126 s."""
     points = [[[0.0], [5.0], [10.0]], [[10.0], [12.0], [14.0]]]
     path = path_of(points, [10.0, 4.0], runs=[0, 1, 2], dwell=np.array([dwell, 0.0]))
     arcs = [*line_arcs(0, 10.0, 1000.0, 50.0), *line_arcs(1, 4.0, 1000.0, 100.0)]
@@ -73,7 +73,7 @@ def two_runs(dwell: float) -> tuple[Path, SpeedProfile]:
 
 
 def zigzag(seed: int, count: int = 20) -> tuple[Path, SpeedProfile]:
-    """X speeds up at 100 mm/s² to the middle and slows down again, Y is a C1 quadratic spline of it."""
+    """X speeds up at 100 mm/s² until the middle and slows down again; Y is a C1 quadratic spline over X."""
     rng = np.random.default_rng(seed)
     slope = np.cumsum(rng.uniform(-1, 1, count + 1))
     width = rng.uniform(0.5, 2.0, count)
@@ -97,7 +97,7 @@ def zigzag(seed: int, count: int = 20) -> tuple[Path, SpeedProfile]:
 
 
 def trapezoid(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Place and speed at 1000 mm/s² to 50 mm/s on 10 mm: ramps of 0.05 s, 0.15 s between them."""
+    """Position and speed for 10 mm at 1000 mm/s² and up to 50 mm/s: ramps of 0.05 s, 0.15 s between them."""
     up, down = np.minimum(t, 0.05), np.clip(t - 0.2, 0.0, 0.05)
     cruise = np.clip(t - 0.05, 0.0, 0.15)
     return 500 * up**2 + 50 * cruise + 50 * down - 500 * down**2, 1000 * (up - down)
@@ -143,7 +143,7 @@ def test_constant_feed_on_a_parabola_keeps_a_millionth_of_a_step(interpolator: s
 
 
 def test_the_curvature_of_a_parabola_gives_acceleration_and_jerk() -> None:
-    # At the vertex of y = x²/2 with speed v: normal acceleration v², along X the jerk −v³.
+    # At the vertex of y = x²/2 with speed v: normal acceleration v², and jerk −v³ along X.
     path, profile = parabola_case()
     chunk = sampled(path, profile, 0.003).all()
     np.testing.assert_allclose(chunk.velocity[0], [20, 0], atol=1e-12)
@@ -172,7 +172,7 @@ def test_every_run_starts_on_the_grid_and_waits_less_than_a_period(interpolator:
     first, second = (math.ceil(time / period - 1e-9) for time in (0.25 + 0.1, profile.run_times[1]))
     assert stream.count == 1 + first + second
     assert stream.duration == (first + second) * period
-    # The tool arrives after 0.25 s, which is no multiple of the period, and rests until the grid goes on.
+    # The tool arrives after 0.25 s, which is no multiple of the period, and rests until the next setpoint.
     resting = slice(math.ceil(0.25 / period), first + 1)
     assert (chunk.position[resting] == 10.0).all()
     for rates in (chunk.velocity, chunk.acceleration, chunk.jerk):
@@ -259,7 +259,7 @@ def test_positions_velocities_and_accelerations_belong_together(interpolator: st
     path, profile = zigzag(seed)
     period = 0.002
     chunk = sampled(path, profile, period, interpolator).all()
-    # On one arc the trapezium rule is off by T³ × jerk / 12 at most, by T² × jump where the arc changes.
+    # Within an arc the trapezium rule is off by at most T³ × jerk / 12; where the arc changes, by T² × jump.
     same = (np.diff(chunk.piece) == 0) & (np.sign(chunk.acceleration[1:, 0] * chunk.acceleration[:-1, 0]) > 0)
     step = np.diff(chunk.position, axis=0)
     trapezium = period / 2 * (chunk.velocity[1:] + chunk.velocity[:-1])
@@ -306,7 +306,7 @@ def test_the_parameter_moves_at_constant_acceleration(degree: int) -> None:
 
 
 def test_phases_of_constant_axis_velocity_and_of_constant_p_follow_their_law() -> None:
-    # y = x²/2, C' = (1, u): y at a constant 6 mm/s on [1, 2]; p = 4 on [2, 4].
+    # y = x²/2, C' = (1, u): y moves at a constant 6 mm/s on [1, 2]; p = 4 on [2, 4].
     path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0])
     arcs: list[Phase] = [
         (0, PhaseLaw.PARAMETER_ACCELERATION, 255, 0.0, 0.0, 1.0, 36.0, 36.0, 1 / 6),
@@ -382,11 +382,11 @@ def test_a_run_that_ends_in_motion_before_the_last_is_refused() -> None:
 
 
 def test_numbers_do_not_depend_on_the_unit() -> None:
-    # The same part in micrometres.
+    # The same part, with lengths in micrometres.
     path, profile = zigzag(3)
     scale = 1000.0
     micro = replace(path, curve=CompositeCurve.from_pieces(path.curve.by_piece * scale, path.width))
-    # C' grows with the scale; u and p stay.
+    # C' grows with the scale; u and p stay the same.
     faster = replace(profile, value=profile.value * scale)
     first, second = sampled(path, profile, 0.003).all(), sampled(micro, faster, 0.003).all()
     np.testing.assert_allclose(second.position, first.position * scale, rtol=1e-12, atol=1e-9)

@@ -34,7 +34,7 @@ RATES = ("position", "velocity", "acceleration", "jerk")
 
 
 def random_problem(seed: int, degree: int | None = None, rational: bool = True) -> Problem:
-    """A random NURBS curve, every fourth nearly with a cusp, under random limits of all kinds."""
+    """A random NURBS curve, every fourth one nearly with a cusp, with random limits of all kinds."""
     rng = np.random.default_rng(seed)
     degree = int(rng.integers(2, 7)) if degree is None else degree
     axes, spans = int(rng.integers(2, 5)), int(rng.integers(1, 9))
@@ -55,7 +55,7 @@ def random_problem(seed: int, degree: int | None = None, rational: bool = True) 
 
 
 def feed_profile(curve: CompositeCurve, feed: float) -> SpeedProfile:
-    """One arc a piece at one speed."""
+    """A profile with one arc per piece, all at one speed."""
     count = np.arange(len(curve))
     starts = np.append(CurveLength(curve).length(count, np.zeros(len(curve))), CurveLength(curve).total)
     speed = [np.linalg.norm(curve.evaluate(count, u, 1)[1], axis=1) for u in (0 * curve.width, curve.width)]
@@ -66,7 +66,7 @@ def feed_profile(curve: CompositeCurve, feed: float) -> SpeedProfile:
 
 
 def _out_and_ahead(angle: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Radial and tangential directions on a circle."""
+    """Radial and tangential unit vectors on a circle."""
     x, y = np.cos(angle), np.sin(angle)
     return (x, y), (-y, x)
 
@@ -94,7 +94,7 @@ def test_a_circle_at_constant_feed_turns_evenly(interpolator: str, period: float
 @INTERPOLATOR
 @pytest.mark.parametrize("speed", [0.5, 9.0])
 def test_a_line_whose_parameter_speeds_up_is_the_school_formula(interpolator: str, speed: float) -> None:
-    # x'(0) = x'(1) = 3 speed and symmetric; 30 mm from rest to rest at 1000 mm/s².
+    # Symmetric, with x'(0) = x'(1) = 3 speed; 30 mm from rest to rest at 1000 mm/s².
     curve = CompositeCurve.from_bezier([[0.0, 1.0], [speed, 1.0], [30 - speed, 1.0], [30.0, 1.0]])
     half = math.sqrt(30 / 1000)
     peak = float((1000 * half / curve.evaluate(0, 0.5, 1)[1, 0, 0]) ** 2)
@@ -114,7 +114,7 @@ def test_a_line_whose_parameter_speeds_up_is_the_school_formula(interpolator: st
 @INTERPOLATOR
 @pytest.mark.parametrize("rational", [True, False])
 def test_an_axis_that_turns_round_keeps_its_acceleration(interpolator: str, rational: bool) -> None:
-    # x = r − a t²/2 from the side of a circle on; a parabola x = −u²/2, y = u (1 + u/4) as a quintic.
+    # x = r − a t²/2 from the point (r, 0) of a circle; or a parabola x = −u²/2, y = u (1 + u/4) as a quintic.
     a = 500.0
     if rational:
         r = 10.0
@@ -168,7 +168,7 @@ def test_a_higher_degree_changes_no_setpoint(interpolator: str, seed: int) -> No
 
 
 def arcs_of(chunk: SetpointChunk, profile: SpeedProfile) -> NDArray[np.int64]:
-    """The arc on which each setpoint is, −1 at the stops."""
+    """The arc on which each setpoint is; −1 at the stops."""
     ends = np.cumsum(profile.duration)
     arc = np.searchsorted(ends, chunk.t, side="right")
     arc[0] = -1
@@ -189,28 +189,28 @@ def test_planned_curves_are_sampled_within_their_limits(interpolator: str, seed:
     assert (np.abs(chunk.acceleration) <= problem.max_acceleration * (1 + 1e-8)).all()
     assert np.linalg.norm(chunk.velocity, axis=1).max() <= problem.feed[0] * (1 + 1e-8)
     assert stream.stats.length_error < 1e-6
-    # Every setpoint is on the curve, in order, and the end is hit.
+    # Every setpoint is on the curve, in order, and the last one is its end.
     curve = problem.curve
     np.testing.assert_allclose(
         chunk.position, curve.evaluate(chunk.piece, chunk.u)[0], atol=1e-12 * np.abs(chunk.position).max()
     )
     assert (np.diff(chunk.piece + chunk.u / curve.width[chunk.piece]) >= 0).all()
     assert chunk.position[-1].tolist() == curve.control_points[-1].tolist()
-    # The rule of two places and their derivatives, of the fourth order, where one arc holds a few steps.
+    # Hermite quadrature from both ends of a step (fourth order), on arcs of at least five periods.
     arc = arcs_of(chunk, profile)
     same = (arc[:-1] == arc[1:]) & (arc[1:] >= 0) & (profile.duration[arc[1:]] > 5 * period)
     h = np.diff(chunk.t)[:, None]
     for low, middle, high in zip(RATES, RATES[1:], RATES[2:], strict=False):
         x, v, a = (getattr(chunk, name) for name in (low, middle, high))
         off = np.diff(x, axis=0) - h / 2 * (v[1:] + v[:-1]) + h**2 / 12 * np.diff(a, axis=0)
-        # Near a cusp all higher derivatives grow; half of the steps tell.
+        # Near a cusp all higher derivatives grow, so the median over the steps is tested.
         scale = np.abs(np.diff(x, axis=0)).max(axis=1) + h[:, 0] * np.abs(v).max() * 1e-3
         if same.any():
             assert np.median(np.abs(off).max(axis=1)[same] / scale[same]) <= 2e-6, low
 
 
 def test_an_axis_that_has_all_but_turned_round_is_not_taken_for_one_at_rest() -> None:
-    # x = r − a (t + t0)²/2 on a circle: what x does in the time t0 from its turn is nothing; not what y does.
+    # x = r − a (t + t0)²/2 on a circle: within t0 of its turn x hardly moves, but y does.
     r, a = 10.0, 500.0
     curve = CompositeCurve.from_bezier([[r, 0], [r, r], [0, r]], [1, math.sqrt(0.5), 1])
     time, t0 = math.sqrt(2 * r / a), 2e-8
@@ -227,7 +227,7 @@ def test_an_axis_that_has_all_but_turned_round_is_not_taken_for_one_at_rest() ->
 @INTERPOLATOR
 @pytest.mark.parametrize("degree", [3, 6, 9])
 def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: int) -> None:
-    # (s², s³) on s = u − 1 with x slowing down to rest at s = 0 and speeding up again: x = a τ²/2 from there.
+    # (s², s³) with s = u − 1; x slows down to rest at s = 0 and speeds up again: x = a τ²/2, τ from there.
     curve = CompositeCurve.from_bezier([[1.0, -1], [-1 / 3, 1], [-1 / 3, -1], [1, 1]], width=2.0)
     a = 80.0
     time, pace = math.sqrt(2 / a), a / 2
@@ -236,7 +236,7 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
         (0, PhaseLaw.AXIS_ACCELERATION, 0, a, 1.0, 2.0, pace, pace, time),
     )
     problem = problem_along(path_along(curve.elevated(degree)))
-    # The cusp falls between setpoints, next to one, and on one.
+    # The cusp is between setpoints, next to one, or on one.
     for period in (time / 100.5, time / (100 + 1e-7), time / 100):
         chunk = Setpoints(problem, profile, period, interpolator).all()
         moving = slice(0, int(np.searchsorted(chunk.t, 2 * time)))
@@ -249,7 +249,7 @@ def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: in
         )
         for name, values, size in zip(RATES, expected, (1, a * time, a, b), strict=True):
             found = getattr(chunk, name)[moving]
-            # The length of a step says little about the time next to a standstill.
+            # Next to a standstill the length of a step determines the time badly.
             tolerance = {"jerk": 1e-3}.get(name, 1e-7 if interpolator == "sarfraz" else 1e-5) * size
             np.testing.assert_allclose(found, np.stack(values, axis=1), atol=tolerance, err_msg=name)
 
@@ -272,7 +272,7 @@ def test_time_and_place_agree_with_integration(seed: int) -> None:
             return np.asarray(curve.evaluate(piece, u, 1)[1, 0])
 
         if kind in (PhaseLaw.AXIS_ACCELERATION, PhaseLaw.AXIS_VELOCITY):
-            # The way of the axis, from positions, is a quadratic of time.
+            # The position of the axis is a quadratic of time.
             t, rest = chunk.t[row] - starts[i], starts[i] + profile.duration[i] - chunk.t[row]
             a = value if kind == PhaseLaw.AXIS_ACCELERATION else 0.0
             ends = curve.evaluate([piece, piece], [u0, u1])[0][:, axis]
@@ -317,12 +317,12 @@ def test_the_butterfly_is_followed_to_its_end(interpolator: str) -> None:
 
 
 def joints_case(kind: PhaseLaw) -> tuple[Problem, SpeedProfile]:
-    """The tip on x = u, y = u² at a constant speed, or one whose square grows evenly from 25 to 400 mm²/s²;
-    three joints, of degree 9, move it."""
+    """The tip on x = u, y = u² at a constant speed, or with v² that grows linearly in u from 25 to 400
+    mm²/s²; three joints of degree 9 move it."""
     tip = CompositeCurve.from_bezier([[0, 0], [1, 0], [2, 4]], width=2.0)
     rng = np.random.default_rng(5)
     joints = CompositeCurve.from_bezier(np.cumsum(rng.normal(size=(10, 3)), axis=0), width=2.0)
-    # D = 1 + 4 u² on [0, 2].
+    # The squared tip speed per parameter is 1 + 4 u² on [0, 2].
     problem = replace(
         problem_along(path_along(tip)),
         joint_axes=("X", "Y", "B"),
@@ -354,7 +354,7 @@ def test_joints_follow_the_speed_of_the_tip(interpolator: str, kind: PhaseLaw) -
         assert tip_time(speed_sq, float(u)) == pytest.approx(t, abs=1e-10)
     on = problem.joints.evaluate(0, chunk.u, 1)
     np.testing.assert_allclose(chunk.position, on[0], atol=1e-13)
-    # The tip's velocity is (1, 2u) u̇, and u̇ is that of the joints.
+    # The tip's velocity is (1, 2u) u̇ with the u̇ of the joints.
     pace = (chunk.velocity * on[1]).sum(axis=1) / (on[1] ** 2).sum(axis=1)
     wanted = speed_sq[0] + (speed_sq[1] - speed_sq[0]) * chunk.u / 2
     np.testing.assert_allclose(pace**2 * (1 + 4 * chunk.u**2), wanted, rtol=1e-10)

@@ -1,4 +1,4 @@
-"""Setpoints of profiles of limited jerk: closed forms on line and circle, differences on random curves."""
+"""Setpoints of profiles of limited jerk: closed forms on lines and circles, differences on random curves."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SEEDS = range(6)
 
 
 def motion_at(sections: list[tuple[float, float]], t: Array) -> Array:
-    """Way, speed, acceleration and jerk (4, n) of sections from rest."""
+    """Distance, speed, acceleration and jerk (4, n) at times t, for sections that begin at rest."""
     state = np.zeros((4, len(t)))
     begin, at = 0.0, np.zeros(3)
     for duration, jerk in sections:
@@ -51,7 +51,7 @@ def motion_at(sections: list[tuple[float, float]], t: Array) -> Array:
 @INTERPOLATOR
 @pytest.mark.parametrize("degree", [1, 2, 4])
 def test_a_hundred_millimetres_from_rest_to_rest_are_four_cubics(interpolator: str, degree: int) -> None:
-    # 3200 mm/s³ up, down, down and up, 0.25 s each: 2 · 3200 · 0.25³ = 100 mm, in the direction of (3, 4).
+    # 3200 mm/s³ up, down, down and up for 0.25 s each: 2 · 3200 · 0.25³ = 100 mm, in the direction (3, 4).
     points = np.linspace(0.0, 100.0, degree + 1)[:, None] * [0.6, 0.8]
     curve = CompositeCurve.from_bezier(points, width=7.0)
     sections = rest_to_rest(100.0, 3200.0)
@@ -63,11 +63,11 @@ def test_a_hundred_millimetres_from_rest_to_rest_are_four_cubics(interpolator: s
     expected = motion_at(sections, chunk.t)
     first = chunk.position[1, 0] / 0.6
     assert first == pytest.approx(3200.0 * 0.001**3 / 6, rel=1e-6)
-    # At a switching point rounding may choose either arc's jerk.
+    # At a switching point rounding may select the jerk of either arc.
     inside = ~switching(profile, chunk.t, 1e-9)
     for name, values, scale in zip(RATES, expected, (100.0, 200.0, 800.0, 3200.0), strict=True):
         away = np.abs(getattr(chunk, name) - values[:, None] * [0.6, 0.8])
-        # A time found from a place has but a third of its digits next to rest.
+        # Next to rest, a time that is found from a position has only a third of the digits.
         share = 1e-12 if interpolator == "sarfraz" else 1e-10
         assert away[inside if name == "jerk" else slice(None)].max() <= share * scale, name
     assert chunk.position[-1].tolist() == curve.control_points[-1].tolist()
@@ -75,7 +75,7 @@ def test_a_hundred_millimetres_from_rest_to_rest_are_four_cubics(interpolator: s
 
 
 def switching(profile: SpeedProfile, t: Array, within: float) -> NDArray[np.bool_]:
-    """Whether another arc begins within a time of each (n,)."""
+    """Whether an arc begins or ends within the time `within` of each t (n,)."""
     ends = np.append(0.0, np.cumsum(profile.duration))
     return np.asarray(np.abs(t[:, None] - ends).min(axis=1) <= within)
 
@@ -107,7 +107,7 @@ def test_a_circle_at_constant_tangential_jerk_is_exact(interpolator: str) -> Non
 
 
 def random_curve(seed: int) -> CompositeCurve:
-    """A cubic B-spline or a rational one of degree 4 in two to six axes; no cusp comes near."""
+    """A cubic B-spline or a rational one of degree 4 in two to six axes, far from any cusp."""
     rng = np.random.default_rng(seed)
     axes, spans = 2 + seed % 5, 4
     degree = 3 if seed % 2 else 4
@@ -120,7 +120,7 @@ def random_curve(seed: int) -> CompositeCurve:
 
 
 def profiles(curve: CompositeCurve, seed: int) -> list[SpeedProfile]:
-    """One of each kind of arc."""
+    """One profile of each law of limited jerk along the curve."""
     length = CurveLength(curve).total
     wave = 2 * np.pi * (1 + seed % 3) / length
     cubic = cubic_speed(
@@ -133,7 +133,7 @@ def profiles(curve: CompositeCurve, seed: int) -> list[SpeedProfile]:
 
 
 def differences_agree(chunk: SetpointChunk, profile: SpeedProfile, period: float) -> None:
-    """Each rate is the central difference of the one before, the jerk the third one of the positions."""
+    """Asserts that each rate is the central difference of the lower one, and jerk the third of positions."""
     inside = ~switching(profile, chunk.t, 3.01 * period)
     inside[:3] = inside[-4:] = False
     at = np.flatnonzero(inside)
@@ -157,7 +157,7 @@ def test_rates_on_random_curves_are_the_differences_of_the_positions(interpolato
         stream = Setpoints(problem_along(path_along(curve)), profile, period, interpolator)
         chunk = stream.all()
         differences_agree(chunk, profile, period)
-        # Newton's error is in parts of each step: from rest the first is shorter than 1e-7 mm.
+        # Newton's error is relative to each step; the first step from rest is shorter than 1e-7 mm.
         assert stream.stats.length_error < (1e-6 if interpolator == "sarfraz" else 1e-5)
         assert stream.stats.iterations <= 30
         if (profile.kind == PhaseLaw.PATH_JERK).all():
@@ -168,7 +168,7 @@ def test_rates_on_random_curves_are_the_differences_of_the_positions(interpolato
 @INTERPOLATOR
 @pytest.mark.parametrize("seed", SEEDS)
 def test_joints_follow_the_motion_of_the_tip(interpolator: str, seed: int) -> None:
-    # The tip on x = u, y = u²: D = 1 + 4 u² on [0, 2]. Joints of degree 3 to 9 move it.
+    # The tip on x = u, y = u²: squared speed per parameter 1 + 4 u² on [0, 2]; joints of degree 3 to 9.
     tip = CompositeCurve.from_bezier([[0, 0], [1, 0], [2, 4]], width=2.0)
     rng = np.random.default_rng(seed)
     joints = CompositeCurve.from_bezier(
@@ -191,7 +191,7 @@ def test_joints_follow_the_motion_of_the_tip(interpolator: str, seed: int) -> No
         if profile is jerk:
             np.testing.assert_allclose(s, motion_at(sections, chunk.t)[0], atol=1e-12)
         else:
-            # From 5 mm/s with v² growing by 60 mm/s² for each mm: v = 5 + 30 t.
+            # From 5 mm/s with v² growing by 60 mm²/s² per mm: v = 5 + 30 t.
             np.testing.assert_allclose(s, 5.0 * chunk.t + 15.0 * chunk.t**2, atol=1e-12)
 
 

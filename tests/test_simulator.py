@@ -17,7 +17,7 @@ from feedplan.today import time_by
 from tests.planners import controller_programs
 
 TOLERANCE = 0.05
-# Corners of all angles, a tool change and a pause.
+# Corners of many angles, a tool change and a pause.
 _LINES = controller_programs.zigzag(TOLERANCE).splitlines()
 PROGRAM = "\n".join(["T1 M6", *_LINES[:7], "M3 S1000", "G4 P0.2", *_LINES[7:12], "M5", "M2", ""])
 
@@ -52,11 +52,11 @@ def test_the_simulator_takes_the_models_time_and_plays_the_stream_to_the_last_bi
     assert second.motion + pauses == pytest.approx(model(again), rel=0.05)
     setpoints = plan.setpoints().all()
     np.testing.assert_array_equal(third.played, setpoints.position)
-    # Each stop is hit at a whole period and costs less than one.
+    # Each stop is delayed to a whole period and costs less than one period.
     assert 0.0 <= setpoints.t[-1] - plan.time < MACHINE.period * (len(plan.path.runs) + 1)
     assert setpoints.t[-1] < first.motion + pauses
     way = places(plan.program, MACHINE)
-    # LinuxCNC leaves out points and rounds corners, both within P.
+    # LinuxCNC joins lines and rounds corners, each within P.
     for run in (first, second):
         assert greatest_distance(run.position[run.moving], way) < 2.0 * TOLERANCE
     assert greatest_distance(third.played, way) < 1.001 * TOLERANCE

@@ -1,4 +1,4 @@
-"""The controller of today: in machine files, from Python and on the command line."""
+"""The controller of today: in machine files, in Python and on the command line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from feedplan.today import time_by
 A, V = 500.0, 100.0
 AXES = tuple(Axis(name, V, A) for name in "XYZ")
 PLANE = Machine("plane", AXES)
-# A line, a right angle, a line.
+# Two lines at a right angle.
 ANGLE = "G21 G90 G64 P0.05 F3000\nG1 X40\nY30\nM2\n"
 
 
@@ -40,7 +40,7 @@ def test_a_machine_file_names_its_controller(name: str) -> None:
     assert again.controller == Controller(name)
     short = machine.to_toml().replace(f'[controller]\ntype = "{name}"\n', "")
     assert Machine.from_toml(f'controller = "{name}"\n{short}', "mine.toml") == machine
-    # Every parameter is an option of its method, and its default may be given.
+    # Every parameter is an option of its method, and its default value is accepted.
     model = MODELS[name]
     assert model.method in methods()
     assert set(Controller(name).options) <= set(options_of(model.method))
@@ -150,7 +150,7 @@ def test_a_comparison_tells_what_each_method_saves(program: Path) -> None:
 
 
 def test_one_step_more_of_the_feed_shortens_lines_at_the_feed() -> None:
-    # One line at the feed, with X's acceleration at both ends.
+    # One line at the feed, with ramps at X's acceleration at both ends.
     length, feed = 40.0, 50.0
     made = plan(f"G21 G90 G64 F{60 * feed:g}\nG1 X{length:g}\nM2\n", Machine("mine", AXES, controller="grbl"))
     steps = {step.limit: step for step in one_step_more(made)}
@@ -190,7 +190,7 @@ def test_the_commands_print_it(program: Path, tmp_path: Path, capsys: pytest.Cap
     blocks = [*options, "--controller-option", "block_buffer_size=31", "--json"]
     assert main(["plan", str(program), "--machine", str(mine), *blocks]) == 0
     assert json.loads(capsys.readouterr().out)["today"]["parameters"]["block_buffer_size"] == 31
-    # Another controller does not get the parameters in the machine file.
+    # Another controller does not use the parameters in the machine file.
     assert main(["plan", str(program), "--machine", str(mine), "--controller", "marlin", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["today"]["parameters"] == {}
     assert main(["plan", str(program), "--machine", "mill", "--json"]) == 0

@@ -1,4 +1,4 @@
-"""A plan as functions of time and length: closed forms, agreement with setpoints, and what is refused."""
+"""A plan as functions of time and of length: closed forms, agreement with setpoints, and refused values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LINE = Machine("line", (Axis("X", 100.0, 1000.0, max_jerk=20_000.0),))
 
 
 def _line() -> Plan:
-    """100 mm: 0.1 s up to 100 mm/s on 5 mm, 0.9 s at it, 0.1 s down."""
+    """100 mm: 0.1 s and 5 mm up to 100 mm/s, 0.9 s at 100 mm/s, 0.1 s down."""
     return plan(Path.from_bezier([[0.0], [100.0]]), LINE)
 
 
@@ -93,7 +93,7 @@ def test_a_time_that_is_not_within_the_plan_is_refused(t: object, sentence: str)
 
 
 def test_a_path_is_told_by_its_length() -> None:
-    # A quarter of a circle of radius 20 mm about (0, 0), then a line along −X.
+    # A quarter circle of radius 20 mm about (0, 0), then a line along −X.
     root = 0.5**0.5
     arc = CompositeCurve.from_bezier([[20, 0], [20, 20], [0, 20]], [1, root, 1])
     line = CompositeCurve.from_bezier([[0, 20], [-7, 20]])

@@ -1,4 +1,4 @@
-"""Axes in any unit: in every file and table, and without a scale of their own."""
+"""Axes in any unit, in every file and table; no unit has a scale of its own."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_a_text_that_is_no_unit_is_refused(unit: Any) -> None:
 @pytest.mark.parametrize("scale", [1e-3, 1e3, 1e6])
 @pytest.mark.parametrize("method", ["bang-bang", "jerk-limited", "s-curve", "clarabel"])
 def test_the_plan_is_the_same_in_any_unit(method: Any, scale: float) -> None:
-    """Numbers from a thousandth to a million: no length has a scale."""
+    """Lengths times 1e-3 to 1e6: no planner contains a length."""
     one, other = (feedplan.plan(spline(by), arm("rad", by), method) for by in (1.0, scale))
     rel = {"bang-bang": 1e-9, "s-curve": 1e-6}.get(method, 2e-4)
     assert other.time == pytest.approx(one.time, rel=rel)

@@ -1,4 +1,4 @@
-"""Arguments of wrong types: every public function takes them or refuses them in one sentence."""
+"""Arguments of wrong types: every public function accepts them or refuses them in one sentence."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LONGEST = 300
 
 
 class Odd:
-    """A type that no function takes, with a text that is long and of several lines."""
+    """A type that no function accepts; its text is long and has several lines."""
 
     def __repr__(self) -> str:
         return "very odd\n" * 1000
@@ -71,12 +71,12 @@ WRONG: list[Any] = [
     int,
     Odd(),
 ]
-# Functions are left out: exceptions of a progress function go to its owner.
+# Functions are left out, because an exception of a progress function is raised unchanged.
 NO_FUNCTIONS = [value for value in WRONG if not callable(value)]
 
 
 def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Functions by name, with valid arguments; positional ones have the names in the signature."""
+    """Functions by name, each with valid arguments by name."""
     file = tmp_path / "part.ngc"
     file.write_text(PROGRAM)
     table = tmp_path / "tool.tbl"
@@ -252,7 +252,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
 
 
 def outcome(function: Callable[..., Any], arguments: dict[str, Any]) -> str | None:
-    """An error in the function's reaction to these arguments; None if there is none."""
+    """What is wrong with the function's reaction to these arguments; None if nothing is."""
     try:
         function(**arguments)
     except FeedplanError as error:

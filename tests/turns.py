@@ -1,4 +1,4 @@
-"""Arcs and circles as exact rational quadratics, each of a quarter turn at most."""
+"""Arcs and circles as exact rational quadratics, each with at most a quarter turn."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def arc(start: ArrayLike, centre: Sequence[float], sweep: float) -> CompositeCur
 
 
 def circle(centre: Sequence[float], radius: float) -> CompositeCurve:
-    """The full circle in X and Y; other coordinates of the centre are those of all points."""
+    """The full circle in X and Y; further coordinates of the centre are those of all points."""
     whole = arc([centre[0] + radius, centre[1]], centre[:2], 2.0 * math.pi)
     others = np.tile(np.asarray(centre[2:], dtype=float), (len(whole.control_points), 1))
     points = np.concatenate([whole.control_points, others], axis=1)

@@ -32,14 +32,14 @@ from feedplan.today import time_by
 Array = NDArray[np.float64]
 
 MACHINE = Machine("simulated", tuple(Axis(name, 100.0, 500.0) for name in "XYZ"), period=0.001)
-# Distance of the points of a path [mm].
+# Distance between the points that represent a path [mm].
 _APART = 0.01
 _COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*")
 _MM_PER_INCH = 25.4
 
 
 def prepared(content: bytes, feeds: float, tolerance: float) -> bytes:
-    """The program with its F words times `feeds`, and with the tolerance [mm] in G64 without P."""
+    """The program with its F words times `feeds`, and with P `tolerance` [mm] in each G64 without P."""
     code = _COMMENT.sub(lambda found: b" " * len(found[0]), content)
     unit = _MM_PER_INCH if re.search(rb"[Gg]0*20(?![\d.])", code) else 1.0
     edits = [
@@ -58,7 +58,7 @@ def prepared(content: bytes, feeds: float, tolerance: float) -> bytes:
 def places(program: Program, machine: Machine) -> Array:
     """Points of the programmed path (n, 3)."""
     path = build_path(program, machine, corners=Corners.PROGRAMMED)
-    # With the ends of all pieces, among which are the corners.
+    # The ends of all pieces are included, so that every corner is a point.
     ends = path.lengths.length(np.arange(len(path)), path.width)
     s = np.union1d(np.arange(0.0, path.length, _APART), np.minimum(ends, path.length))
     whole = np.zeros((len(s), 3))
@@ -67,7 +67,7 @@ def places(program: Program, machine: Machine) -> Array:
 
 
 def greatest_distance(points: Array, way: Array) -> float:
-    """The greatest distance of points from a polyline of short lines [mm]."""
+    """The greatest distance of points from a polyline whose lines are short [mm]."""
     near = np.clip(cKDTree(way).query(points)[1], 1, len(way) - 2)
     best = np.full(len(points), np.inf)
     for first in (near - 1, near):
@@ -79,7 +79,7 @@ def greatest_distance(points: Array, way: Array) -> float:
 
 
 def row(file: Path, machine: Machine, feeds: float, tolerance: float) -> dict[str, Cell]:
-    """A line of the table. Raises SimulatorError and FeedplanError."""
+    """One row of the table. Raises SimulatorError and FeedplanError."""
     original = prepared(file.read_bytes(), feeds, tolerance)
     program = feedplan.read_program(original, machine, name=file.name)
     # LinuxCNC and the plan follow a program without G64 within the same tolerance.

@@ -1,4 +1,4 @@
-"""Runs LinuxCNC's HAL, of which a computer can have only one, isolated in its own processes and memory."""
+"""Runs LinuxCNC's HAL isolated in its own processes and memory, because a computer can run only one HAL."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from pathlib import Path
 
 # LinuxCNC's modules are installed for the system's Python.
 PYTHON = "/usr/bin/python3"
-# A user without rights; HAL refuses to run as root without one.
+# A user without privileges: as root, HAL runs only if it is given another user.
 _NOBODY = "65534"
 _ALONE = ["unshare", "--pid", "--fork", "--kill-child", "--mount-proc", "--ipc", "--net"]
 
 
 def missing() -> str | None:
-    """A sentence that tells why HAL cannot run here; None if it can."""
+    """Why HAL cannot run here, in one sentence; None if it can."""
     if shutil.which("halrun") is None:
         return "LinuxCNC is not installed: apt-get install linuxcnc-uspace"
     found = subprocess.run([PYTHON, "-c", "import hal; hal.stream"], env=_clean(), capture_output=True)
@@ -30,8 +30,8 @@ def missing() -> str | None:
 
 
 def alone() -> list[str]:
-    """The words before a command that isolate its processes, shared memory and ports, which end with it;
-    empty if the system does not allow that."""
+    """The start of a command that isolates the processes, shared memory and ports of the command after it,
+    which all end with it; empty if the system does not allow that."""
     allowed = shutil.which("unshare") and subprocess.run([*_ALONE, "true"], capture_output=True)
     return _ALONE if allowed and allowed.returncode == 0 else []
 

@@ -1,9 +1,9 @@
-"""The user interface of LinuxCNC in the simulator: switches the machine on, does the runs, records the
+"""The user interface of LinuxCNC in the simulator: switches the machine on, executes the runs and records the
 joints.
 
-LinuxCNC starts this file as [DISPLAY], with the Python that LinuxCNC is installed for. `runs.json` beside it
-has the runs (programs and streams) in order; `rows.bin` gets a number for each of `PINS` in each servo period
-of a run, `said.json` the messages of LinuxCNC.
+LinuxCNC starts this file as [DISPLAY], with the Python for which LinuxCNC is installed. `runs.json` in the
+same folder lists the runs (programs and streams) in order. `rows.bin` gets one number per pin of `PINS` in
+each servo period of a run, `said.json` the messages of LinuxCNC.
 """
 
 from __future__ import annotations
@@ -20,18 +20,19 @@ import hal
 import linuxcnc
 
 FOLDER = Path(__file__).parent
-# Joints; in motion; a stream is to be played; the stream has no row; number of the run from 1.
+# Types of the recorded pins: three joints; in motion; a stream is to be played; the stream has no row; number
+# of the run, from 1.
 PINS = "fffbbbs"
 # The key of sampler's shared memory.
 SAMPLER = 0x48534130
-# A stream is played once HAL's memory has this number of its rows.
+# A stream starts to play when HAL's memory holds this many of its rows.
 READY = 8000
-# Longest time until the machine is on, and until a program begins [s].
+# Longest wait for the machine to switch on, and for a program to begin [s].
 PATIENCE = 30.0
 
 
 class Simulator:
-    """A machine that is on, and the recorder of its joints."""
+    """A machine that is switched on, and the recorder of its joints."""
 
     def __init__(self) -> None:
         self.command, self.status = linuxcnc.command(), linuxcnc.stat()
@@ -52,7 +53,7 @@ class Simulator:
         self.recorder.start()
 
     def record(self) -> None:
-        """Writes rows of runs until `stop`."""
+        """Writes the rows of runs to the file until `recording` is False."""
         row = struct.Struct(f"<{len(PINS)}d")
         with (FOLDER / "rows.bin").open("wb") as file:
             while self.recording or self.samples.readable:
@@ -89,7 +90,7 @@ class Simulator:
         return status.interp_state == linuxcnc.INTERP_IDLE and status.inpos and status.queue == 0
 
     def to_start(self, startup: str) -> None:
-        """Sets the modes for the begin of a program, and moves the tool to the origin."""
+        """Moves the tool to the origin and sets the modes in which a program begins."""
         self.command.mode(linuxcnc.MODE_MDI)
         self.command.wait_complete(PATIENCE)
         for block in ("G40 G49 G80 G90 G92.1 G54", "G53 G0 X0 Y0 Z0", startup):
@@ -119,8 +120,8 @@ class Simulator:
         def depth() -> int:
             return hal.get_value("streamer.0.curr-depth")
 
-        # HAL tells the rows in its memory once in a period, which may come late: the end of the feeder tells
-        # nothing of them.
+        # HAL updates the number of rows in its memory once a period, perhaps late: the end of the feeder
+        # process does not mean that the memory holds its rows.
         try:
             self.wait(lambda _: depth() >= ready, seconds)
             self.pins["play"] = True

@@ -1,8 +1,8 @@
-"""A session of LinuxCNC's simulator: a machine of X, Y and Z, programs and streams one after the other.
+"""A session of LinuxCNC's simulator: a machine with X, Y and Z runs programs and streams one after the other.
 
 The machine is ideal: its joints follow their commands at once. `mux2` switches the joints between LinuxCNC's
-own motion and the stream, and `sampler` records them in every servo period. A program without G64 is followed
-within `tolerance` (G64 P).
+own motion and the stream, and `sampler` records them in every servo period. Programs without G64 run with
+`tolerance` (G64 P).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 NAMES = ("X", "Y", "Z")
-# Longest time for start, stop and changes between runs [s], and longest time of a run over the expected one.
+# Longest time for start, stop and changes between runs [s], and of a run, over the expected time.
 _BESIDE, _PATIENCE = 60.0, 3.0
-# Depth of the stream in HAL's memory [periods].
+# Number of rows of a stream that HAL's memory holds [periods].
 _DEPTH = 16000
-# The persistent parameters: the least number that LinuxCNC wants in its file.
+# Numbers of the persistent parameters: the smallest set that LinuxCNC requires in its file.
 _KEPT = (
     *range(5161, 5170),
     *range(5181, 5190),
@@ -124,12 +124,12 @@ exec linuxcnc -r "$1/machine.ini"
 
 
 class SimulatorError(Exception):
-    """LinuxCNC could not run; the text is its message in one sentence."""
+    """LinuxCNC could not run the session; the text is its message in one sentence."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run of about `seconds`: the text of a program, or the file of a stream."""
+    """A run that takes about `seconds`: the text of a program, or the file of a stream."""
 
     what: bytes | Path
     seconds: float
@@ -137,8 +137,8 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """The joints in every servo period of a run: `position` (n, 3) [mm], whether LinuxCNC's own planner is
-    in motion (n,), whether a row of a stream is played (n,); and the messages of the run."""
+    """The joints in every servo period of a run: `position` (n, 3) [mm], `moving` (n,) while LinuxCNC's own
+    planner moves, `playing` (n,) while a row of a stream is played; and the messages of the run."""
 
     period: float
     position: Array

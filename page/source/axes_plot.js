@@ -8,13 +8,13 @@ import { axisColour, style } from "./theme.js";
 
 const PER = { velocity: "s", acceleration: "s²", jerk: "s³" };
 const HEIGHT = { speed: 120, others: 150 };
-/* The legend of so many axes is beside their limits; that of more is below them. */
+/* A legend of at most this many axes is beside their limits, a longer one is below them. */
 const MOST_BESIDE = 3;
-/* Values below this part of the limit are rounding. */
+/* Values below this share of the limit are rounding. */
 const ROUNDING = 1e-6;
 
 export class AxesPlot {
-  /* `rows` are names of quantities; with `relative` values are drawn over their limits. */
+  /* `rows` are names of quantities; with `relative` values are drawn in percent of their limits. */
   constructor(container, data, run, cursor, { rows = ["speed", "velocity", "acceleration", "jerk"], relative = false } = {}) {
     Object.assign(this, { data, run, rows, relative });
     this.tops = {};
@@ -59,8 +59,8 @@ export class AxesPlot {
     this.show();
   }
 
-  /* A quantity that the method does not limit may have single high spikes: they are cut at the top of the chart, which is
-     not below the machine's limit. What is 0 but for rounding has the scale of the limit. */
+  /* The greatest value on the scale of a curve. A quantity that the method does not limit may have single high spikes:
+     the chart cuts them, but not below the machine's limit. A curve that is 0 up to rounding has the scale of the limit. */
   #reach(name, curve, k) {
     const top = greatest(curve.y), limit = this.data.limits[name][k] || 0;
     if (this.data.judged.includes(name)) return top;
@@ -89,7 +89,7 @@ export class AxesPlot {
     const unit = inParts ? "%" : [...new Set(units)].map((own) => `${own}/${PER[name]}`).join(", ");
     const curves = known.map((k) => ({ name: axes[k], curve: time[name][k], colour: `--axis-${k % 9}`, scale: scales[k] }));
     const top = Math.max(0, ...known.map((k) => this.tops[name][k] * scales[k]));
-    // A limit is drawn only if it is near the curves, so that they keep their scale; its value is beside the chart.
+    // A limit far above the curves is not drawn, so that the curves keep their scale; its value is beside the chart.
     const ends = [...limits, ...least].map((limit, n) => limit && limit * scales[n % limits.length]);
     const near = [...new Set(ends)].filter((value) => value && Math.abs(value) <= 2 * top);
     const lines = near.map((value) => {
@@ -111,7 +111,7 @@ function told({ axes, units, limits, least }, name, isJudged) {
     return { text, unit: `${units[k]}/${PER[name]}` };
   });
   if (!known.length) return "";
-  // A unit is told once, after the last of the axes in a row that have it.
+  // Neighbouring axes with the same unit share it: it follows the last of them.
   const list = known.map(({ text, unit }, k) => (known[k + 1]?.unit === unit ? text : `${text} ${unit}`)).join(", ");
   return isJudged ? `limits ${list}` : `not limited by this method (machine: ${list})`;
 }

@@ -11,10 +11,10 @@ const listed = (text) => text.split(" ").map((colour) => channels(`#${colour}`))
 const SCALES = { viridis: listed(VIRIDIS), cividis: listed(CIVIDIS) };
 const kinds = listed(KINDS);
 
-/* The end of a scale that is hardly visible on the background is left out. */
+/* Leaves out the end of a scale that is hardly visible on the background. */
 const part = (at) => (isDark() ? 0.12 + 0.88 * at : 0.9 * at);
 
-/* Red, green and blue, 0 to 255, of a value from 0 to 1 on a scale. */
+/* The colour of a value from 0 to 1 on a scale: red, green and blue, 0 to 255. */
 export function mixed(scale, value) {
   const colours = SCALES[scale];
   const at = part(Math.min(Math.max(value, 0), 1)) * (colours.length - 1);

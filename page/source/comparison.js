@@ -9,8 +9,8 @@ import { Run } from "./run.js";
 import { onTheme } from "./theme.js";
 
 const ACROSS = { length: "over length", time: "over time" };
-/* Colours of the methods after the first: those of axes, without the blue ones, which are too near to the first
-   method's; the two that are near to each other come last. */
+/* Colours of the methods after the first: those of the axes except blue ones, which are too similar to the first
+   method's. Of the rest the two that are similar to each other come last. */
 const OTHERS = ["--axis-0", "--axis-1", "--axis-4", "--axis-6", "--axis-8", "--axis-3"];
 const DASHES = [undefined, [2, 3], [8, 4]];
 
@@ -33,7 +33,7 @@ export function comparison(data) {
   });
   cursor.follow((time) => speed.point(time === null ? null : across === "time" ? time : runs[chosen].lengthAt(time)));
 
-  /* The chart is scaled by the cutting speeds: much faster rapids are cut at its top. */
+  /* The chart has the scale of the cutting speeds; much faster rapids are cut off at its top. */
   const reach = 1.25 * Math.max(...methods.map((method) => method.cutting_speed)) || 1;
   const top = Math.max(...methods.map((method) => greatest(method.speed)));
   function drawSpeed() {

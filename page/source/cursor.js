@@ -11,7 +11,7 @@ export class Cursor {
     for (const listener of this.#listeners) listener(time, from);
   }
 
-  /* Calls `listener(time, from)` after each change; returns a function that ends this. */
+  /* Calls `listener(time, from)` after each change; returns a function that removes the listener. */
   follow(listener) {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);

@@ -2,17 +2,17 @@
 
 import { lastUpTo } from "./numbers.js";
 
-/* Reduces a curve { x, y, mean } from `from` to `to` to two values for each column of pixels: the extremes in
-   their order, so that no peak is lost. If the curve oscillates faster than the pixels, the values are its mean,
-   and `low` and `high` its extremes; of a limit that oscillates so fast only the least values are drawn. `top` is
-   the top of the chart. */
+/* Reduces the part of a curve { x, y, mean } between `from` and `to` to two values for each column of pixels: the
+   extremes in their order, so that no peak is lost. If the curve oscillates faster than the pixels, the values are
+   its mean, and `low` and `high` its extremes; of such a limit only the least values are drawn. `top` is the greatest
+   value that the chart shows. */
 export function sampled(curve, from, to, columns, { isLimit = false, top = Infinity, scale = 1 } = {}) {
   const low = new Float64Array(2 * columns), high = new Float64Array(2 * columns), y = new Float64Array(2 * columns);
   const step = (to - from) / columns;
   let variation = 0, least = Infinity, most = -Infinity, before = NaN;
   let i = lastUpTo(curve.x, from);
   for (let k = 0; k < columns; k += 1) {
-    // The last column has the end of the curve too, which differs from `to` by the rounding of sums.
+    // The last column is longer: the end of the curve may be beyond `to` by the rounding of sums.
     const start = from + k * step, end = start + (k + 1 < columns ? step : 2 * step);
     while (i + 1 < curve.x.length && curve.x[i + 1] <= start) i += 1;
     const first = at(curve, i, start);

@@ -9,7 +9,7 @@ export function unpacked(buffer) {
   return JSON.parse(text, (_, value) => (value?.array ? numbers(buffer, start + value.at, value) : value));
 }
 
-/* An array of `count` numbers whose first bytes are at `from`, then the second bytes of all, and so on. */
+/* An array of `count` numbers: at `from` are the first bytes of all numbers, then all second bytes, and so on. */
 function numbers(buffer, from, { array, count }) {
   const all = new KINDS[array](count);
   const size = all.BYTES_PER_ELEMENT;

@@ -4,15 +4,15 @@
 import { extent } from "./numbers.js";
 
 const POINTS = 16384; // points of a chunk
-const COARSER = 4; // tolerance of a level over that of the level before
-const FEWEST = 128; // least points of a level
-const WIDEST = 0.02; // greatest tolerance over the extent of the path
+const COARSER = 4; // ratio of the tolerances of successive levels
+const FEWEST = 128; // a level with at most this number of points has no coarser one
+const WIDEST = 0.02; // greatest tolerance, as a share of the extent of the path
 
 /* Yields the chunks of a path: { centre, radius, levels }; a level is { tolerance, index }, where `index` are
    numbers of points. The last point of a chunk is the first point of the next. */
 export function* chunks(path) {
   const size = Math.hypot(...[path.x, path.y, path.z].map((values) => span(extent(values))));
-  // 1e-2 of the top speed has the weight of 1e-4 of the extent, as in `report/tool_path.py`.
+  // An error of 1e-2 of the top speed counts like one of 1e-4 of the extent, as in `report/tool_path.py`.
   const weight = path.cutting_speed > 0 ? (0.01 * size) / path.cutting_speed : 0;
   const count = path.x.length;
   for (let first = 0; first + 1 < count; first += POINTS) {
@@ -41,8 +41,8 @@ function levels(path, index, weight, widest) {
   return found;
 }
 
-/* Every second point is a candidate. It is removed if its distance from the line between its neighbours, plus the
-   distances of earlier removals, is within the tolerance. */
+/* Removes points in passes: in each, every second point is removed if its distance from the line between its
+   neighbours, plus the error of earlier removals there (`cost`), is within the tolerance. */
 function thin(path, index, cost, tolerance, weight) {
   let gone = 1, parity = 1, idle = 0;
   while (idle < 2 && index.length > 2) {
@@ -70,7 +70,7 @@ function thin(path, index, cost, tolerance, weight) {
   return { index, cost };
 }
 
-/* Distance of the point i from the segment from a to b; the speed is a fourth coordinate. */
+/* Distance of the point i from the segment from a to b, with the speed times w as a fourth coordinate. */
 function off({ x, y, z, speed }, w, i, a, b) {
   const bx = x[b] - x[a], by = y[b] - y[a], bz = z[b] - z[a], bs = w * (speed[b] - speed[a]);
   const px = x[i] - x[a], py = y[i] - y[a], pz = z[i] - z[a], ps = w * (speed[i] - speed[a]);

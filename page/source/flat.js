@@ -2,10 +2,10 @@
 
 import { NONE } from "./modes.js";
 
-const STEPS = 48; // different colours of a scale
-const MOST = 60000; // most points drawn
+const STEPS = 48; // number of colours of a scale
+const MOST = 60000; // greatest number of points that are drawn
 
-/* `levels` are those of `detail.js`; `colours` are CSS colours; a value is 0 to 1, or the number of a kind. */
+/* `levels` are those of `detail.js`, `colours` CSS colours; a value is from 0 to 1, or the number of a kind. */
 export function drawFlat(context, path, levels, project, { values, isKind }, colours, none, width) {
   const every = Math.ceil(levels.reduce((sum, { index }) => sum + index.length, 0) / MOST);
   context.lineJoin = "round";

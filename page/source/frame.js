@@ -3,11 +3,11 @@
 import { shown } from "./numbers.js";
 import { font, style } from "./theme.js";
 
-const NEAREST = 48; // about the least number of pixels between two ticks
+const NEAREST = 48; // approximate least distance of two ticks in pixels
 const AXES = ["X", "Y", "Z"];
 
-/* `project` maps a point [mm] to pixels; `low` and `high` are opposite corners of the box; with `isNarrow` the
-   names of the axes have no units. */
+/* `project` maps a point [mm] to pixels; `low` and `high` are opposite corners of the box; `isNarrow` leaves out
+   the units of the axes. */
 export function drawFrame(context, project, low, high, isNarrow) {
   const ink = style("--soft"), faint = style("--faint");
   context.font = font(12);
@@ -56,14 +56,14 @@ function ticks(context, [a, b, start], axis, low, high, size, [ax, ay], ink, pro
   context.font = font(12);
 }
 
-/* The unit vector across an edge, away from the middle of the box. */
+/* The unit vector at right angles to an edge that points away from the middle of the box. */
 function away([a, b], centre) {
   const x = a[1] - b[1], y = b[0] - a[0], size = Math.hypot(x, y) || 1;
   const side = x * (a[0] - centre[0]) + y * (a[1] - centre[1]) < 0 ? -1 : 1;
   return [(side * x) / size, (side * y) / size];
 }
 
-/* The least of 1, 2, 5 times a power of ten that is not below the value. */
+/* The least number 1, 2 or 5 times a power of ten that is not below the value. */
 function tidy(step) {
   const power = 10 ** Math.floor(Math.log10(step));
   return power * ([1, 2, 5].find((factor) => factor * power >= step * (1 - 1e-9)) ?? 10);

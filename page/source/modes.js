@@ -3,10 +3,10 @@
 import { css, kindColour } from "./colours.js";
 import { extent, shown } from "./numbers.js";
 
-export const NONE = -1; // no value at this point: drawn thin and grey
+export const NONE = -1; // a point without a value, which is drawn thin and grey
 
-/* Each mode makes of a path { values, scale, ends }, with values from 0 to 1 and the texts at the ends of the
-   scale, or { values, colours, kinds }, with the number of a kind as value. */
+/* `of` converts a path to { values, scale, ends }, with values from 0 to 1 and the texts at the ends of the scale,
+   or to { values, colours, kinds }, with the number of a kind as value. */
 export const MODES = {
   speed: { label: "planned speed", of: (path) => scaled(path, path.speed, path.cutting_speed, "viridis") },
   feed: { label: "programmed feed", of: (path) => scaled(path, path.feed, extent(path.feed)[1], "viridis") },
@@ -40,7 +40,7 @@ function timeLost(path) {
   };
 }
 
-/* The values at a point as texts. */
+/* The data of the point i as texts. */
 export function told(path, i) {
   const feed = path.feed[i] > 0 ? `feed ${shown(path.feed[i])} ${path.unit}/s` : "rapid";
   return [

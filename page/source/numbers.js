@@ -10,7 +10,7 @@ export function shown(value, digits = 4) {
   return rest ? `${apart}.${rest}` : apart;
 }
 
-/* A number beside a chart: as a power of ten where it has more than eight characters without its sign. */
+/* A number beside a chart; with an exponent if it would have more than eight characters without its sign. */
 export function tick(value) {
   const text = shown(value, 6);
   return text.replace("−", "").length <= 8 ? text : Number(value.toPrecision(6)).toExponential().replace(/^-/, "−").replace("+", "");
@@ -21,7 +21,7 @@ export function duration(seconds) {
   if (!Number.isFinite(seconds)) return "–";
   if (Math.abs(seconds) < 1) return `${shown(seconds * 1e3)} ms`;
   if (Math.abs(seconds) < 60) return `${seconds.toFixed(3)} s`;
-  // Rounded first: 119.97 s are 2 min 0.0 s.
+  // Rounded before the division, so that 119.97 s give 2 min 0.0 s.
   const tenths = Math.round(10 * seconds);
   const whole = Math.floor(tenths / 600);
   const rest = `${((tenths - 600 * whole) / 10).toFixed(1)} s`;
@@ -35,14 +35,14 @@ export function clock(seconds) {
   return `${minutes}:${((thousandths - 6e4 * minutes) / 1e3).toFixed(3).padStart(6, "0")}`;
 }
 
-/* The number in a text, or several with commas between them; null for an empty text. Other texts are returned as
-   they are, and the service refuses them. */
+/* The number in a text, or the list of several that are separated by commas; null for an empty text. Text that is no
+   number is returned unchanged, and the service refuses it. */
 export function numbersIn(text) {
   const values = text.split(",").map((part) => part.trim()).filter(Boolean).map((part) => (Number.isNaN(Number(part)) ? part : Number(part)));
   return values.length > 1 ? values : values[0] ?? null;
 }
 
-/* The least and the greatest value; 0 and 0 without values. */
+/* The least and the greatest value; [0, 0] without values. */
 export function extent(values) {
   let low = Infinity, high = -Infinity;
   for (let i = 0; i < values.length; i += 1) {

@@ -1,4 +1,4 @@
-/* Small parts of a page. */
+/* Small elements of a page. */
 
 import { shown } from "./numbers.js";
 
@@ -9,7 +9,7 @@ export function element(tag, kind = "", text = "") {
   return made;
 }
 
-/* Buttons of which one is pressed; `names` are the names with their texts. */
+/* Buttons of which one is pressed; `names` maps names to texts. `press` marks the one of a name. */
 export function choice(names, label, onChoose) {
   const box = element("div", "choice");
   box.setAttribute("role", "group");
@@ -32,7 +32,7 @@ export function heading(name, unit, note = "") {
   return [element("b", "", name), ` [${unit}]  ${note}`];
 }
 
-/* The note on rapids that are faster than the `reach` of a chart, which is scaled by the cutting speeds. */
+/* A note if rapids are faster than `reach`, the greatest speed on a chart with the scale of the cutting speeds. */
 export function rapidsBeyond(reach, top, unit) {
   return top > reach ? `rapids up to ${shown(top)} ${unit} run out of the chart` : "";
 }

@@ -55,7 +55,7 @@ export class PathView {
     this.onChoice?.();
   }
 
-  /* The names of colour modes, for keys. */
+  /* The names of colour modes and of views, for the keys. */
   static modes = Object.keys(MODES);
   static views = Object.keys(VIEW_NAMES);
 

@@ -7,8 +7,8 @@ import { shown, tick } from "./numbers.js";
 import { font, style, wash } from "./theme.js";
 import { touch } from "./touch.js";
 
-const AXIS = 64; // width of the numbers at the left in pixels: nine characters
-const LATE = 200; // [ms]
+const AXIS = 64; // width in pixels of the numbers at the left, of at most nine characters
+const LATE = 200; // time until a chart is drawn again [ms]
 
 export class Plot {
   #plot = null;
@@ -17,8 +17,8 @@ export class Plot {
   #cursor = null;
   #isPointing = false;
 
-  /* `onZoom(range)` is called with the new range, null for all; `onPoint(x)` with the x of the pointer. Touch calls
-     both too. The legend is beside the heading where it has no more than `mostBeside` names. */
+  /* `onZoom(range)` gets the new range, null for the whole axis; `onPoint(x)` gets the x of the pointer. Touch calls
+     both too. The legend is beside the heading if it has at most `mostBeside` names. */
   constructor(container, { height, label, onZoom, onPoint, mostBeside = 0 }) {
     this.container = container;
     Object.assign(this, { height, label, onZoom, onPoint, mostBeside });
@@ -26,15 +26,15 @@ export class Plot {
     new ResizeObserver(() => this.#hasNewWidth() && this.draw()).observe(container);
   }
 
-  /* What is drawn: `curves` of { name, curve, colour, width, dash, fill, isLimit, scale,
-     none (the value from which there is none) }, `ends` of the x axis,
-     the `range` of the y axis, `lines` across of { value, colour } and `marks` of { x } down. */
+  /* Draws `curves` of { name, curve, colour, width, dash, fill, isLimit, scale, none }; from the value `none` on the
+     legend shows "none". `ends` are those of the x axis, `range` is that of the y axis; `lines` of { value, colour }
+     are horizontal, `marks` of { x } vertical. */
   show({ curves, ends, range, unit, lines = [], marks = [] }) {
     Object.assign(this, { curves, ends, range, unit, lines, marks });
     this.draw();
   }
 
-  /* Shows a part of the x axis, null: all. */
+  /* Shows a part of the x axis; null shows all of it. */
   zoom(range) {
     this.shownRange = range;
     this.draw();
@@ -56,7 +56,7 @@ export class Plot {
     const [from, to] = this.#range();
     const found = this.curves.map(({ curve, ...options }) => sampled(curve, from, to, this.#columns, { ...options, top: this.range[1] }));
     this.#bands = found;
-    // The name of a curve with a range is as long as two.
+    // The name of a curve with a range is twice as long.
     this.container.classList.toggle("beside", found.length + found.filter((one) => one.low).length <= this.mostBeside);
     const data = [grid(from, to, this.#columns), ...found.map((one) => one.y)];
     this.#plot = new uPlot(this.#options(width, from, to, found), data, this.container);
@@ -64,8 +64,8 @@ export class Plot {
     this.#drawAgain();
   }
 
-  /* The first texts on a canvas can be missing, because their glyphs are loaded late (Chromium without a graphics
-     processor, under load). So the chart is drawn again. */
+  /* Draws the chart again after LATE: the first texts on a canvas can be missing, because their glyphs are loaded late
+     (Chromium without a graphics processor, under load). */
   #drawAgain() {
     const plot = this.#plot;
     setTimeout(() => plot === this.#plot && plot.redraw(false, false), LATE);

@@ -12,7 +12,7 @@ const USED = ["velocity", "acceleration", "jerk"];
 export function report(data) {
   const at = (id) => document.getElementById(id);
   const run = new Run(data.path), cursor = new Cursor();
-  // Joints alone, as those of a robot, have no path in X, Y, Z.
+  // A machine of joints only, such as a robot, has no path in X, Y, Z.
   const moves = [data.path.x, data.path.y, data.path.z].some((places) => places.some((place) => place !== places[0]));
   if (moves) new PathView(at("path"), at("path-tools"), cursor).show(run);
   else at("path").closest("section").hidden = true;

@@ -1,5 +1,5 @@
-/* A polyline for three.js: each segment is a rectangle some pixels wide, coloured by the values at its ends.
-   It draws levels of `detail.js`; a level gets its textures when it first comes into view.
+/* A polyline for three.js: each segment is a rectangle of a few pixels' width, coloured by the values at its ends.
+   It draws levels of `detail.js`; a level gets its textures when it is first shown.
    
    The vertex shader finds the corners of a rectangle from the number of the vertex and the points in a texture.
    Instances of one rectangle would be slower: without a graphics processor each costs as much as a draw call. */
@@ -107,7 +107,7 @@ export class Ribbon {
     mesh.userData.painted = all;
   }
 
-  /* Colours by a mode of `modes.js`; `colours` are red, green, blue for each step of its scale or kind. */
+  /* Colours the path by a mode of `modes.js`; `colours` are red, green, blue for each step of the scale or each kind. */
   colour({ values }, colours, isKind) {
     this.#values = values;
     const uniforms = this.#uniforms;
@@ -130,7 +130,7 @@ export class Ribbon {
     this.#uniforms.now.value = time ?? Infinity;
   }
 
-  /* Shows these levels, on a canvas of this size. */
+  /* Shows these levels on a canvas of this size, with lines `pixels` wide. */
   show(levels, width, height, pixels) {
     for (const mesh of this.#meshes.values()) mesh.visible = false;
     for (const level of levels) {

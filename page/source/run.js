@@ -1,4 +1,4 @@
-/* A planned program as it is drawn, with its tool's position by time, length and source line. */
+/* A planned program as it is drawn: the tool's position by time, length and source line. */
 
 import { lastUpTo } from "./numbers.js";
 
@@ -17,7 +17,7 @@ export class Run {
     return lastUpTo(this.path.time, time);
   }
 
-  /* The position [mm] at a time, between two points of the path. */
+  /* The position [mm] at a time, interpolated between two points of the path. */
   position(time) {
     const { x, y, z } = this.path;
     const i = this.at(time), j = Math.min(i + 1, this.count - 1), t = this.#part(this.path.time, i, j, time);
@@ -36,12 +36,12 @@ export class Run {
     return this.#moved(this.path.time, this.path.speed, time);
   }
 
-  /* The source line at a time: that of the next point. */
+  /* The source line at a time, which is the line of the next point. */
   lineAt(time) {
     return this.count ? this.path.line[Math.min(this.at(time) + 1, this.count - 1)] : 0;
   }
 
-  /* The first time [s] at which a source line is reached; null where it has no motion. */
+  /* The first time [s] at which a source line is reached; null if the line has no motion. */
   timeOfLine(line) {
     const i = this.path.line.indexOf(line);
     return i < 0 ? null : this.path.time[Math.max(i - 1, 0)];

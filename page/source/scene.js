@@ -1,4 +1,4 @@
-/* The tool path of a run in 3D, which the user turns, moves and zooms, with the box around it and marks. */
+/* The tool path of a run in 3D with a box around it and marks; the user can turn, move and zoom it. */
 
 import { OrthographicCamera, Scene, Vector3, WebGLRenderer, MOUSE, TOUCH } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -11,16 +11,16 @@ import { extent } from "./numbers.js";
 import { COLOURS, Ribbon } from "./ribbon.js";
 import { channels, onTheme, style } from "./theme.js";
 
-/* The direction of the viewer from the middle of the path. */
+/* For each view the direction from the middle of the path to the viewer. */
 export const VIEWS = { xyz: [-1.1, -1.5, 1.1], xy: [0, -1e-6, 1], xz: [0, -1, 0], yz: [1, 0, 0] };
-/* Greatest error of a level in pixels, at rest and while the view moves. */
+/* Greatest error of the drawn levels in pixels, at rest and while the view moves. */
 const AT_REST = 0.25, MOVING = 1;
-const REST = 160; // time without motion after which the view is at rest [ms]; longer if pictures take long
-/* A moving view is drawn coarser while its pictures take longer than SLOW, and finer if they take less than
-   QUICK [ms]; at most MOST times as coarse. */
+const REST = 160; // time without motion after which the view is at rest [ms]; longer if drawing is slow
+/* A moving view is drawn coarser while drawing takes longer than SLOW, and finer if it takes less than QUICK [ms];
+   its error is at most MOST times as large. */
 const SLOW = 50, QUICK = 25, MOST = 16;
 const SLICE = 20; // longest work between two reactions to the user [ms]
-const ROOM = [78, 45]; // free pixels beside the path, and above and below it
+const ROOM = [78, 45]; // free pixels on both sides of the path, and above and below it
 const NARROW = 560; // width in pixels below which names of axes are shorter
 const NEAR = 14; // greatest distance in pixels between the pointer and its point
 
@@ -44,7 +44,7 @@ export class PathScene {
   #time = null;
   #hasTrail = false;
 
-  /* `onHover(i, event)` is called with the number of the point under the pointer, -1 without one. */
+  /* `onHover(i, event)` gets the number of the point under the pointer, or -1; `onMove(scene)` follows each motion. */
   constructor(container, { onHover, onMove } = {}) {
     this.container = container;
     container.classList.add("scene");
@@ -57,7 +57,7 @@ export class PathScene {
       this.#renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
       this.#renderer.setClearColor(0, 0);
     } catch {
-      this.#renderer = null; // without WebGL `flat.js` draws
+      this.#renderer = null; // there is no WebGL: `flat.js` draws
     }
     this.#camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.#camera, this.over);
@@ -102,7 +102,7 @@ export class PathScene {
     if (isOther) this.look(this.#firstView());
   }
 
-  /* Takes chunks for SLICE at a time, so that the page reacts in between, and draws those that are ready. */
+  /* Makes chunks for SLICE ms at a time, so that the page reacts in between, and draws those that are ready. */
   #cut(rest) {
     const end = performance.now() + SLICE;
     let next = rest.next();
@@ -200,7 +200,7 @@ export class PathScene {
       up = Math.max(up, Math.abs(corner.y));
     }
     const beside = width < NARROW ? ROOM[0] / 2 : ROOM[0];
-    const half = Math.max(across / Math.max(width / 2 - beside, 20), up / Math.max(height / 2 - ROOM[1], 20)) / 2; // [mm] of half a pixel
+    const half = Math.max(across / Math.max(width / 2 - beside, 20), up / Math.max(height / 2 - ROOM[1], 20)) / 2; // half the width of a pixel [mm]
     Object.assign(camera, { left: -half * width, right: half * width, top: half * height, bottom: -half * height, near: 0.01 * far, far: 4 * far });
     camera.updateProjectionMatrix();
   }
@@ -259,7 +259,7 @@ export class PathScene {
     }
   }
 
-  /* The allowed error in pixels now: less at rest, more if pictures take long. */
+  /* The allowed error in pixels now: smaller at rest, larger if drawing is slow. */
   #detail() {
     return this.#isMoving() ? MOVING * this.#coarse : Math.min(AT_REST * this.#coarse, MOVING);
   }
@@ -268,7 +268,7 @@ export class PathScene {
     return performance.now() - this.#movedAt < REST * this.#coarse - 5;
   }
 
-  /* Measures the time of a picture while the view moves; the next picture waits for its end. */
+  /* Measures how long drawing takes and adapts `#coarse` while the view moves; the next picture waits for the end. */
   #watch(isMoving) {
     const gl = this.#renderer.getContext(), start = performance.now();
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -286,7 +286,7 @@ export class PathScene {
     setTimeout(look);
   }
 
-  /* The coarsest level within a tolerance [mm] of each chunk in view. */
+  /* For each chunk in view, its coarsest level within a tolerance [mm]. */
   #inView(project, tolerance) {
     const [width, height] = this.#size, pixel = this.#pixel();
     return this.#chunks.filter(({ centre, radius }) => {
@@ -341,7 +341,7 @@ export class PathScene {
     return ([x, y, z]) => rows.map(([a, b, c, d]) => a * x + b * y + c * z + d);
   }
 
-  /* That map as numbers: a, b, c, d of a x + b y + c z + d, for each of the three results. */
+  /* The coefficients of that map: a, b, c, d of a x + b y + c z + d, for each of the three results. */
   #rows() {
     const [width, height] = this.#size, centre = this.#centre();
     const m = this.#camera.projectionMatrix.clone().multiply(this.#camera.matrixWorldInverse).elements;

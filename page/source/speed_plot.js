@@ -1,4 +1,4 @@
-/* The planned speed below its limits over the length of the path, and the speed of another run. */
+/* The planned speed and its limits over the length of the path, and the speed of another run. */
 
 import { element, heading, rapidsBeyond } from "./parts.js";
 import { Plot } from "./plot.js";
@@ -11,7 +11,7 @@ const LIMITS = {
 };
 
 export class SpeedPlot {
-  /* `cursor` has a time; the run gives the length at that time. */
+  /* `cursor` holds a time; the run converts it to the length at that time. */
   constructor(container, data, run, cursor) {
     this.run = run;
     this.data = data;
@@ -32,7 +32,7 @@ export class SpeedPlot {
   show(other = null) {
     const { length, path } = this.data;
     const { top_speed: top, cutting_speed: cutting } = length;
-    // The chart is scaled by the cutting speeds: much faster rapids are cut at its top.
+    // The chart has the scale of the cutting speeds; much faster rapids are cut off at its top.
     const reach = 1.25 * ((top > 1.5 * cutting ? cutting : top) || 1);
     const curves = Object.entries(LIMITS)
       .filter(([name]) => length[name])

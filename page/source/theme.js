@@ -12,7 +12,7 @@ export function style(name) {
   return known.get(name);
 }
 
-/* The font of drawn texts of a size in pixels. */
+/* The font for texts on a canvas, of a size in pixels. */
 export const font = (pixels) => `${pixels}px ${style("font-family")}`;
 
 /* A colour #rrggbb of the style sheet with an opacity. */
@@ -20,15 +20,15 @@ export function wash(name, alpha) {
   return `rgba(${channels(style(name)).join(",")},${alpha})`;
 }
 
-/* Red, green and blue, 0 to 255, of #rrggbb. */
+/* Red, green and blue, 0 to 255, of a colour #rrggbb. */
 export const channels = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 
-/* The colour of the k-th axis; the colours differ without red or green too. */
+/* The colour of the k-th axis; the colours can be told apart without red and green. */
 export const axisColour = (k) => style(`--axis-${k % 9}`);
 
 export const isDark = () => dark.matches && !root.classList.contains("printing");
 
-/* Calls the function after a change of the colours, with true while the page is printed. */
+/* Calls the function after each change of the colours; its argument is true while the page is printed. */
 export const onTheme = (listener) => listeners.add(listener);
 
 function tell(printing) {

@@ -1,6 +1,6 @@
-/* Touch on a chart: one finger sets the cursor, two fingers zoom and move. Scrolling of the page is not changed. */
+/* Touch on a chart: one finger sets the cursor, two fingers zoom and move. The page still scrolls vertically. */
 
-/* A plugin of uPlot; it calls `zoom(range)` and `point(x)`, and `ends()` for the ends of the whole axis. */
+/* A plugin of uPlot that calls `zoom(range)` and `point(x)`; `ends()` gives the ends of the whole axis. */
 export function touch(zoom, ends, point) {
   return {
     hooks: {
@@ -27,7 +27,7 @@ export function touch(zoom, ends, point) {
   };
 }
 
-/* The range in which the values `held` are at the pixels `at` of `width`. */
+/* The range of an axis of `width` pixels on which the values `held` are at the pixels `at`, within first and last. */
 function ranged(held, at, width, [first, last]) {
   if (Math.abs(at[1] - at[0]) < 10) return null;
   const scale = (held[1] - held[0]) / (at[1] - at[0]);

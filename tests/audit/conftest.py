@@ -1,4 +1,4 @@
-"""A planned part with everything on it that the audit looks at, and tools to break it."""
+"""A planned part that uses all that the audit checks, and tools to plant faults in it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COLUMNS = ("t", "position", "velocity", "acceleration", "jerk", "line")
 
 @dataclass(frozen=True)
 class Case:
-    """All that one audit compares; `broken` gives another case with parts of it replaced."""
+    """All that one audit compares; the methods `with_…` return a case with parts of it replaced."""
 
     problem: Problem
     profile: SpeedProfile
@@ -65,16 +65,16 @@ class Case:
         return replace(self, points=replace(self.points, **changes))
 
     def arcs(self, change: Callable[[NDArray[Any]], NDArray[Any]], runs: NDArray[np.int64]) -> Case:
-        """The case with the same change, of rows, made to every column of the profile."""
+        """The case with `change` applied to the rows of every column of the profile."""
         columns = {name: change(getattr(self.profile, name)) for name in OF_PHASES}
         return self.with_profile(**columns, runs=runs)
 
     def rows(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Case:
-        """The case with the same change, of rows, made to every column of the setpoints."""
+        """The case with `change` applied to the rows of every column of the setpoints."""
         return self.with_points(**{name: change(getattr(self.points, name)) for name in COLUMNS})
 
     def start(self, arc: int) -> float:
-        """Time at which an arc begins, dwells included."""
+        """Time at which an arc begins, dwells included [s]."""
         run = int(np.searchsorted(self.profile.runs, arc, side="right")) - 1
         return float(self.profile.duration[:arc].sum() + self.path.dwell[:run].sum())
 

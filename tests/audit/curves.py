@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 
 
 def machine_of(problem: Problem, jump: float = 0.0) -> Machine:
-    """Axes with the limits of the problem."""
+    """A machine whose axes have the limits of the problem."""
     limits = zip(problem.axes, problem.max_velocity, problem.max_acceleration, strict=True)
     return Machine("own", tuple(Axis(name, v, a, max_velocity_jump=jump) for name, v, a in limits))
 
 
 def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """Arc, u and √p at times in motion (n,): by halving, from closed forms; not along a feed limit."""
+    """Arc, u and √p at times in motion (n,), by closed forms and bisection; not for arcs of the law FEED."""
     ends = np.cumsum(profile.duration)
     arc = np.minimum(np.searchsorted(ends, t, side="right"), len(profile) - 1)
     since = np.clip(t - (ends[arc] - profile.duration[arc]), 0.0, profile.duration[arc])
@@ -38,7 +38,7 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
 
     (q0, g0), (q1, g1) = motion(profile.u0[arc]), motion(profile.u1[arc])
     v0, v1 = g0 * np.sqrt(profile.p0[arc]), g1 * np.sqrt(profile.p1[arc])
-    # From the slower end, where nothing cancels.
+    # From the slower end, where no difference of large numbers occurs.
     rest = profile.duration[arc] - since
     ahead = q0 + since * (v0 + 0.5 * value * since)
     target = np.where(np.abs(v0) <= np.abs(v1), ahead, q1 - rest * (v1 - 0.5 * value * rest))
@@ -71,7 +71,7 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
 
 
 def sampled(problem: Problem, profile: SpeedProfile) -> SetpointChunk:
-    """Setpoints of one run: its start, one a period, and the stop at the next whole period."""
+    """Setpoints of one run: the start, one every period, and the stop at the next whole period."""
     count = math.ceil(profile.time / problem.period - 1e-9)
     t = np.arange(count + 1) * problem.period
     arc, u, root_p = places_at(problem, profile, np.minimum(t, profile.time))
@@ -91,7 +91,8 @@ def sampled(problem: Problem, profile: SpeedProfile) -> SetpointChunk:
     velocity[[0, -1]] *= [[problem.start_speed > 0], [problem.end_speed > 0]]
     acceleration = np.zeros_like(velocity)
     if not problem.words:
-        # Differences so close that only a switch at the setpoint itself comes between.
+        # Central differences over 0.1 µs on each side: a switch between phases disturbs them only if it is at
+        # the setpoint itself.
         around = [places_at(problem, profile, np.clip(t + step, 0.0, profile.time)) for step in (-1e-7, 1e-7)]
         rates = [
             curve.evaluate(profile.piece[arc].astype(np.int64), u, 1)[1] * root_p[:, None]

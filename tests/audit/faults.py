@@ -1,4 +1,4 @@
-"""Faults of whole profiles for the tests of the audit, and the checks that find them."""
+"""Faults planted in whole profiles for the tests of the audit, and the checks that fail."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from feedplan.audit import Audit
 from feedplan.profile import SpeedProfile
 
-# The first five get past the audit's look at signs and sizes.
+# The first five are finite and not negative, so the audit's first check of signs and sizes accepts them.
 STRANGE = np.array([0.0, 5e-324, 1e-310, 1e-160, 1e160, -0.0, -1.0, 1e308, math.inf, math.nan])
 
 
@@ -29,7 +29,7 @@ def changed(array: NDArray[Any], place: Any, value: Any) -> NDArray[Any]:
 
 
 def faster(profile: SpeedProfile, factor: float = 1.001) -> SpeedProfile:
-    """The whole profile at p times `factor`, with the durations to it."""
+    """The whole profile with p times `factor` and matching durations."""
     return replace(
         profile,
         p0=profile.p0 * factor,
@@ -42,7 +42,7 @@ def faster(profile: SpeedProfile, factor: float = 1.001) -> SpeedProfile:
 def rubbish(
     rng: np.random.Generator, profile: SpeedProfile, share: float, values: NDArray[np.float64] = STRANGE
 ) -> dict[str, NDArray[Any]]:
-    """The columns of numbers with a share of their entries replaced by any of the values."""
+    """The numeric columns; each entry is replaced with probability `share` by a random one of `values`."""
     columns = {}
     for name in ("value", "u0", "u1", "p0", "p1", "duration"):
         column = getattr(profile, name)

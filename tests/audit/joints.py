@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes: Any) -> Problem:
-    """From rest to rest along the tip curve, cut where the planner's stand-ins for the joints are."""
+    """From rest to rest along the tip curve, cut where the planner's polynomials of the joints are joined."""
     words = axis_words(machine, tuple(names), changes.pop("coordinate_mode", None))
     points = curve.by_piece
     found = joint_interpolants(words.kinematics, words.tip(points), curve.width, 1e-10, nodes=8)
@@ -52,7 +52,7 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
 
 
 def steady(problem: Problem, p: float) -> SpeedProfile:
-    """Constant p over all pieces."""
+    """A profile with constant p over all pieces."""
     count, width = len(problem.path), problem.path.width
     return SpeedProfile(
         piece=np.arange(count, dtype=np.uint32),

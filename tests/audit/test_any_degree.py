@@ -1,4 +1,4 @@
-"""The audit on pieces of any degree, rational or not: what passes as quadratics passes, what fails fails."""
+"""The audit on pieces of any degree, rational or not: it passes and fails the same plans as on quadratics."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SPEED_LINE = PhaseLaw.SPEED_LINE
 
 
 def rational(curve: CompositeCurve) -> CompositeCurve:
-    """The same pieces over the same parameter, numerator and denominator times 1 + t."""
+    """The same pieces over the same parameter; numerator and denominator are multiplied by 1 + t."""
     points = curve.by_piece
     count, degree = points.shape[0], points.shape[1] - 1
     one = np.ones((count, degree + 1)) if curve.weights is None else curve.weights_by_piece
@@ -44,7 +44,7 @@ def rational(curve: CompositeCurve) -> CompositeCurve:
             raised[:, i] += 2.0 * i / (degree + 1) * homogeneous[:, i - 1]
     weights = raised[..., -1]
     control = raised[..., :-1] / weights[..., None]
-    # The ends are exactly those that meet their neighbours.
+    # The end points are copied, so that they still equal those of the neighbouring pieces exactly.
     control[:, 0], control[:, -1] = points[:, 0], points[:, -1]
     return CompositeCurve(
         control.reshape(-1, curve.axes), weights.ravel(), np.arange(count + 1) * (degree + 2), curve.width
@@ -56,7 +56,7 @@ FORMS = {"cubic": lambda c: c.elevated(3), "degree 6": lambda c: c.elevated(6), 
 
 @pytest.fixture(scope="session", params=list(FORMS))
 def other(request: pytest.FixtureRequest, part: Any) -> Any:
-    """The part with its pieces in another form."""
+    """The part with its pieces in another form: higher degree or rational."""
     return part.with_path(curve=FORMS[request.param](part.path.curve))
 
 
@@ -67,7 +67,7 @@ def test_the_same_plan_in_another_form_measures_the_same(part: Any, other: Any) 
     for name in ("velocity", "acceleration"):
         for axis in "XYZ":
             assert theirs.check(name, axis).worst == pytest.approx(mine.check(name, axis).worst, rel=1e-6)
-    # Lines of several feeds reach them: rounding decides which one is named.
+    # Several lines use the feed equally, and rounding decides which is named: only the ratio is compared.
     assert theirs.check("feed").ratio == pytest.approx(mine.check("feed").ratio, rel=1e-6)
     for name in ("chord", "deviation"):
         assert theirs.check(name).worst == pytest.approx(mine.check(name).worst, rel=1e-6)
@@ -135,7 +135,7 @@ def test_a_piece_off_the_program_or_its_neighbour_is_found(other: Any) -> None:
 
 
 def test_numbers_that_are_none_get_into_no_curve(other: Any) -> None:
-    # The audit's own look at them is tested beside it, in solvers/audit.
+    # The curve itself refuses such numbers; that the audit does too is tested in solvers/audit.
     curve = other.path.curve
     columns = ("control_points", math.nan), ("control_points", math.inf), ("weights", -1.0), ("width", 0.0)
     for name, value in columns:
@@ -167,7 +167,7 @@ def random_curve(rng: np.random.Generator, weights: bool) -> CompositeCurve:
     knots = np.concatenate([np.zeros(degree + 1), inner, np.full(degree, inner[-1])])
     weight = np.exp(rng.uniform(np.log(0.1), np.log(10.0), len(points))) if weights else None
     curve = CompositeCurve.from_nurbs(points, knots, degree, weight)
-    # Jumps of parameter speed where pieces meet.
+    # Different widths: the parameter speed jumps where pieces meet.
     return curve.with_width(rng.uniform(0.2, 4.0, len(curve)))
 
 
@@ -311,7 +311,7 @@ def test_a_spline_move_is_followed_by_its_own_pieces_or_parts_of_them() -> None:
         result = audit(problem, None, machine, spline_program(spline))
         assert result.failures == ()
         assert result.check("deviation").worst < 1e-9
-        # A piece that strays by twice the tolerance; a program that does.
+        # A piece that leaves the program by twice the tolerance.
         control = curve.control_points.copy()
         control[curve.offsets[120] + 1 : curve.offsets[121] - 1] += 2e-3
         strayed = replace(path, curve=replace(curve, control_points=control))
@@ -320,7 +320,7 @@ def test_a_spline_move_is_followed_by_its_own_pieces_or_parts_of_them() -> None:
         assert 1e-3 < result.check("deviation").worst < 4e-3
         shorter = curve.control_points[curve.offsets[len(curve) // 2]]
         assert shorter is not None
-    # The program goes on where the path takes a short cut: only the way from the program shows it.
+    # The program makes a detour that the path cuts off: only the distance program to path shows it.
     loop = np.array([[[0, 0], [10, 0]], [[10, 0], [10, 5]], [[10, 5], [10, 0]], [[10, 0], [20, 0]]], float)
     ways = CompositeCurve.from_pieces(loop, np.array([10.0, 5.0, 5.0, 10.0]))
     straight = CompositeCurve.from_pieces(loop[[0, 3]], np.array([10.0, 10.0]))
@@ -359,7 +359,7 @@ def test_a_circle_is_followed_by_exact_pieces() -> None:
 
 
 def along_a_line(*pieces: tuple[float, ...]) -> CompositeCurve:
-    """Bézier pieces on a line that rises 4 on 3, by how far along it their control points are."""
+    """Bézier pieces on a line of slope 4/3; a control point is given by its distance along the line."""
     direction = np.array([0.6, 0.8])
     return CompositeCurve.joined(
         [CompositeCurve.from_bezier(np.outer(x, direction), width=10.0) for x in pieces]

@@ -1,4 +1,4 @@
-"""The audit of the followed path: its distance from the programmed one, both ways, and its joints."""
+"""The audit of the path: its distance from the program in both directions, and the joints of its pieces."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLANE = Machine("plane", (Axis("X", 100.0, 1000.0), Axis("Y", 100.0, 1000.0)))
 
 
 def program_of(targets: list[list[float]], **arcs: Any) -> Program:
-    """Moves from the origin; line numbers 10, 20, …"""
+    """Moves from the origin; they have the line numbers 10, 20, …"""
     count = len(targets)
     return Program(
         name="moves",
@@ -65,19 +65,19 @@ def test_a_parabola_is_as_far_from_its_chord_as_half_its_control_point() -> None
 
 
 def test_a_peak_between_the_samples_is_found() -> None:
-    # The parabola is farthest from the line at t = 0.3, which no eighth and no sixty-fourth hits.
+    # The parabola is farthest from the line at t = 0.3, which is no multiple of 1/8 or 1/64.
     peak = 0.3
     a, c = 1 / (2 * peak), 0.0
     points = [[[0.0, 0.0], [1.0, 0.5 * a], [2.0, a - 1 + c]]]
     program = program_of([[2.0, a - 1.0]])
     height = audit(problem_of(points, [[0, 0]], 1.0), None, PLANE, program).check("deviation").worst
-    # The greatest distance of a parabola from its own chord is half way, whatever its ends.
+    # A parabola is farthest from its own chord at t = 1/2, whatever its ends.
     exact = 0.25 * abs(a - 1 - a) * 2.0 / math.hypot(2.0, a - 1)
     assert height == pytest.approx(exact, rel=1e-12)
 
 
 def test_a_peak_that_only_a_closer_look_finds_breaks_the_tolerance() -> None:
-    # The distance from an L peaks where the lopsided parabola passes its bisector, not at an eighth.
+    # The distance from an L is greatest where the parabola crosses its bisector, at no multiple of t = 1/8.
     program = program_of([[4.0, 0.0], [4.0, 1.0]])
     points = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 1.0]])
     t = np.linspace(0.0, 1.0, 100_001)[:, None]
@@ -88,7 +88,7 @@ def test_a_peak_that_only_a_closer_look_finds_breaks_the_tolerance() -> None:
     tolerance = 0.5 * (seen + distance.max())
     result = audit(problem_of([points.tolist()], [[0, 1]], tolerance), None, PLANE, program)
     assert broken(result) == {("deviation", None)}
-    # The closer look takes steps of a sixty-fourth.
+    # The refined search takes steps of 1/64.
     assert distance.max() - result.check("deviation").worst < 0.005 * distance.max()
 
 
@@ -129,13 +129,13 @@ def test_a_detour_of_the_program_that_the_path_leaves_out_is_found() -> None:
     assert broken(result) == {("deviation", None)}
     assert result.check("deviation").worst == pytest.approx(0.3)
     assert result.check("deviation").line in (20, 30)
-    # Also where no piece claims to follow it.
+    # The same when no piece names these moves as the ones that it follows.
     unnamed = problem_of([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]], [[0, 0]], 0.01)
     assert ("deviation", None) in broken(audit(unnamed, None, PLANE, program))
 
 
 def test_arcs_are_measured_against_the_true_circle() -> None:
-    # A quarter of a circle of 10 mm as one parabola: its middle is off by 10 (1 − ¾ √2).
+    # A quarter circle of radius 10 mm as one parabola: its middle is 10 (¾ √2 − 1) mm off.
     program = program_of(
         [[10.0, 0.0], [0.0, 10.0]], move=[1], centre=[[0.0, 0.0, 0.0]], normal=[2], angle=[math.pi / 2]
     )
@@ -171,7 +171,7 @@ def test_a_control_point_moved_by_twice_the_tolerance_is_found(part: Any, piece:
         result = part.with_path(curve=replace(part.path.curve, control_points=points.reshape(-1, 3))).audit()
         assert {("deviation", None), ("gap", None)} <= broken(result)
         assert abs(result.check("deviation").line - part.path.line[piece]) <= 1
-    # The middle one pulls the curve along by half as much.
+    # Moving the middle control point moves the curve by half as much.
     points = changed(part.path.curve.by_piece, (piece, 1, 2), lambda z: z + 5 * tolerance)
     result = part.with_path(curve=replace(part.path.curve, control_points=points.reshape(-1, 3))).audit()
     assert ("deviation", None) in broken(result)
@@ -198,7 +198,7 @@ def test_pieces_that_follow_other_moves_than_they_say_are_found(part: Any) -> No
 
 
 def test_the_audit_uses_nothing_of_what_it_audits() -> None:
-    """Its crate depends on no other one of ours; so the compiler holds it."""
+    """The crate of the audit depends on no other crate of the project, so it cannot use their code."""
     manifest = (FilePath(__file__).parents[2] / "solvers" / "audit" / "Cargo.toml").read_text()
     dependencies = manifest.split("[dependencies]")[1]
     assert "rayon" in dependencies

@@ -1,4 +1,4 @@
-"""The audit of profiles of limited jerk: closed forms, what is planted is found, and nothing else is."""
+"""The audit of profiles with limited jerk: closed forms; planted faults are found, and nothing else."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FREE = 1e6
 
 
 def judged(problem: Problem, profile: SpeedProfile, with_setpoints: bool = True, **changes: Any) -> Audit:
-    """The verdict of a method that claims to limit jerk."""
+    """The verdict on a profile whose method claims to limit jerk."""
     problem = replace(problem, **changes)
     stream = Setpoints(problem, profile, problem.period) if with_setpoints else None
     return audit(problem, profile, machine_of(problem), None, stream, jerk=True)
@@ -41,12 +41,12 @@ def broken(result: Audit) -> set[str]:
 
 
 def problem_on(curve: CompositeCurve, jerk: Any = FREE**2) -> Problem:
-    """A curve with jerk limits and hardly any others."""
+    """A problem along a curve with jerk limits and no other effective ones."""
     return problem_along(path_along(curve), FREE, FREE, max_jerk=np.broadcast_to(jerk, curve.axes))
 
 
 def line() -> tuple[Problem, SpeedProfile]:
-    """100 mm along (3, 4) from rest to rest at 3200 mm/s³, so at 1920 and 2560 mm/s³ of the axes."""
+    """100 mm along (3, 4) from rest to rest at 3200 mm/s³: 1920 and 2560 mm/s³ of the axes."""
     curve = CompositeCurve.from_bezier(np.linspace(0.0, 100.0, 4)[:, None] * [0.6, 0.8], width=100.0)
     return problem_on(curve, [1920.0, 2560.0]), constant_jerk(curve, rest_to_rest(100.0, 3200.0))
 
@@ -74,10 +74,10 @@ def test_a_jerk_two_millionths_above_its_limit_is_found(with_setpoints: bool) ->
 def test_setpoints_alone_show_the_excess_too() -> None:
     problem, profile = line()
     stream = Setpoints(problem, profile, 0.001).all()
-    # Rounding hides some 2e-6 of the limit in third differences over 1 ms.
+    # Rounding of third differences over 1 ms hides an excess of about 2e-6 of the limit.
     for excess, ok in ((0.5e-6, True), (1e-5, False)):
         tight = replace(problem, max_jerk=problem.max_jerk / (1.0 + excess))
-        # The profile is not audited: only the positions speak.
+        # The profile is not audited: only positions count.
         result = audit(tight, None, machine_of(tight), None, [stream], jerk=True)
         assert result.ok == ok, result.failures
         assert broken(result) <= {"jerk"}
@@ -168,12 +168,12 @@ def test_every_way_of_breaking_a_cubic_is_named() -> None:
     assert names(problem, changed(profile, 4, duration=1e-5 * profile.duration[4])) == {"duration"}
     assert names(problem, changed(profile, 4, a0=0.2)) == {"duration", "acceleration_continuity"}
     assert names(problem, changed(profile, 4, p1=1e-3 * profile.p1[4])) >= {"jump", "duration"}
-    # A dent down to standstill.
+    # The speed falls to 0 inside the phase.
     assert "duration" in names(problem, changed(profile, 4, a0=-1e4))
 
 
 def test_acceleration_that_steps_is_no_limited_jerk() -> None:
-    # A trapezoid: constant acceleration is jerk 0, and still it steps.
+    # A trapezoid of speed: jerk is 0 inside the phases, but the acceleration jumps between them.
     curve = CompositeCurve.from_bezier([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]], width=100.0)
     problem = problem_on(curve, 1e6)
     up = constant_jerk(curve, [(0.5, 0.0), (0.5, 0.0)])
@@ -193,7 +193,7 @@ def test_acceleration_that_steps_is_no_limited_jerk() -> None:
     check = result.check("acceleration_continuity")
     assert check.worst == pytest.approx(800.0)
     assert check.time == pytest.approx(0.5)
-    # Its setpoints alone tell as much.
+    # The setpoints alone show it as well.
     assert "jerk" in broken(judged(problem, profile, max_jerk=np.full(2, 1e4)))
 
 
@@ -206,7 +206,7 @@ def test_arcs_of_other_kinds_claim_what_nothing_limits() -> None:
 
 
 def straight_into_a_bend(speed: float, radius: float = 20.0) -> tuple[Problem, SpeedProfile]:
-    """20 mm along X, then a quarter turn: the curvature jumps by 1/radius, at one speed."""
+    """20 mm along X, then a quarter turn, at constant speed: the curvature jumps by 1/radius between them."""
     straight = CompositeCurve.from_bezier([[-20.0, 0.0], [-10.0, 0.0], [0.0, 0.0]], width=20.0)
     turn = arc([0.0, 0.0], [0.0, radius], 0.5 * math.pi)
     curve = CompositeCurve.joined([straight, turn])
@@ -216,7 +216,8 @@ def straight_into_a_bend(speed: float, radius: float = 20.0) -> tuple[Problem, S
 
 
 def test_a_step_of_the_acceleration_where_the_curvature_jumps_shows_as_a_jerk() -> None:
-    # v²/R steps by 45 mm/s²: between setpoints third differences show 3/4 of it over 1 ms, on one 1/2.
+    # The acceleration jumps by v²/R = 45 mm/s². Third differences over 1 ms show 3/4 of this jump if it is
+    # between two setpoints, and 1/2 if it is at a setpoint.
     for start, share in ((0.5, 0.75), (0.0, 0.5)):
         speed = 20.0 / ((666.0 + start) * 0.001)
         problem, profile = straight_into_a_bend(speed)
@@ -227,7 +228,7 @@ def test_a_step_of_the_acceleration_where_the_curvature_jumps_shows_as_a_jerk() 
             result = judged(problem, profile, max_jerk=limit)
             assert result.check("jerk", "Y").worst == pytest.approx(shown, rel=1e-3)
             assert ("jerk" in broken(result)) == (not ok)
-            # Where no path is known the setpoints alone show it.
+            # Without a path the setpoints alone show it.
             known = replace(problem, max_jerk=limit)
             alone = [Setpoints(problem, profile, 0.001).all()]
             result = audit(known, None, machine_of(problem), None, alone, jerk=True)
@@ -235,7 +236,7 @@ def test_a_step_of_the_acceleration_where_the_curvature_jumps_shows_as_a_jerk() 
 
 
 def test_a_step_of_the_acceleration_that_no_difference_may_show_is_named() -> None:
-    # 45 mm/s² are 4/3 of what 33 750 mm/s³ make in 1 ms.
+    # A limit of 33 750 mm/s³ allows 33.75 mm/s² per period of 1 ms, and a jump of 4/3 of that: 45 mm/s².
     problem, profile = straight_into_a_bend(30.0)
     for jerk, ok in ((33_750.0, True), (33_700.0, False)):
         result = judged(problem, profile, max_jerk=np.full(2, jerk), with_setpoints=False)
@@ -297,7 +298,7 @@ def test_the_jerk_of_joints_is_that_of_their_setpoints(joints: Any) -> None:
     result = audit(problem, profile, machine, None, stream, jerk=True)
     assert result.failures == ()
     for k, name in enumerate(problem.axes):
-        # Setpoints of this period miss the peaks by up to a thousandth.
+        # Setpoints at the machine's period miss the peaks by up to a thousandth.
         assert result.check("jerk", name).worst == pytest.approx(most[k], rel=1e-2, abs=1e-3)
     assert audit(replace(problem, max_jerk=1.001 * most + 1.0), profile, machine, None, None, jerk=True).ok
     k = int(np.argmax(most))

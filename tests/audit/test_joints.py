@@ -1,4 +1,4 @@
-"""The audit of machines whose joints are not the path's axes: the kinematics alone tells what a plan does."""
+"""The audit of machines whose joints are not the path's axes: it computes the joints by their kinematics."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ Array = NDArray[np.float64]
 
 
 def past_the_column(distance: float = 40.0) -> CompositeCurve:
-    """A line from X −100 to 130 that passes the cylindrical machine's column."""
+    """A line from X −100 to 130 that passes the column of the cylindrical machine at this distance [mm]."""
     return CompositeCurve.from_pieces(np.array([[[-100.0, distance, 0.0], [130.0, distance, 30.0]]]), [232.0])
 
 
 def wavy(seed: int = 1) -> CompositeCurve:
-    """A smooth path of five axes."""
+    """A smooth random path in five axes."""
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.normal(size=(7, 5)), axis=0) * 3
     return CompositeCurve.from_nurbs(points, [0, 0, 0, 0, 1, 2, 3, 4, 4, 4, 4], 3).with_width(6.0)
 
 
 def wide(name: str) -> Machine:
-    """A bundled machine whose travel is no matter."""
+    """A bundled machine without limits of travel."""
     machine = Machine.load(name)
     anywhere = (-math.inf, math.inf)
     return replace(machine, axes=tuple(replace(axis, travel=anywhere) for axis in machine.axes))
@@ -56,7 +56,7 @@ CASES = {
 
 
 class Case:
-    """A machine with the fastest plan along a tip path."""
+    """A machine and the fastest plan along a tip path."""
 
     def __init__(self, machine: Machine, problem: Problem) -> None:
         self.machine, self.problem = machine, problem
@@ -77,7 +77,8 @@ def case(request: pytest.FixtureRequest) -> Case:
 
 
 def limits_of(problem: Problem, p: float) -> tuple[Array, Array, Array]:
-    """Greatest velocity and acceleration (joints,) at constant p by exact derivatives, and the pieces."""
+    """Greatest velocity and acceleration (joints,) at constant p by exact derivatives, and the piece of the
+    greatest acceleration (joints,)."""
     (words,) = problem.words
     points, width = problem.path.curve.by_piece, problem.path.width
     shares = np.linspace(0.0, 1.0, 65)
@@ -93,7 +94,7 @@ def limits_of(problem: Problem, p: float) -> tuple[Array, Array, Array]:
 def test_a_steady_profile_is_measured_as_the_derivatives_say(case: Case) -> None:
     problem = case.problem
     velocity, acceleration, pieces = limits_of(problem, 1.0)
-    # The greatest p that some joint allows.
+    # The greatest p that all joints allow.
     by_velocity = (problem.max_velocity / velocity) ** 2
     by_acceleration = problem.max_acceleration / np.maximum(acceleration, 1e-9)
     p = float(min(by_velocity.min(), by_acceleration.min()))
@@ -113,7 +114,7 @@ def test_a_steady_profile_is_measured_as_the_derivatives_say(case: Case) -> None
         assert good.check("acceleration", name).worst == pytest.approx(
             acceleration[k] * 0.999 * p, rel=0.02, abs=1e-4
         )
-    # Too fast by two percent: the joint, line and value of the greatest share.
+    # Two percent too fast: the audit names the joint, line and value of the greatest use.
     result = audit(flat, steady(flat, 1.02 * p), case.machine)
     k = int(np.argmin(np.minimum(by_velocity, by_acceleration)))
     kind = "velocity" if by_velocity.min() < by_acceleration.min() else "acceleration"
@@ -184,7 +185,7 @@ def test_limits_of_feed_and_junctions_are_those_of_the_tip(case: Case) -> None:
     feed = result.check("feed").worst
     assert broken(case.audit(feed=np.full(len(case.problem.path), feed * 0.999))) == {("feed", None)}
     assert case.audit(feed=np.full(len(case.problem.path), feed * 1.0001)).ok
-    # Slowly through one junction.
+    # The problem allows speed 0 at one junction.
     speed = changed(case.problem.junction_speed, len(case.problem.path) // 2, 0.0)
     result = case.audit(junction_speed=speed)
     assert broken(result) == {("junction", None)}
@@ -304,7 +305,7 @@ def test_a_stop_with_a_pause_may_wait_for_the_next_period() -> None:
     fine = sampled_at(replace(problem, words=way.words), profile, own)
     points = replace(fine, t=t)
     assert audit(problem, profile, machine, None, [points]).failures == ()
-    # Two periods later than the stream may go on.
+    # The setpoints after the first stop come two periods too late.
     waits = np.insert(np.arange(len(t)), 5 + first, [5 + first] * 2)
     later = {n: getattr(points, n)[waits] for n in ("position", "velocity", "acceleration", "jerk", "line")}
     late = replace(points, t=np.arange(len(waits)) * 1e-3, **later)
@@ -312,7 +313,7 @@ def test_a_stop_with_a_pause_may_wait_for_the_next_period() -> None:
 
 
 def sampled_at(problem: Problem, profile: SpeedProfile, own: Array) -> SetpointChunk:
-    """Setpoints at times in motion; at rest where the time stands still."""
+    """Setpoints at times in motion `own`; the tool rests where two successive times are equal."""
     arc, u, root_p = places_at(problem, profile, own)
     piece = profile.piece[arc].astype(np.int64)
     words = problem.words[0]
@@ -331,7 +332,7 @@ def sampled_at(problem: Problem, profile: SpeedProfile, own: Array) -> SetpointC
 
 
 def test_a_speed_along_the_tip_is_constant_over_its_length() -> None:
-    # 232 mm of parameter for √(230² + 30²) mm of line, at 40 mm/s.
+    # √(230² + 30²) mm of line over a parameter of 232, at 40 mm/s.
     machine = wide("cylindrical")
     problem = joint_problem(machine, "XYZ", past_the_column())
     width, count = problem.path.width, len(problem.path)
@@ -371,7 +372,7 @@ def test_where_only_rotary_words_move_the_feed_is_theirs() -> None:
 
 
 def test_the_chord_error_is_that_of_the_tip() -> None:
-    # y = 60 + x²/40: ρ = 20 mm at x = 0, in the middle of the parameter, at 60 mm/s and 1 ms.
+    # y = 60 + x²/40: the radius is ρ = 20 mm at x = 0, half way in the parameter, at 60 mm/s and 1 ms.
     parabola = np.array([[[-20.0, 70.0, 0.0], [0.0, 50.0, 0.0], [20.0, 70.0, 0.0]]])
     machine = wide("cylindrical")
     problem = joint_problem(machine, "XYZ", CompositeCurve.from_pieces(parabola, [40.0]))
@@ -402,13 +403,13 @@ def test_the_travel_is_that_of_the_joints() -> None:
         axes = tuple(replace(a, travel=(least, most)) if a.name == name else a for a in machine.axes)
         return replace(machine, axes=axes)
 
-    # The arm comes to 40 mm of the column; the column turns from 158.2° to 17.1°.
+    # The arm comes as near as 40 mm to the column; the column turns from 158.2° to 17.1°.
     assert audit(problem, profile, limited("X", 39.9, 500.0)).ok
     result = audit(problem, profile, limited("X", 41.0, 500.0))
     assert broken(result) == {("travel", "X")}
     travel = result.check("travel", "X")
     assert travel.worst == pytest.approx(40.0, abs=0.05)
-    # The tool passes the column after 100 of its 230 mm, still fast by then.
+    # The tool passes the column after 100 of its 230 mm, still at a high speed.
     assert travel.time == pytest.approx(0.45 * profile.time, rel=0.02)
     piece = profile.piece[np.searchsorted(np.cumsum(profile.duration), travel.time)]
     assert travel.line == problem.path.line[piece]
@@ -425,7 +426,8 @@ def test_a_corner_of_the_joints_needs_the_jump_that_the_machine_allows() -> None
     profile = steady(problem, 25.0)
     result = audit(problem, profile, machine)
     assert broken(result) == {("jump", "C"), ("jump", "X")}
-    # From (1, 0) to (0, 1): the arm's velocity by (y − x)/r, the column's by (x + y)/r², at 5 mm/s.
+    # The direction changes from (1, 0) to (0, 1) at 5 mm/s: the arm's velocity jumps by 5 (y − x)/r, the
+    # column's by 5 (x + y)/r².
     radius = math.hypot(60.0, 40.0)
     assert result.check("jump", "X").worst == pytest.approx(5.0 * 20.0 / radius, rel=1e-6)
     assert result.check("jump", "C").worst == pytest.approx(math.degrees(5.0 * 100.0 / radius**2), rel=1e-6)

@@ -1,4 +1,4 @@
-"""Faults of a thousandth at random places of plans that keep all limits: each of them is found."""
+"""Faults of a thousandth at random places of plans that keep all limits: the audit finds each of them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.campaign import seeds
 
 FAULT = 1e-3
 
-# Long lines and wide bends, where the feed is held, and short ones, where it is not.
+# Long lines and wide bends, where the tool runs at the feed, and short lines, where it does not.
 POINTS = "60,0 61,0.4 62,1.2 100,40 100,41 99,42 70,60 55,62 40,60 39,60 38.5,59 37,57 0,20 0,0"
 LINES = "".join("G1 X{} Y{}\n".format(*point.split(",")) for point in POINTS.split())
 MILL = f"G21 G90 G94 G64 P0.02\nG0 X0 Y0 Z0\nF2400\n{LINES}M2\n"
@@ -62,7 +62,7 @@ def names(result: Audit) -> set[str]:
 
 
 def some_phases(plan: Plan, seed: int, count: int = 6) -> NDArray[np.intp]:
-    """Phases long enough to tell a thousandth of them, half of them at constant p if there are such."""
+    """Phases long enough for a fault of a thousandth to matter; half of them, if possible, at constant p."""
     rng = np.random.default_rng(seed)
     profile = plan.profile
     long = profile.duration > 1e-3
@@ -75,7 +75,7 @@ def some_phases(plan: Plan, seed: int, count: int = 6) -> NDArray[np.intp]:
 @pytest.mark.parametrize("seed", range(seeds(2)))
 @pytest.mark.parametrize("column", ["p0", "p1", "duration", "value", "u0", "u1"])
 def test_a_number_of_one_phase_that_is_off(plan: Plan, column: str, seed: int) -> None:
-    """Accelerations are left out: they may jump by what the limit of jerk makes in a period."""
+    """a0 and a1 are left out: accelerations may jump by the limit of jerk times a period."""
     for i in some_phases(plan, seed):
         values = getattr(plan.profile, column).copy()
         values[i] *= 1.0 + FAULT
@@ -85,7 +85,7 @@ def test_a_number_of_one_phase_that_is_off(plan: Plan, column: str, seed: int) -
 
 @pytest.mark.parametrize("quantity", ["velocity", "acceleration", "jerk"])
 def test_a_limit_of_an_axis_below_its_greatest_use(plan: Plan, quantity: str) -> None:
-    """By all states inside the phases, that are measured by the product's own reader of profiles."""
+    """The greatest use is taken from states inside all phases, evaluated by the plan's own sampler."""
     if quantity == "jerk" and plan.method != "jerk-limited":
         return
     profile, problem = plan.profile, plan.problem
@@ -124,7 +124,7 @@ def test_a_feed_below_the_speed_of_one_phase(plan: Plan, seed: int) -> None:
         if problem.joints is None:
             least = float(speed.max()) / (1.0 + FAULT)
         else:
-            # The speed of the tip is that of the joints' p: only where all of it is along X, Y, Z.
+            # p belongs to the joints: the tip's speed follows only if the tip moves in X, Y and Z alone.
             rate = np.linalg.norm(problem.curve.evaluate(rows, u, 1)[1], axis=1)
             least = float((speed / rate * slope).max()) / (1.0 + FAULT)
             if (problem.path.curve.evaluate(rows, u, 1)[1][:, 3:] != 0.0).any():
@@ -135,7 +135,7 @@ def test_a_feed_below_the_speed_of_one_phase(plan: Plan, seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(seeds(3)))
 def test_one_setpoint_beside_its_place(plan: Plan, seed: int) -> None:
-    """By the way that a thousandth of an acceleration makes in a period, but at least by two nanometres."""
+    """The step is a thousandth of the acceleration limit times period², but at least 2 nm."""
     rng = np.random.default_rng(seed)
     whole = plan.setpoints().all()
     for _ in range(4):

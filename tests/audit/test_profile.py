@@ -1,4 +1,4 @@
-"""The audit of speed profiles: right plans pass, and every way of breaking one is found where it is."""
+"""The audit of speed profiles: correct plans pass; every kind of fault is found, at its place."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.audit.faults import STRANGE, broken, changed, rubbish
 
 
 def plane(*max_velocity_jump: float) -> Machine:
-    """X and Y at 500 mm/s and 1000 mm/s²."""
+    """A machine with X and Y at 500 mm/s and 1000 mm/s²."""
     jumps = max_velocity_jump or (0.0, 0.0)
     return Machine(
         "plane", tuple(Axis(n, 500.0, 1000.0, max_velocity_jump=j) for n, j in zip("XY", jumps, strict=True))
@@ -40,13 +40,13 @@ def problem_of(path: Path, **changes: Any) -> Problem:
 
 
 LINE = path_of([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]], [10.0])
-# 10 mm from rest to rest at 1000 mm/s² and 50 mm/s: 0.05 s up, 0.15 s along, 0.05 s down.
+# 10 mm from rest to rest at 1000 mm/s² and 50 mm/s: 0.05 s up, 0.15 s at constant speed, 0.05 s down.
 TRAPEZOID = profile_of(
     (0, PhaseLaw.AXIS_ACCELERATION, 0, 1000.0, 0.0, 1.25, 0.0, 2500.0, 0.05),
     (0, PhaseLaw.FEED, 255, 2500.0, 1.25, 8.75, 2500.0, 2500.0, 0.15),
     (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 8.75, 10.0, 2500.0, 0.0, 0.05),
 )
-# x = u − 1, y = x²/2 for u in [0, 2] at 20 mm/s in X: Y accelerates at 400 mm/s² all the way.
+# x = u − 1, y = x²/2 for u in [0, 2] at 20 mm/s in X: Y has the constant acceleration 400 mm/s².
 PARABOLA = path_of([[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]]], [2.0])
 STEADY_X = profile_of((0, PhaseLaw.AXIS_VELOCITY, 0, 400.0, 0.0, 2.0, 400.0, 400.0, 0.1))
 THROUGH = {"start_speed": 20.0 * math.sqrt(2.0), "end_speed": 20.0 * math.sqrt(2.0)}
@@ -72,7 +72,7 @@ def test_the_acceleration_across_a_parabola_is_its_curvature_times_speed_squared
 
 
 def test_the_chord_error_of_a_plan_is_the_sagitta_at_the_tip() -> None:
-    # ρ = 1 mm at 20 mm/s and 1 ms: 1 − √(1 − 0.01²).
+    # ρ = 1 mm at 20 mm/s and 1 ms: the chord error is 1 − √(1 − 0.01²) mm.
     sagitta = 1.0 - math.sqrt(1.0 - 1e-4)
     result = audit(problem_of(PARABOLA, chord_tolerance=sagitta, **THROUGH), STEADY_X, plane())
     assert result.ok
@@ -102,7 +102,7 @@ def test_arcs_of_a_nanosecond_pass_and_still_show_what_breaks_a_limit() -> None:
         (0, PhaseLaw.AXIS_ACCELERATION, 0, -1000.0, 8.75, 10.0, v * v, 0.0, 0.05),
     )
     assert audit(problem_of(far), profile_of(*arcs), plane()).ok
-    # One of them gains 1e-5 mm/s in a nanosecond: 10 000 mm/s².
+    # One of the short phases gains 1e-5 mm/s in a nanosecond: 10 000 mm/s².
     faster = (v + 1e-5) ** 2
     gain = (faster - v * v) / (2 * width)
     a, b = pieces[7]
@@ -229,7 +229,7 @@ def test_another_kind_or_axis_of_an_arc_is_found(part: Any) -> None:
         for kind in (PhaseLaw.PARAMETER_ACCELERATION, PhaseLaw.FEED, PhaseLaw.AXIS_VELOCITY, 77):
             value = profile.value
             if kind == PhaseLaw.PARAMETER_ACCELERATION:
-                # With the value of an axis along which |C'| is 1 it would be the same arc.
+                # With the same value the arc could stay equal, if |C'| = 1 along its axis.
                 value = changed(value, arc, 0.0)
             assert not part.with_profile(kind=changed(profile.kind, arc, kind), value=value).audit().ok
         for axis in (0, 1, 2, 9):
@@ -238,7 +238,7 @@ def test_another_kind_or_axis_of_an_arc_is_found(part: Any) -> None:
 
 
 def test_a_run_that_ends_in_motion_is_found() -> None:
-    # The last arc goes on at 50 mm/s instead of slowing down.
+    # The last arc stays at 50 mm/s instead of slowing down.
     arc = (0, PhaseLaw.FEED, 255, 2500.0, 8.75, 10.0, 2500.0, 2500.0, 0.025)
     columns = [tuple(column[i] for column in _columns(TRAPEZOID)) for i in range(2)]
     result = audit(problem_of(LINE), profile_of(*columns, arc), plane())
@@ -254,7 +254,7 @@ def test_start_and_end_speed_must_be_those_of_the_problem() -> None:
 
 
 def corner(speed: float) -> tuple[Path, SpeedProfile]:
-    """10 mm in X, 10 mm in Y, at constant speed throughout."""
+    """10 mm in X, 10 mm in Y, at constant speed through the corner."""
     path = path_of(
         [[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [10.0, 5.0], [10.0, 10.0]]], [10.0, 10.0]
     )
@@ -305,7 +305,7 @@ def test_every_lowered_limit_is_the_one_that_is_named(part: Any) -> None:
             limit = changed(getattr(part.problem, field), k, worst.worst * (1 - 1e-5))
             result = part.with_problem(**{field: limit}).audit()
             assert (name, axis) in broken(result)
-            # Slower axes also tell what jump of velocity matters, and what recorded values may be off.
+            # The lower limit also lowers this axis's tolerances for velocity jumps and for recorded values.
             assert {n for n, a in broken(result) if a == axis} <= {
                 name,
                 "jump",
@@ -340,13 +340,13 @@ def test_the_position_of_an_axis_is_kept_within_its_travel() -> None:
     result = audit(problem_of(LINE), TRAPEZOID, limited(0.0, 9.99))
     assert broken(result) == {("travel", "X")}
     assert (result.check("travel", "X").worst, result.check("travel", "X").limit) == (10.0, 9.99)
-    # The parabola's lowest point lies between its ends.
+    # The lowest point of the parabola lies between its ends.
     low = replace(plane(), axes=(plane().axes[0], replace(plane().axes[1], travel=(0.001, 2.0))))
     assert broken(audit(problem_of(PARABOLA, **THROUGH), STEADY_X, low)) == {("travel", "Y")}
 
 
 def test_numbers_with_hardly_a_digit_left_end_in_a_verdict() -> None:
-    # p has one or two significant bits: no rule ever agrees with another, however short the interval.
+    # p has one or two significant bits: two quadrature rules never agree, however short the interval is.
     p0, p1 = 2e-323, 8e-323
     for value in (p1 - p0, 5e-324):
         arc = (0, PhaseLaw.AXIS_ACCELERATION, 0, value, 0.0, 10.0, p0, p1, 1e150)
@@ -358,7 +358,7 @@ def test_numbers_with_hardly_a_digit_left_end_in_a_verdict() -> None:
 @pytest.mark.parametrize("seed", range(12))
 def test_a_profile_of_rubbish_ends_in_a_verdict(part: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    # In every other case only what counts as a number, to get past the first look.
+    # Every other case uses only values that pass the audit's first check of signs and sizes.
     changes = rubbish(rng, part.profile, (0.02, 0.2, 1.0)[seed % 3], STRANGE if seed % 2 else STRANGE[:5])
     piece = rng.integers(0, 2**32, len(part.profile), dtype=np.uint32)
     changes["piece"] = piece if seed % 4 == 3 else rng.permutation(part.profile.piece)
@@ -389,7 +389,8 @@ def test_jerk_is_judged_only_where_it_is_claimed(part: Any) -> None:
     arguments = (part.problem, part.profile, part.machine, part.program)
     assert audit(*arguments, part.chunks(500)).ok
     claimed = audit(*arguments, part.chunks(500), jerk=True)
-    # Arcs of constant axis acceleration limit no jerk, and those at constant feed jump with the curvature.
+    # Arcs of constant axis acceleration have jumps of acceleration; arcs at the feed have them where the
+    # curvature jumps.
     assert {name for name, _ in broken(claimed)} == {"jerk", "acceleration_jump"}
 
 

@@ -1,4 +1,4 @@
-"""The audit of setpoints: their differences, their places on the path, and setpoints from anywhere."""
+"""The audit of setpoints: their differences, their places on the path, and setpoints from other sources."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.audit.faults import broken, changed
 
 
 def moving(part: Any, row: int) -> int:
-    """The first row from `row` on where the tool is fast and turns little."""
+    """The first row from `row` on at which the speed is more than half of the greatest."""
     speed = np.linalg.norm(part.points.velocity, axis=1)
     return int(row + np.flatnonzero(speed[row:] > 0.5 * speed.max())[0])
 
@@ -35,7 +35,7 @@ def test_a_square_is_measured_as_a_person_would(square: Any) -> None:
     assert result.check("acceleration", "X").ratio == pytest.approx(1.0, rel=1e-9)
     assert result.check("velocity", "Y").worst == pytest.approx(50.0, rel=1e-12)
     assert result.check("place").worst < 1e-11
-    # From 0 to 500 mm/s² at a setpoint: half of it in each of two steps, 2.5e5 mm/s³.
+    # The acceleration jumps by 500 mm/s² at a setpoint: two third differences have half each, 2.5e5 mm/s³.
     assert result.check("jerk", "X").worst == pytest.approx(2.5e5, rel=1e-6)
     assert result.check("jerk", "X").ok
 
@@ -100,7 +100,8 @@ def test_a_step_backwards_is_found_even_on_the_path_and_without_a_profile(part: 
 
 
 def test_setpoints_that_hurry_or_dawdle_on_the_path_are_found(spline: Any) -> None:
-    # The same path planned 1 % slower: every difference holds, but it is not this plan.
+    # The same path planned at a feed that is 1 % lower: all differences keep the limits, but the places
+    # differ from this plan.
     machine = Machine.load("mill")
     case, slower = spline(machine, 3, feed=20.0), spline(machine, 3, feed=19.8)
     result = audit(case.problem, case.profile, machine, None, slower.chunks(1000))
@@ -180,7 +181,7 @@ def test_recorded_velocities_and_accelerations_must_be_those_of_the_motion(part:
 
 
 def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any) -> None:
-    # The path's own places are an eighth of a piece apart and a setpoint falls between two of them.
+    # The audit samples the path in eighths of a piece; the setpoint lies between two of its samples.
     row = moving(part, 100)
     assert part.program is not None
     case = part.with_path(tolerance=np.full(len(part.path), 1e-3))
@@ -224,11 +225,11 @@ def test_setpoints_of_rubbish_end_in_a_verdict(part: Any, seed: int) -> None:
 
 
 def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
-    # Two sides of a square at 10 mm/s: the step across the corner, half on each side, leaves it by 5 µm / √2.
+    # Two sides of a square at 10 mm/s: the step across the corner, half on each side, cuts it by 5 µm / √2.
     machine = Machine(
         "jumpy", tuple(Axis(n, 100.0, 1000.0, max_velocity_jump=10.0) for n in "XY"), 0.001, 0.004
     )
-    half = 0.305  # the corner comes 35.5 ms after the start
+    half = 0.305  # the tool reaches the corner after 35.5 ms
     corners = np.array([[0.0, 0.0], [half, 0.0], [half, half]])
     points = np.stack([corners[:-1], 0.5 * (corners[:-1] + corners[1:]), corners[1:]], axis=1)
     path = path_along(CompositeCurve.from_pieces(points, np.full(2, half)), feed=10.0)
@@ -245,14 +246,14 @@ def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
     assert ("chord", None) in broken(audit(narrow, profile, machine, setpoints=[points]))
 
 
-# Setpoints from anywhere, without a path.
+# Setpoints from other sources, without a path.
 
 PLANE = Machine("plane", (Axis("X", 60.0, 1000.0), Axis("Y", 60.0, 1000.0)))
 JUMPY = replace(PLANE, axes=tuple(replace(axis, max_velocity_jump=20.0) for axis in PLANE.axes))
 
 
 def trapezoid(t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """10 mm at 1000 mm/s² to 50 mm/s: 0.25 s."""
+    """Position at times t: 10 mm in 0.25 s, at 1000 mm/s² and up to 50 mm/s."""
     up, down = np.minimum(t, 0.05), np.clip(t - 0.2, 0.0, 0.05)
     return np.asarray(500 * up**2 + 50 * np.clip(t - 0.05, 0, 0.15) + 50 * down - 500 * down**2)
 
@@ -272,7 +273,7 @@ def audited(
     period: float = 0.001,
     **how: Any,
 ) -> Audit:
-    """The audit of setpoints as they are in a file, which may have no velocities and accelerations."""
+    """The audit of setpoints as read from a file, which may lack velocities and accelerations."""
     names = machine.axis_names if axes is None else axes
     none = np.empty((0, len(names)))
     rates = [none if column is None else column for column in (velocity, acceleration)]
@@ -283,7 +284,7 @@ def audited(
 
 
 def through_a_corner(jump_x: float, jump_y: float, share: float = 0.5) -> NDArray[np.float64]:
-    """At 20 mm/s in X; within step 100 the velocity jumps by these amounts."""
+    """Positions at 20 mm/s in X; within step 100 the velocity jumps by these amounts [mm/s]."""
     steps = np.tile([0.020, 0.0], (200, 1))
     steps[100:] += [1e-3 * jump_x, 1e-3 * jump_y]
     steps[99] += [share * 1e-3 * jump_x, share * 1e-3 * jump_y]
@@ -343,14 +344,15 @@ def test_a_turn_within_the_allowed_jump_is_a_corner_and_nothing_else_is(share: f
     turn = through_a_corner(-20.0, 20.0, share)
     assert audited(times, turn, JUMPY).failures == ()
     assert broken(audited(times, turn, PLANE)) == {("acceleration", "X"), ("acceleration", "Y")}
-    # More than is allowed in Y, also with 1 mm/s of acceleration a step; a burst ahead; a faster turn.
+    # In turn: a jump in Y above the allowed one plus 1 mm/s for the acceleration in a step; a jump of the
+    # speed alone, in X; a turn that adds speed in Y.
     assert ("acceleration", "Y") in broken(audited(times, through_a_corner(-20.0, 22.2, share), JUMPY))
     assert ("acceleration", "X") in broken(audited(times, through_a_corner(10.0, 0.0, share), JUMPY))
     assert ("acceleration", "Y") in broken(audited(times, through_a_corner(0.0, 20.0, share), JUMPY))
 
 
 def test_an_acceleration_kept_up_is_no_corner() -> None:
-    # A circle of 0.5 mm at 30 mm/s: 1800 mm/s² all the way round.
+    # A circle of radius 0.5 mm at 30 mm/s: 1800 mm/s² all the way round.
     angle = np.arange(201) * 0.06
     circle = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
     result = audited(np.arange(201) / 1000, circle, JUMPY)
@@ -391,7 +393,7 @@ def test_what_rotary_axes_do_is_told_in_degrees() -> None:
 
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve", "ruckig"])
 def test_a_setpoint_beside_a_stop_where_the_path_turns_back_may_be_on_either_side(method: str) -> None:
-    # Within a nanometre of the stop the tool is for several periods, with accelerations that differ.
+    # The tool is within a nanometre of the stop for several periods, while its acceleration changes.
     axes = [Axis(name, 0.018, 0.167, max_jerk=6.1) for name in "XYZ"]
     there_and_back = "G21 G90\nG1 Y0.01 Z0.01 F0.46\nZ0\nZ-0.01\nM2\n"
     made = plan(there_and_back, Machine("small", axes, period=0.001), method, tolerance=3.6e-5)

@@ -1,4 +1,4 @@
-"""Starts batches as users do, and reads their files."""
+"""Starts batches as users do, and reads the files that they write."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PART = "G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nG2 X30 Y10 R10\nM2\n"
 
 @dataclass(frozen=True)
 class Done:
-    """The result of a command."""
+    """The result of a command: exit code and output."""
 
     code: int
     said: str
@@ -31,7 +31,7 @@ def start(*arguments: str | Path) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        # The parent of the tests may ignore this signal.
+        # The process that runs the tests may ignore this signal, and children inherit that.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
@@ -61,7 +61,7 @@ def write(folder: Path, count: int) -> list[Path]:
 
 
 def content(folder: Path) -> dict[str, Any]:
-    """The files of a plan without the computing times in them."""
+    """The files of a plan's folder, without the computing times in them."""
     files: dict[str, Any] = {file.name: file.read_bytes() for file in folder.iterdir()}
     summary = json.loads(files["plan.json"])
     del summary["compute"]
@@ -72,7 +72,7 @@ def content(folder: Path) -> dict[str, Any]:
 
 
 def wait_for(what: Any, seconds: float = 60.0) -> Any:
-    """The first result of a function that is true."""
+    """Calls `what` until its result is true, and returns that result."""
     last = time.monotonic() + seconds
     while time.monotonic() < last:
         if found := what():

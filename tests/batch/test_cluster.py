@@ -115,7 +115,7 @@ def test_an_interrupt_and_a_limit_of_time_end_jobs_on_a_cluster(
     process.send_signal(signal.SIGINT)
     done = end(process)
     assert (done.code, done.told) == (130, "\nerror: interrupted\n")
-    # The workers have stopped; they stop too when the client is killed.
+    # The workers have stopped their jobs; they also stop if the client is killed.
     cluster.wait_until_idle()
     process = start(long, *SLOW, "-o", tmp_path / "other", *cluster.options)
     with cluster.client() as client:

@@ -1,4 +1,4 @@
-"""Joint motion: known times, limits on the true joints, what users are told where joints cannot follow."""
+"""Joint motion: known times, limits of the exact joints, and messages where joints cannot follow."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def without_travel(machine: Machine) -> Machine:
     ("distance", "time"), [(10.0, 1.835307436752), (1.0, 2.221472585005), (0.05, 2.436528749075)]
 )
 def test_the_cylindrical_machine_passes_its_axis_in_the_known_time(distance: float, time: float) -> None:
-    # The times are those of an independent implementation with closed forms of K, to 1e-12 s.
+    # Times of an independent implementation with closed forms of the kinematics, to 1e-12 s.
     line = CompositeCurve.from_bezier([[-100.0, distance, -30.0], [130.0, distance, 39.0]], width=230.0)
     problem = build_problem(path_along(line.elevated(2), feed=200.0), CYLINDER)
     profile = plan(problem)
@@ -46,13 +46,13 @@ def test_the_cylindrical_machine_passes_its_axis_in_the_known_time(distance: flo
     excess, use = worst_excess(problem, profile)
     assert excess <= 1e-9
     assert use >= 1 - 1e-6
-    # The same by a line of another parameter speed, cut unevenly.
+    # The same line with another parameter speed, cut unevenly.
     uneven = line.elevated(3).split([0, 0], [1.0, 97.0]).with_width([0.3, 20.0, 1.0])
     assert plan(build_problem(path_along(uneven, feed=200.0), CYLINDER)).time == pytest.approx(time, rel=1e-9)
 
 
 def test_a_circle_about_the_column_is_one_joint_alone() -> None:
-    # r = 50: the column turns 360 deg at A = 20 rad/s², and the tool goes 150 mm/s where V = 3 rad/s.
+    # r = 50 mm: the column turns 360° with A = 20 rad/s²; at V = 3 rad/s the tool moves at 150 mm/s.
     problem = build_problem(path_along(circle([0.0, 0.0, 5.0], 50.0), feed=1e6), CYLINDER)
     v, a, way = 3.0, 20.0, 2 * np.pi
     assert plan(problem).time == pytest.approx(way / v + v / a, rel=1e-8)
@@ -62,7 +62,7 @@ def test_a_circle_about_the_column_is_one_joint_alone() -> None:
 
 
 def random_problem(name: str, seed: int) -> Problem:
-    """A random NURBS curve of the tool, about half of them rational, some with the tool's direction."""
+    """A random NURBS curve of the tool; about half are rational, and some have tool directions."""
     rng = np.random.default_rng(seed)
     machine = without_travel(Machine.load(name))
     axes, coordinate_mode = machine.inverse.tip_names, None
@@ -79,7 +79,7 @@ def random_problem(name: str, seed: int) -> Problem:
     scale = np.array([0.02 * size if letter in "IJK" else size for letter in axes])
     points = start + np.cumsum(rng.normal(size=(count, len(axes))) * scale * 0.7, axis=0)
     if rng.random() < 0.15:
-        # Nearly a cusp: neighbouring control points all but coincide.
+        # Nearly a cusp: two neighbouring control points nearly coincide.
         first = int(rng.integers(0, count - 1))
         points[first + 1] = points[first] + 10 ** rng.uniform(-9, -3) * scale * rng.normal(size=len(axes))
     inner = np.sort(rng.uniform(0, 1, count - degree - 1))
@@ -108,7 +108,8 @@ def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "seed"), [("corexy", 1200), ("cylindrical", 1195)])
 def test_pieces_some_micrometres_long_keep_the_digits_of_their_derivatives(name: str, seed: int) -> None:
-    # From control points 100 mm off these accelerations cannot be told closer than 1e-7 of their limits.
+    # Computed from control points 100 mm away from the origin, these accelerations would be uncertain by 1e-7
+    # of their limits.
     problem = random_problem(name, seed)
     excess, use = worst_excess(problem, plan(problem))
     assert excess <= 1e-9
@@ -137,7 +138,7 @@ def test_a_singular_place_and_a_travel_end_are_told_with_their_lines() -> None:
 
 
 def test_crossed_belts_plan_as_the_same_limits_in_their_own_directions() -> None:
-    # Along x = y one motor stands still and the other goes twice as far.
+    # Along x = y one motor stands still and the other moves twice as far.
     belts = without_travel(Machine.load("corexy"))
     line = CompositeCurve.from_bezier([[0.0, 0.0, 0.0], [100.0, 100.0, 0.0]], width=100.0).elevated(2)
     motor = belts.axes[0]

@@ -1,4 +1,4 @@
-"""Speeds where pieces meet, on pieces of any degree."""
+"""Speed limits where pieces meet, on pieces of any degree."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_end_edges_are_the_first_and_the_last_that_have_a_length() -> None:
 
 
 def test_a_jump_of_velocity_limits_the_speed_at_corners_of_any_degree() -> None:
-    # Along X, a cubic from X into Y, then a corner of 90 degrees into −X at a cusp of both sides.
+    # Along X; a cubic that turns from X to Y; a corner of 90 degrees into −X where both sides have C' = 0.
     curve = CompositeCurve.joined(
         [
             bezier([0, 0], [2, 0]),

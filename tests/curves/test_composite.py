@@ -27,7 +27,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def random_knots(rng: np.random.Generator, points: int, degree: int, clamped: bool) -> NDArray[np.float64]:
-    """Knots with some of them repeated, never so often that the curve falls apart."""
+    """Random knots, some repeated, but never so often that the curve is disconnected."""
     steps = rng.uniform(0.2, 2.0, points + degree + 1)
     steps[rng.uniform(size=len(steps)) < 0.3] = 0.0
     steps[[degree + 1, points]] = 1.0
@@ -81,7 +81,7 @@ def fractions_at(curve: CompositeCurve, piece: int, u: float) -> list[list[Fract
 
 
 def assert_exact(curve: CompositeCurve, piece: int, u: float, tolerance: float) -> None:
-    """Each order to `tolerance` of its greatest component, or of what the size of the piece lets expect."""
+    """Each derivative is exact to `tolerance` of its greatest component, or of its expected size if more."""
     found = curve.evaluate([piece], [u], order=3)[:, 0]
     expected = np.array(fractions_at(curve, piece, u), dtype=float)
     rows = slice(curve.offsets[piece], curve.offsets[piece + 1])
@@ -114,7 +114,7 @@ def test_arrays_are_views_of_what_the_native_curve_holds(axes: int) -> None:
             column = getattr(one, name)
             assert np.shares_memory(column, one.native.fields()[name])
             assert not column.flags.writeable
-    # The memory stays as long as a view of it.
+    # A view keeps the memory alive.
     column = curve.control_points
     del curve, one
     np.testing.assert_array_equal(column, points)

@@ -1,4 +1,4 @@
-"""Lengths along curves of any degree against closed forms, exact changes of the curve and integration."""
+"""Lengths along curves of any degree: closed forms, changes that keep the length, numerical integration."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def test_the_unit_parabola_has_its_known_length() -> None:
 
 
 def test_a_parabola_by_weights_has_the_same_length() -> None:
-    # The weights 1, r, r² change the parameter only.
+    # Weights 1, r, r² change only the parametrisation.
     curve = CompositeCurve.from_bezier([[0, 0], [0.5, 0], [1, 0.5]], [1, 7, 49])
     assert CurveLength(curve).total == pytest.approx((math.sqrt(2) + math.asinh(1)) / 2, abs=1e-15)
 
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-8, 1e-12, 1e-15])
 def test_a_cusp_costs_no_accuracy(accuracy: float) -> None:
-    # (s², s³) on [−1, 1]: 2 (13^1.5 − 8)/27.
+    # (s², s³) on [−1, 1]: its length is 2 (13^1.5 − 8)/27.
     curve = CompositeCurve.from_bezier([[1.0, -1], [-1 / 3, 1], [-1 / 3, -1], [1, 1]], width=2.0)
     exact = 2 * (13**1.5 - 8) / 27
     length = CurveLength(curve, accuracy)

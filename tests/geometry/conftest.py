@@ -1,4 +1,4 @@
-"""Programs written by hand, and a check of paths that knows nothing of how they are built."""
+"""Programs written by hand, and a check of paths that is independent of how they are built."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Check = Callable[[Program, Path], tuple[float, float]]
 def _make_program(
     points: ArrayLike, axes: str = "XYZ", arcs: dict[int, Any] | None = None, **columns: Any
 ) -> Program:
-    """G1 moves at 50 mm/s in G64 along `points`, missing coordinates 0.
+    """G1 moves at 50 mm/s in G64 along `points`; missing coordinates are 0.
 
-    `arcs` maps moves to (centre, normal, angle). Other columns are given as one value or one per move.
+    `arcs` maps moves to (centre, normal, angle). Other columns are given as one value or as one per move.
     """
     given = np.array(points, dtype=float, ndmin=2)
     full = np.zeros((len(given), len(axes)))
@@ -62,7 +62,7 @@ def _make_program(
 
 
 def _curve(control: Array, weight: Array, t: Array) -> Array:
-    """Points (n, axes) of quadratics (n, 3, axes) with middle weights (n,), one t each."""
+    """Points (n, axes) on quadratics (n, 3, axes) with middle weights (n,), at one t each."""
     s, w = t[:, None], weight[:, None]
     b0, b1, b2 = (1 - s) ** 2, 2 * w * s * (1 - s), s**2
     found: Array = (b0 * control[:, 0] + b1 * control[:, 1] + b2 * control[:, 2]) / (b0 + b1 + b2)
@@ -70,7 +70,7 @@ def _curve(control: Array, weight: Array, t: Array) -> Array:
 
 
 def _weights(path: Path) -> Array:
-    """(n,) middle weights of the path's conics, which are in standard form."""
+    """Middle weights (n,) of the path's conics, whose end weights are 1."""
     if path.curve.weights is None:
         return np.ones(len(path))
     weights = path.curve.weights.reshape(-1, 3)
@@ -79,7 +79,7 @@ def _weights(path: Path) -> Array:
 
 
 class _Moves:
-    """The programmed path: lines, and arcs whose radius and other axes are linear in the angle."""
+    """The programmed path: lines, and arcs whose radius and remaining axes are linear in the angle."""
 
     def __init__(self, program: Program, axes: tuple[str, ...]) -> None:
         columns = [program.axes.index(name) for name in axes]
@@ -101,7 +101,7 @@ class _Moves:
             self.sweep[move] = np.hypot(*last) - np.hypot(*first), program.arc_angle[row]
 
     def points(self, move: NDArray[np.intp], share: Array) -> Array:
-        """Points (n, axes), one move and one share each."""
+        """Points (n, axes) at a share in [0, 1] of one move each."""
         found: Array = self.start[move] + share[:, None] * (self.end[move] - self.start[move])
         rows = np.flatnonzero(self.turns[move] > 0)
         radius, angle = (self.polar[move[rows]] + share[rows, None] * self.sweep[move[rows]]).T
@@ -111,9 +111,9 @@ class _Moves:
 
 
 def _nearest(points: Array, curve: Callable[[Array], Array], grid: int) -> Array:
-    """Distance (n,) of each point from its curve(x), x in [0, 1], which may be closed.
+    """Distance (n,) of each point from its own curve(x), x in [0, 1]; the curve may be closed.
 
-    The best of a grid in each half, then golden sections around both.
+    The best point of a grid in each half of the curve is refined by golden section search.
     """
 
     def distance(x: Array) -> Array:
@@ -136,10 +136,10 @@ def _nearest(points: Array, curve: Callable[[Array], Array], grid: int) -> Array
 
 
 def _deviations(program: Program, path: Path) -> tuple[Array, Array]:
-    """Distance of each piece from the moves it follows and of each move from the pieces that follow it."""
+    """Distance of each piece from the moves it follows, and of each move from the pieces that follow it."""
     moves = _Moves(program, path.axes)
     counts = path.move[:, 1] - path.move[:, 0] + 1
-    # All pairs of a piece and a move that it follows, each seen from samples on both.
+    # All pairs of a piece and a move that it follows, with samples on both.
     piece = np.repeat(np.arange(len(path)), counts)
     move = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts) + path.move[piece, 0]
     found = []
@@ -157,7 +157,7 @@ def _deviations(program: Program, path: Path) -> tuple[Array, Array]:
                 nearest[chosen] = _nearest(on_piece(share[chosen]), on_move, 2 + int(100 * turns))
             else:
                 nearest[chosen] = _nearest(on_move(share[chosen]), on_piece, 4)
-        # Each sample of an owner counts with the nearest of its partners.
+        # A sample counts with its nearest partner.
         table = np.full((owner.max() + 1, samples), np.inf)
         np.minimum.at(table, (owner[rows], np.tile(np.arange(samples), len(piece))), nearest)
         found.append(table.max(axis=1))
@@ -165,16 +165,17 @@ def _deviations(program: Program, path: Path) -> tuple[Array, Array]:
 
 
 def _check(program: Program, path: Path) -> tuple[float, float]:
-    """Asserts what every path without velocity jumps must fulfil; the greatest distances found, both ways."""
+    """Asserts what every path without velocity jumps must satisfy; returns the greatest distances found, from
+    pieces to moves and from moves to pieces."""
     control, columns = path.curve.by_piece, [program.axes.index(name) for name in path.axes]
     rounding = 1e-13 + 1e-14 * np.abs(control).max()
     assert np.isfinite(control).all()
     assert (path.width > 0).all()
-    # Joined without a gap, from the programmed start to the programmed end.
+    # Pieces meet exactly, from the programmed start to the programmed end.
     np.testing.assert_array_equal(control[1:, 0], control[:-1, 2])
     np.testing.assert_array_equal(control[0, 0], program.start[columns])
     np.testing.assert_array_equal(control[-1, 2], program.target[-1, columns])
-    # All moves are followed, in order, at no more than their feeds.
+    # All moves are followed, in order, and no piece is faster than the feeds of its moves.
     assert path.move[0, 0] == 0
     assert path.move[-1, 1] == len(program) - 1
     assert (np.diff(path.move, axis=0) >= 0).all()
@@ -183,7 +184,7 @@ def _check(program: Program, path: Path) -> tuple[float, float]:
     slowest = [program.feed[first : last + 1].min() for first, last in path.move]
     if set(path.axes) <= set("XYZ"):
         assert (path.feed <= np.array(slowest)).all()
-    # The direction is continuous within runs, as far as coordinates can tell.
+    # The direction is continuous within runs, up to the rounding of coordinates.
     out, into = control[:-1, 2] - control[:-1, 1], control[1:, 1] - control[1:, 0]
     lengths = np.linalg.norm(out, axis=1), np.linalg.norm(into, axis=1)
     turn = np.linalg.norm(out / lengths[0][:, None] - into / lengths[1][:, None], axis=1)
@@ -191,7 +192,7 @@ def _check(program: Program, path: Path) -> tuple[float, float]:
     inner = np.ones(len(turn), dtype=bool)
     inner[path.runs[1:-1] - 1] = False
     assert (turn[inner] <= 1e-9 + noise[inner]).all()
-    # Runs end where the program halts, wherever else they do.
+    # Runs end at every halt of the program; they may end elsewhere too.
     assert path.runs[0] == 0
     assert path.runs[-1] == len(path)
     assert (np.diff(path.runs) > 0).all()
@@ -199,7 +200,7 @@ def _check(program: Program, path: Path) -> tuple[float, float]:
     halts = np.flatnonzero(program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP))
     assert set(halts) <= set(path.move[path.runs[1:] - 1, 1])
     assert path.dwell.sum() == program.dwell.sum()
-    # As near as promised, both ways.
+    # The distances are within the promised ones, both ways.
     pieces, moves = _deviations(program, path)
     assert (pieces <= path.tolerance * (1 + 1e-9) + rounding).all()
     assert pieces.max() <= path.fit.deviation + rounding
@@ -216,5 +217,5 @@ def make_program() -> ProgramMaker:
 
 @pytest.fixture(scope="session")
 def check() -> Check:
-    """Asserts everything a path promises; returns the greatest distances found, path to program and back."""
+    """Asserts all that a path promises; returns the greatest distances found, path to program and back."""
     return _check

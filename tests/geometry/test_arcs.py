@@ -1,4 +1,4 @@
-"""Arcs and helices of programs: every plane, several turns, tiny and huge radii."""
+"""Arcs and helices of programs: every plane, several turns, very small and very large radii."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_quarter_and_full_circles_in_every_plane(
     assert len(path) == round(abs(angle) / (math.pi / 2))
     assert max(off, path.fit.deviation) < 1e-13
     assert_on_cylinder(path, normal, 10.0)
-    # At the turned angle 0 the direction is that of the second axis.
+    # At the angle 0 in the plane the direction is that of the second axis.
     spoke = path.curve.by_piece[0, 0] - [1, 2, 3]
     step = path.curve.by_piece[0, 1] - path.curve.by_piece[0, 0]
     turning = np.cross(spoke, step)
@@ -67,7 +67,7 @@ def test_a_helix_of_three_and_a_quarter_turns(make_program: Any, check: Any, nor
     path = build_path(program, MILL)
     off, _ = check(program, path)
     assert_on_cylinder(path, normal, 4.0)
-    # The axis is linear in the angle from piece to piece, and off within.
+    # The third axis is linear in the angle at the ends of pieces, but not within them.
     axis = path.curve.by_piece[:, :, normal]
     np.testing.assert_allclose(np.diff(axis, axis=1), axis[0, 1] - axis[0, 0], rtol=1e-9)
     assert 0.5 * path.fit.deviation < off <= path.fit.deviation <= 0.5e-3
@@ -100,7 +100,7 @@ def test_helices_are_no_looser_than_the_tolerance(make_program: Any) -> None:
 
 
 def test_rounded_ends_lie_on_one_circle_and_a_spiral_is_none(make_program: Any, check: Any) -> None:
-    # Three decimals: both ends are beside the circle of radius 10, on opposite sides.
+    # With three decimals one end is inside and the other outside of the circle of radius 10.
     points = [[6.428, 7.661], [-9.848, 1.736]]
     angle = math.atan2(1.736, -9.848) - math.atan2(7.661, 6.428)
     rounded = make_program(points, arcs={0: ((0, 0, 0), 2, angle)}, control=PathControl.EXACT_PATH)
@@ -114,7 +114,7 @@ def test_rounded_ends_lie_on_one_circle_and_a_spiral_is_none(make_program: Any, 
     centre = np.linalg.solve(np.stack([a, b]), [a @ a / 2, b @ b / 2]) + points[0]
     radius = np.linalg.norm(centre - points[0])
     np.testing.assert_allclose(np.linalg.norm(control[:, 2, :2] - centre, axis=1), radius, rtol=1e-12)
-    # The centre is the one on the bisector of both ends that is nearest to the programmed one.
+    # The centre is the point on the bisector of both ends that is nearest to the programmed centre.
     np.testing.assert_allclose(centre @ [-b[1], b[0]], 0.0, atol=1e-9)
     spiral = make_program([[10, 0], [0, 10.5]], arcs={0: ((0, 0, 0), 2, math.pi / 2)})
     path = build_path(spiral, MILL)
@@ -124,7 +124,7 @@ def test_rounded_ends_lie_on_one_circle_and_a_spiral_is_none(make_program: Any, 
 
 
 def test_rounded_coordinates_leave_arcs_joined_to_their_neighbours(make_program: Any, check: Any) -> None:
-    # A slot with 3 decimals: its arcs are tangent to its lines but for rounding.
+    # A slot with 3 decimals: its arcs are tangent to its lines up to rounding.
     points = [[0.003, -2.5], [10, -2.5], [12.165, 1.25], [6.667, 4.773], [0, 3]]
     arc = ((10.0, 0.0, 0.0), 2, math.atan2(1.25, 2.165) + math.pi / 2)
     for control in (PathControl.EXACT_PATH, PathControl.TOLERANCE):
@@ -139,7 +139,7 @@ def test_rounded_coordinates_leave_arcs_joined_to_their_neighbours(make_program:
 
 
 def test_corners_between_arcs_and_lines_are_rounded_within_tolerance(make_program: Any, check: Any) -> None:
-    # Into the half circle smoothly, out of it into a line at a right angle.
+    # Smoothly into the half circle, and at a right angle out of it into a line.
     points = [[0, 0], [10, 0], [10, 20], [10, 40]]
     arcs = {1: ((10.0, 10.0, 0.0), 2, math.pi)}
     for tolerance in (0.02, 0.5):

@@ -1,4 +1,4 @@
-"""Programs become paths: path control, runs, feeds, axes, travel and faults."""
+"""Programs become paths: path control, runs, feeds, axes, travel and errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CIRCLE = [[10 * math.cos(a), 10 * math.sin(a)] for a in np.linspace(0, 2 * math.
 
 
 def with_axes(**changes: Any) -> Machine:
-    """The mill with the same change to all axes."""
+    """The machine `mill` with the same change to all axes."""
     return dataclasses.replace(MILL, axes=tuple(dataclasses.replace(axis, **changes) for axis in MILL.axes))
 
 
@@ -91,7 +91,7 @@ def test_q_bounds_the_fit_and_not_the_corners(make_program: Any, check: Any) -> 
     tight = make_program(points, blend_tolerance=0.1, fit_tolerance=2e-3)
     paths = [build_path(program, MILL) for program in (loose, tight)]
     for program, path in zip((loose, tight), paths, strict=True):
-        # The corner from the circle into the line takes all that is left.
+        # The corner from the circle into the line uses the rest of the tolerance.
         assert check(program, path)[1] == pytest.approx(0.1, rel=0.05)
     assert len(paths[1]) > 1.3 * len(paths[0])
     unfitted = build_path(make_program(points, blend_tolerance=0.1, fit_tolerance=0.0), MILL)
@@ -125,7 +125,7 @@ def test_rapids_are_lines_without_a_feed_and_share_corners(make_program: Any, ch
     path = build_path(program, MILL)
     check(program, path)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
-    # Where the feed changes in a corner, it changes in its middle.
+    # Where the feed changes at a corner, it changes in the middle of the blend.
     np.testing.assert_array_equal(path.feed, [np.inf, np.inf, 50, 50, 50, 50, 50, np.inf, np.inf])
     np.testing.assert_array_equal(path.move[[1, 2]], [[0, 0], [1, 1]])
 
@@ -178,7 +178,7 @@ def test_a_feed_counts_along_the_linear_axes_where_they_move(make_program: Any, 
     program = make_program(points, axes="XYZA", control=PathControl.EXACT_STOP, feed=6.0)
     path = build_path(program, rotary)
     np.testing.assert_array_equal(path.feed, 6.0)
-    # X and A, A alone, X alone.
+    # The moves: X and A, A alone, X alone.
     free = np.inf
     np.testing.assert_array_equal(path.group_feed, [[6.0, free, free], [free, free, 6.0], [6.0, free, free]])
     helix = make_program(
@@ -191,11 +191,11 @@ def test_a_feed_counts_along_the_linear_axes_where_they_move(make_program: Any, 
     np.testing.assert_array_equal(build_path(helix, rotary).group_feed[:, 0], 6.0)
     blend = make_program([[0, 0, 0, 0], [9, 0, 0, 0], [9, 0, 0, 9]], axes="XYZA", feed=np.array([6.0, 2.0]))
     path = build_path(blend, rotary)
-    # Each half of the corner keeps the feeds of both moves.
+    # The whole blend keeps the feeds of both moves.
     corner = [[6.0, free, 2.0]] * (len(path) - 2)
     np.testing.assert_array_equal(path.group_feed, [[6.0, free, free], *corner, [free, free, 2.0]])
     assert build_path(make_program([[0, 0, 0], [3, 0, 4]]), rotary).group_feed is None
-    # A chain is cut where the same number counts along other axes.
+    # A sequence of points is not fitted as one curve where an equal feed counts along other axes.
     turn = [[0.2 * min(i, 10), 0, 0, 0.2 * max(i, 10)] for i in range(21)]
     path = build_path(make_program(turn, axes="XYZA", feed=6.0), rotary)
     assert (np.isfinite(path.group_feed).sum(axis=1) == 1).sum() >= 2
@@ -213,7 +213,7 @@ def test_positions_outside_the_travel_name_line_axis_and_limit(make_program: Any
     )
     with pytest.raises(InputError, match=r"line 10: A reaches 400 deg, its travel ends at 90 deg: move"):
         build_path(make_program([[0, 0, 0, 0], [1, 0, 0, 400]], axes="XYZA"), turning)
-    # An arc that touches the limit is within, though the curve that follows it is not quite.
+    # The programmed arc only touches the limit and is accepted; its fitted curve exceeds it slightly.
     touching = make_program([[0, -10], [0, 10]], arcs={0: ((0, 0, 0), 2, math.pi)})
     build_path(touching, machine)
     beyond = make_program([[0, -10], [0, 10]], arcs={0: ((0.01, 0, 0), 2, math.pi)})

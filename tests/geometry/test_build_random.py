@@ -1,4 +1,4 @@
-"""Random programs: whatever the moves, modes, feeds and tolerances, the path keeps its promises."""
+"""Random programs: for all moves, modes, feeds and tolerances, the path keeps its promises."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MILL = Machine.load("mill")
 
 @st.composite
 def polylines(draw: st.DrawFn) -> tuple[np.ndarray[Any, Any], dict[str, Any]]:
-    """Points with steps from a micrometre to a centimetre, smooth or not, some rounded; and their columns."""
+    """Points with steps from a nanometre to a centimetre, smooth or not, some rounded; and their columns."""
     count = draw(st.integers(1, 40))
     seed = draw(st.integers(0, 2**32 - 1))
     random = np.random.default_rng(seed)
@@ -69,7 +69,7 @@ def test_random_mixtures_of_lines_and_arcs_keep_every_promise(
     points, arcs = [np.zeros(3)], {}
     heading = 0.0
     for move in range(12):
-        # Half of the joints are tangent, as posts write them: with rounded coordinates.
+        # Half of the joints are tangent, up to the rounding of coordinates as posts write them.
         heading += random.choice([0.0, random.normal()])
         direction = np.array([math.cos(heading), math.sin(heading), 0.0])
         if random.random() < 0.5:
@@ -97,7 +97,7 @@ def test_the_path_does_not_depend_on_the_number_of_threads(make_program: Any) ->
     import subprocess
     import sys
 
-    # Three runs of thousands of pieces, with gentle and sharp turns.
+    # Three runs with thousands of pieces, with gentle and sharp turns.
     script = """
 import hashlib, numpy as np
 from feedplan.geometry.build import build_path

@@ -1,4 +1,4 @@
-"""Paths of curves and of points, without a program."""
+"""Paths built from curves and from points, without a program."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_bspline_of_scipy_is_followed_in_its_own_parameter_but_for_a_factor() 
     total = path.width.sum()
     share = np.linspace(0, 1, 30)
     np.testing.assert_allclose(at(path.curve, np.minimum(share * total, total))[0], spline(share), atol=1e-11)
-    # The parameter is a length, that of the control polygons.
+    # The parameter has the unit of length: the sum of the lengths of the control polygons.
     own = [path.curve[i : i + 1].control_points for i in range(len(path))]
     edges = sum(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in own)
     length = np.linalg.norm(np.diff(spline(np.linspace(0, 1, 4001)), axis=0), axis=1).sum()
@@ -77,7 +77,7 @@ def test_runs_end_at_corners_and_pass_tangent_joints() -> None:
 
 
 def test_a_cusp_is_the_end_of_a_piece_and_of_a_run_where_the_motion_turns() -> None:
-    # (s², s³) about t = 0.3: the motion turns back in the cusp.
+    # (s², s³) with s = t − 0.3: the motion turns back in the cusp.
     def blossom(a: float, b: float, e: float) -> list[float]:
         a, b, e = a - 0.3, b - 0.3, e - 0.3
         return [(a * b + a * e + b * e) / 3, a * b * e]
@@ -87,7 +87,7 @@ def test_a_cusp_is_the_end_of_a_piece_and_of_a_run_where_the_motion_turns() -> N
     assert len(path) == 2
     assert path.width[0] / path.width.sum() == pytest.approx(0.3, abs=1e-9)
     np.testing.assert_array_equal(path.runs, [0, 1, 2])
-    # A curve rests in its cusp, even where the motion goes on: the curvature has no bound there.
+    # The tool rests in a cusp even where the motion continues: the curvature is unbounded there.
     flat = Path.from_bezier([[0, 0], [0, 0], [0, 0], [1, 0], [2, 1]])
     line = CompositeCurve.from_bezier([[-1, 0], [0, 0]])
     joined = CompositeCurve.joined([line, flat.curve])
@@ -95,10 +95,10 @@ def test_a_cusp_is_the_end_of_a_piece_and_of_a_run_where_the_motion_turns() -> N
 
 
 def test_straight_curves_are_lines_from_turn_to_turn() -> None:
-    # A line that stands still for a moment goes on: t³ about one half.
+    # t³ about t = 1/2: a line on which C' vanishes at one point is still one line.
     line = Path.from_bezier([[-1, -2], [1, 2], [-1, -2], [1, 2]])
     np.testing.assert_array_equal(line.curve.control_points, [[-1, -2], [1, 2]])
-    # A conic with its turn at half way; before and after it spans of the same line.
+    # A conic that turns back half way, between spans of the same line.
     spline = CompositeCurve.joined(
         [
             CompositeCurve.from_bspline([[0, 0], [1, 1], [2, 2]], [0, 0, 1, 2, 2], 1),
@@ -110,7 +110,7 @@ def test_straight_curves_are_lines_from_turn_to_turn() -> None:
     np.testing.assert_array_equal(path.curve.degree, [1, 1, 1])
     np.testing.assert_array_equal(path.runs, [0, 2, 3])
     np.testing.assert_array_equal(path.move, [[0, 0], [1, 2], [2, 3]])
-    # 3/(1 + 3) of the way to the middle point; at the ends of pieces the parameter is that of the curve.
+    # The turn is 3/(1 + 3) of the way to the middle control point; the parameter at ends is unchanged.
     np.testing.assert_allclose(path.curve.control_points[3], [3.5, 3.5], rtol=1e-15)
     np.testing.assert_array_equal(path.width, [1.0, 2.0, 2.0])
     np.testing.assert_allclose(at(spline, [3.0])[0, 0], [3.5, 3.5], rtol=1e-15)
@@ -146,7 +146,7 @@ def test_points_are_fitted_and_corners_rounded_within_the_tolerance() -> None:
     exact = Path.from_points(points, 0)
     np.testing.assert_array_equal(exact.runs, np.arange(102))
     sharp = Path.from_points([[0, 0, 0], [10, 0, 0], [10, 10, 0]], 0.1)
-    # As far as the tolerance allows: the apex is at it.
+    # The apex of the rounded corner uses the whole tolerance.
     assert sharp.fit.deviation == pytest.approx(0.1)
     assert sharp.axes == ("X", "Y", "Z")
 

@@ -1,4 +1,4 @@
-"""Corners: shape, symmetry, sharing of short moves, reversals, and everything that a corner may meet."""
+"""Blends of corners: shape, symmetry, sharing of short moves, reversals, and special neighbours."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_neighbours_share_a_short_edge_by_halves(make_program: Any, check: Any) 
 
 
 def test_a_neighbour_that_needs_little_leaves_the_rest(make_program: Any, check: Any) -> None:
-    # A slight turn and a sharp one on the two ends of a short edge.
+    # A slight turn and a sharp one at the two ends of a short edge.
     points = [[-20, -0.02], [0, 0], [0.1, 0], [0.1, 20]]
     program = make_program(points, blend_tolerance=1.0, fit_tolerance=0.0)
     path = build_path(program, MILL)
@@ -72,7 +72,7 @@ def test_a_neighbour_that_needs_little_leaves_the_rest(make_program: Any, check:
 
 
 def test_a_corner_reaches_over_short_pieces(make_program: Any, check: Any) -> None:
-    # Arcs of 0.005 rad, one smooth curve, run into a line at a right angle.
+    # Arcs of 0.005 rad each, one smooth curve, end in a line at a right angle.
     turn = np.linspace(0, 1, 201)
     end = [10 * math.sin(1), 10 - 10 * math.cos(1)]
     arc = 10 * np.stack([np.sin(turn), 1 - np.cos(turn)], axis=1)
@@ -83,7 +83,7 @@ def test_a_corner_reaches_over_short_pieces(make_program: Any, check: Any) -> No
     _, off = check(program, path)
     assert off == pytest.approx(0.1, rel=1e-3)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
-    # Bent circles stay conics, off their circle by more and more.
+    # Conics that the blend bends stay conics, increasingly far from their circle.
     (joints,) = path.curve.evaluate(np.arange(200), path.width[:200])
     distance = np.abs(np.linalg.norm(joints[:, :2] - [0, 10], axis=1) - 10)
     assert (distance > 0.02).sum() >= 2
@@ -150,7 +150,7 @@ def test_a_closed_contour_starts_and_ends_at_rest_in_its_first_corner(make_progr
 
 
 def test_a_slight_turn_between_long_moves_is_no_stop(make_program: Any, check: Any) -> None:
-    # So little turn that the feed needs nanometres of a move of 100 mm.
+    # The turn is so slight that the feed of 1 mm/s needs only nanometres of the moves of 100 mm.
     for tolerance in (None, 1e-3, 1e-5):
         program = make_program([[0, 0], [100, 0], [200, 0.01]], feed=1.0)
         path = build_path(program, MILL, tolerance)

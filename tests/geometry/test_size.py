@@ -1,4 +1,4 @@
-"""Smooth paths keep the size of arcs and of bends of G1 moves, and say by how much they miss it."""
+"""Smooth paths keep the size of arcs and of bends of G1 moves, and report by how much they miss it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.campaign import examples
 Array = NDArray[np.float64]
 
 MILL = Machine.load("mill")
-# Three circles of radius 2 mm around (8, 0) between lines at right angles to them.
+# Three full circles of radius 2 mm about (8, 0), entered and left by lines at right angles to them.
 HOLE = "G21 G90 G64\nG0 X0 Y0\nF600\nG1 X10\n" + 3 * "G3 X10 Y0 I-2 J0\n" + "G1 X20\nM2\n"
 
 
@@ -37,7 +37,7 @@ def program(text: str) -> Program:
 
 
 def hole_radii(path_choice: str) -> Array:
-    """Distances of setpoints from the centre, of those a millimetre or more from the corners."""
+    """Distances from the centre [mm], of setpoints on the circles at least 1 mm from the corners."""
     chunk = plan(program(HOLE), MILL, "jerk-limited", tolerance=0.1, path=path_choice).setpoints().all()
     place = chunk.position[:, :2]
     on_circle = (chunk.line >= 5) & (chunk.line <= 7) & (np.hypot(*(place - [10.0, 0.0]).T) > 1.0)
@@ -62,7 +62,7 @@ def test_the_fastest_path_cuts_bends_and_says_so(
     for choice in ("as-fitted", "fastest"):
         command = ["plan", str(file), "--method", "s-curve", "--tolerance", "0.1", "--path", choice]
         assert main([*command, "-o", str(tmp_path / choice)]) == 0
-        # The sides are named to the user.
+        # The command tells the user which side.
         assert "outside" in capsys.readouterr().out
         found[choice] = json.loads((tmp_path / choice / "plan.json").read_text(encoding="utf-8"))["fit"]
         assert "outside" in (tmp_path / choice / "report.html").read_text(encoding="utf-8")
@@ -76,7 +76,7 @@ def test_the_fastest_path_cuts_bends_and_says_so(
 
 
 def arc_of(path: Path, move: int, count: int = 300) -> Array:
-    """Places of the pieces that follow a move."""
+    """Points of the pieces that follow a move."""
     piece = np.flatnonzero((path.move[:, 0] <= move) & (path.move[:, 1] >= move))
     piece = np.repeat(piece, count)
     part = np.tile(np.linspace(0.0, 1.0, count), len(piece) // count)
@@ -96,7 +96,7 @@ def arc_of(path: Path, move: int, count: int = 300) -> Array:
 def test_arcs_of_any_size_are_followed_to_two_percent_of_the_tolerance_away_from_their_ends(
     radius: float, sweep: float, tolerance: float, touch: bool, climb: float
 ) -> None:
-    """Before and after the arc a line touches it, or makes a corner of 90°, which bends ten tolerances of it.
+    """A line before and after touches the arc, or makes a corner of 90°, which bends the arc near its ends.
 
     Away from the ends means farther than 2 √(6 tolerance · radius), two intervals of the fit, or in the
     middle half.
@@ -122,7 +122,7 @@ def test_arcs_of_any_size_are_followed_to_two_percent_of_the_tolerance_away_from
 
 
 def offsets(moves: Program, path: Path) -> Array:
-    """Offsets of the path from the points of G1 moves that turn by less than 30°, positive outside."""
+    """Offsets [mm] of the path at the points of G1 moves that turn by less than 30°, positive outwards."""
     points = np.vstack([moves.start, moves.target])[:, :2]
     found = []
     for i in range(2, len(points) - 1):
@@ -148,7 +148,7 @@ def offsets(moves: Program, path: Path) -> Array:
 def test_points_on_a_bend_are_within_a_tenth_of_the_tolerance_in_the_mean(
     radius: float, turn: float, sweep: float, tolerance: float, noise: float, seed: int
 ) -> None:
-    """Chords of an arc between lines that touch it, with noise where that is far below their sagitta."""
+    """Chords of an arc between lines that touch it, with noise where that is far below the sagitta."""
     count = max(3, round(sweep / turn))
     angle = math.radians(turn) * np.arange(count + 1)
     off = np.zeros(count + 1)
@@ -163,10 +163,10 @@ def test_points_on_a_bend_are_within_a_tenth_of_the_tolerance_in_the_mean(
 
 
 def test_what_is_reported_is_what_is_measured(make_program: Any) -> None:
-    """A circle in chords of 4° that are cut to the tolerance."""
+    """A circle of radius 5 mm in chords of 4°, at a tolerance of 0.05 mm."""
     angle = np.radians(4.0) * np.arange(91)
     moves = make_program(5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1), blend_tolerance=0.05)
-    # At an even speed the second path cuts the bend up to the tolerance.
+    # The given motion has a constant speed: the second path cuts the bend up to the tolerance.
     straight, max_jerk = np.zeros((1, 2)), np.full(2, 1e3)
     run, start, place, speed_sq = np.array([[0, 89]]), np.array([0, 1]), np.zeros(1), np.ones(1)
     motion = Motion(run, start, place, speed_sq, straight, straight, max_jerk)
@@ -177,7 +177,7 @@ def test_what_is_reported_is_what_is_measured(make_program: Any) -> None:
         assert path.fit.inside is not None
         assert path.fit.outside is not None
         assert path.fit.inside == pytest.approx(max(0.0, -measured.min()), abs=0.0015)
-        # Between its ends a chord is inside of the circle, by 3 µm.
+        # `outside` includes the 3 µm by which the middle of a chord is inside of the circle.
         assert path.fit.outside >= max(0.0, measured.max()) - 1e-4
     rounded = build_path(moves, MILL)
     assert rounded.fit.mean_offset is None

@@ -1,4 +1,4 @@
-"""Smooth paths: what stops, what stays exact, feeds and lines of pieces, and the audit of all of it."""
+"""Smooth paths: where they stop, what stays exact, feeds and lines of pieces, and their audit."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def smooth(program: Program, tolerance: float | None = None, machine: Machine = 
 
 
 def audited(program: Program, path: Path, machine: Machine = MILL) -> Audit:
-    """The audit of a plan of second order along the path, against the program."""
+    """The audit of a plan without limits of jerk along the path, against the program."""
     result = plan(path, machine)
     return audit(result.problem, result.profile, machine, program, result.setpoints())
 
 
 def turns_of(path: Path) -> NDArray[np.int64]:
-    """The pieces before which the path goes back along its own line."""
+    """The pieces before which the path turns back along its own line."""
     ends = path.curve.evaluate(np.arange(len(path)), path.width, 1)[1]
     starts = path.curve.evaluate(np.arange(len(path)), np.zeros(len(path)), 1)[1]
     units = [tangent / np.linalg.norm(tangent, axis=1)[:, None] for tangent in (ends[:-1], starts[1:])]
@@ -44,8 +44,8 @@ def turns_of(path: Path) -> NDArray[np.int64]:
 
 
 def assert_smooth(path: Path) -> None:
-    """All derivatives to the third are continuous within runs, but where the path goes back along its own
-    line; it never stands still within pieces."""
+    """All derivatives to the third are continuous within runs, except where the path turns back along its own
+    line; C' vanishes nowhere inside a piece."""
     inner = np.setdiff1d(np.arange(1, len(path)), [*path.runs, *turns_of(path)])
     middle = path.curve.evaluate(np.arange(len(path)), path.width / 2, 1)[1]
     assert (np.linalg.norm(middle, axis=1) > 0.01).all()
@@ -98,7 +98,7 @@ def test_the_path_stops_where_it_turns_back_and_where_it_is_told(make_program: A
 
 
 def test_only_turns_that_are_stops_are_warned_of(make_program: Any) -> None:
-    # Back along its own line at X30, where the tool rests for no time, and at 170° at X10.
+    # It turns back along its own line at X30, where it rests for no time, and by 170° at X10.
     program = make_program([[0, 0], [30, 0], [10, 0], [29.696, 3.473]], blend_tolerance=0.1)
     path = smooth(program)
     np.testing.assert_array_equal(path.move[path.runs[1:] - 1, 1], [1, 2])
@@ -121,7 +121,7 @@ def test_a_rapid_between_feed_moves_is_one_run_and_each_keeps_its_feed_to_the_co
     rapid = path.feed == np.inf
     assert (path.move[rapid] == 1).all()
     assert set(path.feed[~rapid]) == {50.0}
-    # To 1 % of the tolerance the rapid is nearer to its own line (X50) than to Y0 and Y50.
+    # Up to 1 % of the tolerance, the pieces of the rapid are nearer to its own line (X50) than to Y0 and Y50.
     x, y = path.curve.control_points[path.curve.offsets[:-1], :2][rapid].T
     from_feed = np.minimum(np.abs(y), np.abs(50 - y))
     assert (from_feed >= np.abs(50 - x) - 1e-3).all()
@@ -162,7 +162,7 @@ def test_pieces_are_cut_beside_the_points_where_feed_or_tolerance_change(make_pr
 
 
 def test_lines_and_arcs_become_one_curve_near_the_true_circle(make_program: Any) -> None:
-    # A slot: two lines, two half circles of radius 10.
+    # A slot: two lines and two half circles of radius 10 mm.
     points = [[0, -10, 0], [30, -10, 0], [30, 10, 0], [0, 10, 0], [0, -10, 0]]
     arcs = {1: ((30.0, 0.0, 0.0), 2, math.pi), 3: ((0.0, 0.0, 0.0), 2, math.pi)}
     for tolerance, control in ((0.02, PathControl.TOLERANCE), (1e-3, PathControl.EXACT_PATH)):
@@ -248,7 +248,7 @@ def test_random_points_are_followed_within_the_tolerance_stops_and_all(axes: int
         assert path.fit.deviation <= tolerance
         np.testing.assert_array_equal(path.curve.control_points[0], points[0])
         np.testing.assert_array_equal(path.curve.control_points[-1], points[-1])
-        # Every sample is near a move that its piece follows, or the next one.
+        # Every sample is near a move that its piece follows, or near one of their neighbours.
         share = np.linspace(0, 1, 9)
         for piece in range(len(path)):
             own = path.curve.evaluate(np.full(9, piece), share * path.width[piece])[0]

@@ -1,4 +1,4 @@
-"""Spline moves of programs go into the path as they are, between lines, arcs and each other."""
+"""Spline moves of programs enter the path unchanged, between lines, arcs and each other."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CUBIC = [[10, 0, 0], [12, 0, 0], [14, 2, 0], [14, 4, 0]]
 
 
 def with_splines(program: Program, splines: dict[int, CompositeCurve], **changes: Any) -> Program:
-    """The program with moves replaced by splines."""
+    """The program with some moves replaced by splines."""
     kind = program.kind.copy()
     kind[list(splines)] = MoveKind.SPLINE
     return dataclasses.replace(
@@ -62,7 +62,7 @@ def test_pieces_of_any_degree_are_kept_to_the_last_bit(make_program: Any) -> Non
         np.testing.assert_array_equal(control, curves[i].control_points)
         given = curves[i].weights if i else None  # a line has none
         np.testing.assert_array_equal(weights, 1.0 if given is None else given)
-    # Every joint is a corner, and a stop.
+    # Every joint is a corner and therefore a stop.
     np.testing.assert_array_equal(path.runs, np.arange(10))
     np.testing.assert_array_equal(path.line, 10 + np.arange(9))
     assert path.fit.deviation == 0.0
@@ -78,7 +78,7 @@ def test_tangent_joints_pass_between_lines_arcs_and_splines(make_program: Any) -
     np.testing.assert_array_equal(path.feed, [10, 20, 30, 40])
     np.testing.assert_array_equal(piece(path, 1)[0], CUBIC)
     assert min(joints(path.curve)) >= Joint.TANGENT
-    # About its length, by its control polygon.
+    # The width is the length of the control polygon, about that of the curve.
     assert path.width[1] == 2 + 2 * math.sqrt(2) + 2
 
 
@@ -87,11 +87,12 @@ def test_a_corner_beside_a_spline_is_rounded_within_the_tolerance(make_program: 
     program = with_splines(make_program(points, blend_tolerance=0.05), {0: CompositeCurve.from_bezier(CUBIC)})
     path = build_path(program, MILL)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
-    # What is left of the spline, its end, the line's start in two pieces, then a parabola for two lines.
+    # The rest of the spline, the bent end of it, the bent start of the line in two pieces, then a line, a
+    # parabola that rounds the corner, and a line.
     assert path.curve.degree.tolist() == [3, 3, 2, 2, 2, 2]
     assert min(joints(path.curve)) >= Joint.TANGENT
     assert 0.045 < path.fit.deviation <= 0.05 * (1 + 1e-9)
-    # The corner at (14, 4) moves to where both bent sides meet, as far as they say.
+    # The corner at (14, 4) moves to the point where both bent sides meet, at about the tolerance.
     meeting = piece(path, 1)[0][-1]
     assert np.linalg.norm(meeting - [14, 4, 0]) == pytest.approx(0.05, rel=0.1)
     assert meeting[0] > 14
@@ -148,7 +149,7 @@ def test_pieces_of_a_spline_keep_their_continuity_and_lose_those_without_length(
     curve = CompositeCurve.joined([still, smooth])
     path = build_path(with_splines(make_program(control[[0, -1]]), {0: curve}), MILL)
     np.testing.assert_array_equal(path.runs, [0, 2])
-    # C2 stays C2: one factor for all widths.
+    # C2 stays C2: all widths have the same factor.
     assert joints(path.curve) == [Joint.C2]
     assert path.width[1] / path.width[0] == pytest.approx(2.0)
     with pytest.raises(ProgramError, match="line 10: the move has no length"):
@@ -177,7 +178,7 @@ def test_splines_start_exactly_where_their_move_does(make_program: Any) -> None:
 
 
 def test_travel_is_that_of_the_curve_and_not_of_its_polygon(make_program: Any) -> None:
-    # The apex of this cubic is at 3/4 of its polygon's height.
+    # The highest point of this cubic is at 3/4 of the height of its control polygon.
     arch = CompositeCurve.from_bezier([[0, 0, 0], [1, 4, 0], [2, 4, 0], [3, 0, 0]])
     program = with_splines(make_program([[0, 0], [3, 0]]), {0: arch})
 
@@ -196,7 +197,7 @@ def test_an_axis_that_only_a_spline_moves_is_in_the_path(make_program: Any) -> N
     program = with_splines(make_program([[0, 0, 0, 0], [2, 0, 0, 0]], axes="XYZA", feed=5.0), {0: curve})
     path = build_path(program, rotary)
     assert path.axes == ("X", "Y", "Z", "A")
-    # The feed as it is: never faster along X, Y and Z.
+    # The feed is unchanged: A does not lower it.
     np.testing.assert_array_equal(path.feed, 5.0)
     with pytest.raises(Exception, match="axis A moves"):
         build_path(program, MILL)

@@ -1,4 +1,4 @@
-"""Paths on machines whose words are the tool tip, and moves in different coordinate modes."""
+"""Paths on machines whose axis words are the tool tip, and moves in different coordinate modes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_every_bundled_machine_takes_a_square_and_a_circle(make_program: Any) ->
         names = [axis for axis in machine.inverse.tip_names if axis in "XYZ"]
         path = build_path(make_program(SQUARE), machine)
         assert list(path.axes) == names, name
-        # Corners within the tolerance whatever the joints.
+        # Corners use the tolerance, whatever the joints are.
         assert path.fit.deviation == pytest.approx(0.01), name
         arc = build_path(make_program([[20, 0], [20, 0]], arcs={0: ((25, 0, 0), 2, 2 * np.pi)}), machine)
         assert len(arc) == 4

@@ -1,4 +1,4 @@
-"""Proven bounds of the derivatives of joints over whole pieces, as the native module gives them."""
+"""Proven bounds of the derivatives of joints over whole pieces, computed by the native module."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Enclosures(Bounds):
 
     @property
     def magnitude(self) -> NDArray[np.float64]:
-        """The greatest absolute values inside."""
+        """The greatest absolute value inside each bound."""
         return np.maximum(np.abs(self.lo), np.abs(self.hi))
 
 
@@ -36,9 +36,9 @@ def enclosures(
 ) -> Enclosures:
     """Bounds (order + 1, n, joints) of q^(k)(u)/k! for every u of each piece, rounding included.
 
-    `parts` (n, 2) are fractions of the pieces in [0, 1], if not the whole pieces are meant. A bound is
-    infinite where K is singular on the part, or too near to it to decide. Angles known up to whole turns are
-    continuous over the part, whichever turn they are on.
+    `parts` (n, 2) are fractions of the pieces in [0, 1]; without them the whole pieces count. A bound is
+    infinite where K is singular on the part, or too near to a singularity to decide. Angles are known up to
+    whole turns; over a part they are continuous.
     """
     pieces = TipPieces.of(control_points, width, weights)
     lo, hi = joint_enclosures(kinematics.recorded, pieces, order, contiguous(parts))

@@ -1,6 +1,6 @@
-"""Taylor series in numpy: an evaluation of kinematics' formulas that shares nothing with the native one.
+"""Taylor series in numpy: evaluates formulas of kinematics independently of the native code.
 
-Each elementary function by the rule that follows from its differential equation, in extended precision.
+Each elementary function uses the recurrence of its differential equation, in extended precision.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PI = np.arctan2(np.longdouble(0), np.longdouble(-1))
 
 
 class Series:
-    """Coefficients (order + 1, …) of powers of u."""
+    """Coefficients (order + 1, …) of a power series in u."""
 
     __array_ufunc__ = None
 
@@ -89,7 +89,7 @@ class Series:
         return Series(s), Series(c)
 
     def atan2(self, y: Any, x: Any) -> Series:
-        """The angle of the vector (x, y): its slope is (x y' − y x') / (x² + y²)."""
+        """The angle of the vector (x, y) [rad], from its derivative (x y' − y x') / (x² + y²)."""
         y, x = self._of(y), self._of(x)
         steps = np.arange(1, len(y.c)).reshape(-1, *[1] * (y.c.ndim - 1))
         dy, dx = (Series(np.concatenate([v.c[1:] * steps, 0 * v.c[:1]])) for v in (y, x))

@@ -1,4 +1,4 @@
-"""Axis words: joint positions, tip or tool direction, column by column."""
+"""Axis words as joint positions, tip or tool direction: their kinematics, column by column."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Recorded formulas: what they evaluate to, proven bounds against rational numbers, what is refused."""
+"""Recorded formulas: their values, proven bounds against rational numbers, and refused operations."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ numbers = st.floats(-1e6, 1e6)
 
 
 class Formulas(Kinematics):
-    """A joint for each formula of x and y."""
+    """A kinematics with one joint for each formula of x and y."""
 
     tip_names = ("X", "Y")
 
@@ -52,13 +52,13 @@ class Formulas(Kinematics):
 
 
 def over(x: tuple[float, float], y: tuple[float, float], *formulas: Formula, order: int = 0) -> Enclosures:
-    """Bounds (order + 1, joints) over a box."""
+    """Bounds (order + 1, joints) for a piece along the diagonal of a box in x and y."""
     found = enclosures(Formulas(*formulas), np.array([[[x[0], y[0]], [x[1], y[1]]]]), [1.0], order)
     return Enclosures(found.lo[:, 0], found.hi[:, 0])
 
 
 def series(u: float, *formulas: Formula) -> Array:
-    """Coefficients (ORDER + 1, joints) at u of formulas of x = u, y = 0."""
+    """Taylor coefficients (ORDER + 1, joints) at u of the formulas along x = u, y = 0."""
     line = np.array([[[u, 0.0], [u + 1.0, 0.0]]])
     found = derivatives(Formulas(*formulas), line, [1.0], [0.0], ORDER)[:, 0]
     return found / np.array([[math.factorial(k)] for k in range(ORDER + 1)])

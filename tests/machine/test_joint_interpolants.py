@@ -1,4 +1,4 @@
-"""Polynomial stand-ins for joint motion keep their proven distance from it."""
+"""Polynomial interpolants of joint motion stay within their proven distance from it."""
 
 import math
 
@@ -18,7 +18,7 @@ CYLINDER = Cylindrical(("C", "X", "Z"))
 
 
 def value(coefficients: Array, t: float) -> Array:
-    """Bernstein form (m, degree + 1, joints) at t."""
+    """Polynomials in Bernstein form (m, degree + 1, joints) at t."""
     degree = coefficients.shape[1] - 1
     basis = [math.comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(degree + 1)]
     result: Array = np.einsum("i,mik->mk", np.array(basis), coefficients)
@@ -26,7 +26,7 @@ def value(coefficients: Array, t: float) -> Array:
 
 
 def errors(kinematics: Kinematics, points: Array, width: Array, found: Interpolants) -> tuple[Array, Array]:
-    """Greatest |q' − proxy'| and |q'' − proxy''| (m, joints) found at 23 points of each part."""
+    """Greatest |q' − interpolant'| and |q'' − interpolant''| (m, joints) at 23 points of each part."""
     degree = found.slope.shape[1] - 1
     change = np.diff(found.slope, axis=1) * degree / found.width[:, None, None]
     worst = np.zeros((2, *found.slope_error.shape))

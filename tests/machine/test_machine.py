@@ -1,4 +1,4 @@
-"""Machine files: what is bundled loads, what is wrong is refused in one sentence."""
+"""Machine files: the bundled ones load, wrong ones are refused in one sentence."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A machine as text: whatever it was made from, the text of its file gives the same machine again."""
+"""A machine as text: however it was made, its text gives the same machine again."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_any_machine_comes_back_from_its_text(machine: Machine) -> None:
 
 
 class Anything(Kinematics):
-    """Joints are the tip, whatever the parameters."""
+    """A kinematics whose joints are the tip, whatever its parameters are."""
 
     tip_names = joint_names = ("X", "Y")
 

@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 
 
 def line_past_the_axis(distance: float, count: int) -> tuple[Array, Array]:
-    """The straight tip path x = −100 … 130, y = distance, z = 0.3 x, u = x + 100, `count` times."""
+    """Straight tip paths x = −100 … 130, y = distance, z = 0.3 x with u = x + 100, `count` times."""
     ends = np.array([[-100.0, distance, -30.0], [130.0, distance, 39.0]])
     return np.tile(ends, (count, 1, 1)), np.full(count, 230.0)
 
 
 def closed_forms(x: Array, d: float) -> tuple[Array, Array, Array]:
-    """q', q'', q''' of angle [deg] and radius on that line."""
+    """q', q'', q''' of the angle [deg] and of the radius on that line."""
     r = np.hypot(x, d)
     first = np.stack([np.degrees(-d / r**2), x / r], axis=-1)
     second = np.stack([np.degrees(2 * d * x / r**4), d**2 / r**3], axis=-1)
@@ -37,7 +37,8 @@ def closed_forms(x: Array, d: float) -> tuple[Array, Array, Array]:
 
 
 def random_curves(kinematics: Kinematics, count: int, seed: int, step: float = 2.0) -> tuple[Array, Array]:
-    """Cubic pieces whose control points are a random walk, angles by as many degrees, directions by 1/100."""
+    """Cubic pieces whose control points are a random walk in steps of about `step` [mm, deg]; directions I,
+    J, K take steps of 1/100 of it."""
     generator = np.random.default_rng(seed)
     scale = np.array([0.01 if name in "IJK" else 1.0 for name in kinematics.tip_names]) * step
     walk = np.cumsum(generator.normal(size=(count, 4, len(scale))), axis=1) * scale
@@ -50,14 +51,14 @@ def test_the_cylindrical_machine_on_a_line_past_its_axis(d: float) -> None:
     q = derivatives(CYLINDER, *line_past_the_axis(d, len(x)), (x + 100) / 230)
     for order, exact in enumerate(closed_forms(x, d), start=1):
         scale = np.abs(exact).max(axis=0)
-        # A fraction of 230 mm is known to 3e-14 mm, which q^(k+1) turns into an error of q^(k).
+        # A fraction of 230 mm has a rounding error of 3e-14 mm; q^(k+1) turns this into an error of q^(k).
         assert q[order, :, :2] == pytest.approx(exact, abs=1e-13 * max(1.0, 10 / d) * scale.max())
     assert q[1, :, 2] == pytest.approx(np.full(len(x), 0.3))
     assert np.abs(q[2:, :, 2]).max() == 0
 
 
 def test_the_cylindrical_machine_turns_fastest_abreast_of_its_axis() -> None:
-    # θ' = −1/d and r'' = 1/d where the line is nearest: 10 mm from the axis.
+    # θ' = −1/d and r'' = 1/d at the place of the line nearest to the axis, d = 10 mm.
     q = derivatives(CYLINDER, *line_past_the_axis(10.0, 1), np.array([100 / 230]))
     assert np.radians(q[1, 0, 0]) == pytest.approx(-0.1)
     assert q[:, 0, 1] == pytest.approx([10, 0, 0.1, 0], abs=1e-14)
@@ -105,7 +106,7 @@ def test_order_zero_is_the_position(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in all_kinematics() if "direction" not in name])
 def test_the_tip_comes_back_with_all_its_derivatives(name: str) -> None:
-    # The feed counts along the tip, also where joints are programmed: tip(joints) is differentiated alike.
+    # The feed counts along the tip even where joints are programmed: tip(joints) needs derivatives too.
     kinematics = all_kinematics()[name]
     generator = np.random.default_rng(4)
     tip = [taylor.Series(generator.normal(size=(6, 10))) for _ in kinematics.tip_names]
@@ -132,7 +133,7 @@ def test_enclosures_hold_dense_samples_of_every_order(name: str) -> None:
         assert (bounds.lo <= sample).all()
         assert (sample <= bounds.hi).all()
         low, high = np.minimum(low, sample.astype(float)), np.maximum(high, sample.astype(float))
-    # Tight: q'' is enclosed like its true range, and the highest order within a factor.
+    # The bounds are tight: q'' within 5 % of its true range, the highest order within a factor of 30.
     spread = high - low
     assert np.median(((bounds.hi - bounds.lo)[2] + 1e-12) / (spread[2] + 1e-12)) < 1.05
     greatest = np.maximum(np.abs(low[order]), np.abs(high[order]))
@@ -154,7 +155,7 @@ def test_an_enclosure_closes_in_on_the_range_as_the_part_shrinks() -> None:
 
 
 def test_enclosures_near_the_axis_and_across_the_cut_hold_the_angle_on_one_turn() -> None:
-    # One piece by hand: the middle of its box is above the cut at 180 degrees, its own middle below.
+    # A piece by hand: the middle of its bounding box is above the cut at 180 degrees, its own one below.
     points = np.array([[[-10.0, 3.0, 0.0], [-10.0, -2.0, 0.0], [-10.0, -0.9, 0.0]]])
     points = np.concatenate([points, np.random.default_rng(9).uniform(-1, 1, size=(20_000, 3, 3))])
     width = np.ones(len(points))
@@ -168,7 +169,7 @@ def test_enclosures_near_the_axis_and_across_the_cut_hold_the_angle_on_one_turn(
         angle = derivatives(CYLINDER, points[known], width[known], np.full(known.sum(), t), 0)[0, :, 0]
         angle = angle + 360 * np.ceil((lo - angle) / 360)
         assert (angle <= hi).all()
-        # On one turn: from sample to sample the angle goes the short way.
+        # The angle stays on one turn: between samples it changes by less than half a turn.
         assert before is None or np.abs(angle - before).max() < 180
         before = angle
 
@@ -193,7 +194,7 @@ def test_a_rational_arc_round_the_axis_turns_at_a_constant_radius() -> None:
         q = derivatives(*arc, np.array([t]), 3, weights)
         assert q[:, 0, 1] == pytest.approx([50, 0, 0, 0], abs=1e-11)
     assert q[0, 0, 0] == pytest.approx(90)
-    # θ = 2 atan(…): half way the arc is symmetric, so θ'' vanishes there.
+    # θ = 2 atan(…): the arc is symmetric about its middle, so θ'' vanishes there.
     assert derivatives(*arc, np.array([0.5]), 2, weights)[2, 0, 0] == pytest.approx(0, abs=1e-12)
     parts = np.array([[0.4, 0.6]])
     bounds = enclosures(*arc, 6, parts, weights)
@@ -203,7 +204,8 @@ def test_a_rational_arc_round_the_axis_turns_at_a_constant_radius() -> None:
 
 @pytest.mark.parametrize("t", [3e-9, 1 - 3e-9])
 def test_beside_a_rational_cusp_derivatives_keep_their_digits_far_from_the_origin(t: float) -> None:
-    # Of points 100 mm off and 1e-9 mm apart the differences are what counts; truth is in rational numbers.
+    # The points are 100 mm from the origin and 1e-9 mm apart, so only differences keep the digits; the exact
+    # values come from rational numbers.
     points = np.array([[101.7, 55.3, 3.1], [101.7 + 1e-9, 55.3 - 2e-9, 3.1 + 1e-9], [102.9, 56.1, 2.2]])
     if t > 0.5:
         points = points[::-1]
@@ -251,7 +253,7 @@ def test_interpolation_of_the_acceleration_keeps_its_proven_bound(nodes: int) ->
         exact = closed_forms(middle + h / 2 * t, 10.0)[1][:, 0]
         measured[i] = np.abs(np.polynomial.chebyshev.chebval(t, fit) - exact).max()
     assert (measured <= bound + 1e-14).all()
-    # Worth having: not much more than what happens, where it matters most.
+    # The bound is useful: its greatest value is less than 60 times the greatest error.
     assert bound.max() < 60 * measured.max()
 
 
@@ -263,7 +265,7 @@ def test_through_the_axis_nothing_is_bounded_and_nothing_is_raised() -> None:
 
 
 class Inverted(Kinematics):
-    """A user's machine: two legs from fixed feet, and a height."""
+    """A kinematics as a user would write it: two legs from fixed feet, and a height."""
 
     tip_names = ("X", "Y", "Z")
     joint_names = ("U", "V", "Z")
@@ -279,7 +281,7 @@ def test_a_user_s_machine_has_derivatives_and_bounds_without_more_code() -> None
     kinematics = Inverted()
     points = np.array([[[0.0, 300.0, 0.0], [60.0, 300.0, 6.0]]])
     q = derivatives(kinematics, points, np.array([60.0]), np.array([0.0]), 2)
-    # |P − foot| = √(200² + 300²); its slope is 200 over it.
+    # |P − foot| = √(200² + 300²) mm; its derivative along X is 200 mm over it.
     length = math.hypot(200, 300)
     assert q[0, 0] == pytest.approx([length, length, 0])
     assert q[1, 0] == pytest.approx([200 / length, -200 / length, 0.1])

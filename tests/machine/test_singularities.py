@@ -1,4 +1,4 @@
-"""Along whole paths: angles go on turning, singular places and travel ends are found and named."""
+"""Joints along whole paths: angles keep counting turns; singular places and ends of travel are named."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ FREE = [(-np.inf, np.inf)] * 3
 
 
 def polygon(radius: float, corners: int, laps: float, centre: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
-    """Straight pieces round a centre, `corners` to a lap, counter-clockwise."""
+    """Straight pieces around a centre, counter-clockwise, `corners` per lap."""
     angle = np.arange(round(corners * laps) + 1) * (2 * np.pi / corners)
     points = np.stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle), 0 * angle], 1)
     return np.stack([points[:-1], points[1:]], axis=1)
@@ -31,7 +31,7 @@ def lengths(pieces: np.ndarray) -> np.ndarray:
 
 
 def ends(path: JointPath) -> np.ndarray:
-    """Joints at every piece's start, then at the end of the last."""
+    """Joints at the start of every piece, and at the end of the last one."""
     count = len(path.tips.width)
     starts = path.positions(np.arange(count), np.zeros(count))
     return np.concatenate([starts, path.positions(np.array([count - 1]), np.ones(1))])
@@ -45,7 +45,7 @@ def test_two_and_a_half_laps_are_nine_hundred_degrees() -> None:
 
 
 def test_one_curve_round_the_axis_turns_a_whole_turn() -> None:
-    # A closed quintic loop round the axis: more than half a turn within one piece.
+    # A closed quintic loop around the axis: it turns by more than half a turn within one piece.
     angle = np.linspace(0, 2 * np.pi, 6)
     loop = np.stack([100 * np.cos(angle), 100 * np.sin(angle), 0 * angle], axis=1)[None]
     path = joint_path(CYLINDER, loop, np.array([600.0]))
@@ -56,7 +56,7 @@ def test_one_curve_round_the_axis_turns_a_whole_turn() -> None:
 
 
 class TwoAxes(Kinematics):
-    """An angle that counts turns about two points, as the elbow and shoulder of an arm add up."""
+    """An angle that adds the turns about two points, as the elbow and the shoulder of an arm do."""
 
     tip_names = ("X", "Y", "Z")
     joint_names = ("C", "X", "Z")

@@ -1,4 +1,4 @@
-"""LinuxCNC's HAL without its real-time kernel: `streamer` plays a file, `sampler` records what it plays."""
+"""Runs LinuxCNC's HAL without its real-time kernel: `streamer` plays a file and `sampler` records it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 
 from benchmarks.simulator.alone import PYTHON, alone, folder_and_environment
 
-# The longest stream in HAL's memory: it is loaded before it is played, so that a busy computer does not
-# matter.
+# Number of rows that HAL's memory holds. A stream is loaded before it is played, so that a busy computer
+# cannot interrupt it.
 DEPTH = 16000
 # The key of sampler's shared memory.
 _SAMPLER = 0x48534130
@@ -31,9 +31,10 @@ with open(sys.argv[3], "w") as file:
 
 
 def played(file: Path, pins: str, count: int, folder: Path) -> list[str]:
-    """The values on the pins of these types in `count` periods of a stream, as rows of numbers.
+    """The values in `count` periods of a stream, on pins of the types `pins`; one text of numbers per period.
 
-    Fails if `halstreamer` complains about a line."""
+    Fails if `halstreamer` complains about a line.
+    """
     record, rows = folder / "record.py", folder / "rows.txt"
     record.write_text(_RECORD)
     nets = (f"net pin{k} streamer.0.pin.{k} => sampler.0.pin.{k}" for k in range(len(pins)))

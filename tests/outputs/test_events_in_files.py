@@ -31,7 +31,7 @@ def test_events_come_back_to_the_last_digit(name: str, cuts: tuple[int, ...], tm
 @pytest.mark.parametrize("name", ["csv", "pvt", "halstreamer"])
 def test_in_a_text_an_event_stands_before_the_first_row_at_or_after_it(name: str, tmp_path: Path) -> None:
     lines = written(name, tmp_path, chunk(1000)).read_text().splitlines()
-    # No line is too long for readers of text.
+    # No line is too long for programs that read text.
     assert max(map(len, lines)) <= 1000
     rows, before = 0, {}
     for line in lines[1 + (name != "halstreamer") :]:

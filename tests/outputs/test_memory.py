@@ -17,7 +17,7 @@ AXES = ("X", "Y", "Z")
 
 
 def peak(name: str, chunks: int, folder: Path) -> int:
-    """The greatest memory of Python, numpy and Arrow while `chunks` chunks are written [bytes]."""
+    """The peak memory of Python, numpy and Arrow while `chunks` chunks are written [bytes]."""
     rows = 500 if name == "json" else 10_000  # measuring memory makes Python slow
     values = np.random.default_rng(1).normal(size=(rows, 3))
     line = np.arange(rows, dtype=np.int32)
@@ -42,7 +42,7 @@ def peak(name: str, chunks: int, folder: Path) -> int:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_three_times_the_setpoints_take_the_same_memory(name: str, tmp_path: Path) -> None:
-    peak(name, 1, tmp_path)  # imports what is needed
+    peak(name, 1, tmp_path)  # imports all that is needed
     short, long = peak(name, 10, tmp_path), peak(name, 30, tmp_path)
-    # 20 more chunks have 18 MB of numbers, with json 1 MB.
+    # The 20 additional chunks have 18 MB of numbers, with json 1 MB.
     assert long <= 1.1 * short + 300_000

@@ -1,4 +1,4 @@
-"""A folder of outputs appears whole or not at all."""
+"""A folder of outputs appears complete or not at all."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def fail_in(folder: Path) -> None:
 
 
 def write_new(folder: Path, names: str) -> None:
-    """Writes files of these names, the last of them last."""
+    """Writes files of these names, in this order."""
     with staged(folder, last=names[-1]) as stage:
         for name in names:
             (stage / name).write_text("new")

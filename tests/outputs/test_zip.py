@@ -1,4 +1,4 @@
-"""The archive whose members are filled in one pass, also with the 64-bit fields of large files."""
+"""Zip archives whose members are written in one pass, also with the 64-bit fields for large files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Programs for the tests of planned feeds: some by hand, and random ones of all kinds of blocks."""
+"""Programs for the tests of planned feeds: some written by hand, and random ones of all kinds of blocks."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ def planned(text: str | bytes, machine: str = "mill", **options: object) -> feed
 
 
 def again(result: feedplan.PlannedProgram, machine: str = "mill") -> feedplan.Program:
-    """The program with planned feeds, read."""
+    """The program with planned feeds, read again."""
     return feedplan.read_program(result.content, machine)
 
 
 def greatest_around(plan: feedplan.Plan) -> np.ndarray:
-    """The greatest planned speed on all pieces that follow each move (m,), from the speeds at many places.
+    """The greatest planned speed on all pieces that follow each move (m,) [mm/s], from many samples.
 
-    By another way than that of the rewriting: lengths, and what `plan.trajectory` says there; for programs of
-    X, Y and Z.
+    It shares no code with the writer of planned feeds: it samples `plan.trajectory` by length. For programs
+    of X, Y and Z only.
     """
     path, profile = plan.path, plan.profile
     length = CurveLength(plan.problem.path.curve)
@@ -65,7 +65,7 @@ def greatest_around(plan: feedplan.Plan) -> np.ndarray:
 
 
 class Writer:
-    """Writes random blocks; every program that it makes is read."""
+    """Writes random blocks; the reader accepts every program of them."""
 
     def __init__(self, rng: random.Random) -> None:
         self.rng = rng
@@ -109,7 +109,7 @@ class Writer:
         return self.end.join(self.lines) + rng.choice(["", self.end])
 
     def number(self, value: float) -> str:
-        """A length in mm, as the program has it."""
+        """A length in mm as a word's number in the unit of the program."""
         return (
             f"{value / self.unit:.4f}".rstrip("0") if self.rng.random() < 0.8 else f"{value / self.unit:+.5f}"
         )
@@ -163,7 +163,7 @@ class Writer:
         )
         radius = rng.choice([0.5, 4.0, 25.0])
         goal = list(self.place)
-        # A quarter, a half or nearly a whole turn to the point that is opposite or beside.
+        # A quarter, a half or nearly a whole turn, to the point opposite or beside.
         across = rng.choice([(radius, radius), (2.0 * radius, 0.0), (radius, -radius)])
         goal[first] += across[0]
         goal[second] += across[1]
@@ -182,7 +182,7 @@ class Writer:
         self.block(code, motion, *self.exact(goal, axes), *centre, turns, self.feed())
 
     def exact(self, place: list[float], axes: str) -> list[str]:
-        """Words with enough digits for ends of arcs."""
+        """Words with enough digits for the ends of arcs."""
         words = []
         for k, axis in enumerate("XYZ"):
             if axis in axes:

@@ -1,4 +1,4 @@
-"""What controls lack is told with its line, and what is written anew is in their words."""
+"""What a control lacks is reported with its line; new blocks use the words of the control."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_splines_are_written_as_nurbs(dialect: str) -> None:
     assert program.splines.control_points == pytest.approx(own.splines.control_points, abs=1e-11)
     assert program.splines.weights is not None
     assert own.splines.weights is not None
-    # Weights of a piece count by their ratios.
+    # Only the ratios of the weights of a piece matter.
     for first, last in zip(own.splines.offsets[:-1], own.splines.offsets[1:], strict=True):
         ratio = program.splines.weights[first:last] / own.splines.weights[first:last]
         assert np.ptp(ratio) < 1e-9

@@ -1,4 +1,4 @@
-"""The F of each line: where it is written, where the program's own one comes back, and what stays."""
+"""The F word of each line: where it is written, where the program's own F is restored, and what stays."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_program_whose_feeds_are_reached_comes_back_byte_for_byte() -> None:
 
 
 def test_a_feed_that_is_reached_again_comes_back() -> None:
-    # The second side is long enough for F12000, 200 mm/s: the way up takes 6.7 mm.
+    # The second side is long enough to reach F12000, 200 mm/s: speeding up takes 6.7 mm.
     text = "G21 G61.1\nG0 X0\nG1 X5 F12000\nX100\nX105\nM2\n"
     assert rewritten(text) == "G21 G61.1\nG0 X0\nG1 X5 F7348.4\nX100 F12000\nX105 F7348.4\nM2\n"
 
@@ -66,7 +66,7 @@ def test_inches_and_rotary_words_count_in_their_units() -> None:
     text = "G20 G61.1\nG1 X1 F9999\nM2\n"
     # 25.4 mm from rest to rest: 276.04 mm/s are 652.07 inch/min.
     assert "F652.07" in rewritten(text)
-    # Degrees/min on a move of rotary axes alone, whatever the units.
+    # A move of rotary axes alone has its feed in degrees per minute, whatever the units.
     plan = planned("G20 G61.1\nG1 A10 F99999\nM2\n", "rotary-table")
     result = feedplan.planned_program(plan)
     top = np.abs(plan.at(np.linspace(0.0, plan.time, 2001)).velocity).max()
@@ -77,7 +77,7 @@ def test_inches_and_rotary_words_count_in_their_units() -> None:
 def test_a_feed_per_turn_and_inverse_time_stay_in_their_mode() -> None:
     text = "G21 G61.1 S1000 M3\nG95 G1 X5 F60\nG94 X10 F60000\nG93 X15 F3000\nG94 X20 F60\nM2\n"
     lines = rewritten(text).splitlines()
-    # 122.47 mm/s are 7.3484 mm a turn at 1000/min, and 1469.6 a minute of 5 mm.
+    # 122.47 mm/s are 7.3484 mm per turn at 1000/min, and in inverse time 1469.6/min for 5 mm.
     assert [line.split("F")[1] for line in lines[1:5]] == ["7.3484", "7348.4", "1469.6", "60"]
 
 
@@ -97,7 +97,7 @@ def test_the_programs_feed_comes_back_before_lines_that_rely_on_it() -> None:
 
 def test_a_feed_that_is_set_in_a_call_is_known_from_the_moves() -> None:
     text = "G21 G61.1\no1 sub\nG1 X1 F30000\no1 endsub\nF60000\no1 call\nX6\nX300\nM2\n"
-    # F30000, 500 mm/s, holds after the call: X6 peaks at 7348.4, and X300 gets there.
+    # F30000, 500 mm/s, stays in force after the call: X6 peaks at F7348.4, and X300 reaches F30000.
     assert rewritten(text).splitlines()[6:8] == ["X6 F7348.4", "X300 F30000"]
 
 
@@ -256,13 +256,13 @@ def test_a_program_that_was_changed_since_is_refused(tmp_path: object) -> None:
 
 
 def test_a_program_without_a_feed_gets_that_of_the_user() -> None:
-    """A control refuses a feed move before the first F."""
+    """The first feed move gets the feed, because a control refuses a feed move before the first F."""
     text = "G21 G90\nG0 Y1\nG1 X10\nX20\nX30\nF1200 X40\nX50\nM2\n"
     result = feedplan.planned_program(feedplan.plan(text, "mill", feed=10.0))
     assert result.content.decode() == ("G21 G90\nG0 Y1\nG1 X10 F600\nX20\nX30\nF600 X40\nX50\nM2\n")
     again = feedplan.plan(result.content, "mill")
     assert again.time == pytest.approx(feedplan.plan(text, "mill", feed=10.0).time, rel=1e-12)
-    # As inverse time its F is told as none.
+    # With inverse time, too, the summary says that the line had no F.
     told = feedplan.planned_program(feedplan.plan("G1 X10\nM2\n", "mill", feed=10.0), inverse_time=True)
     assert "line 1: no F -> F60" in told.summary()
 

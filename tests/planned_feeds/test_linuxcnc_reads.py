@@ -1,4 +1,4 @@
-"""LinuxCNC's interpreter makes the same moves of a program with planned feeds as of the program itself."""
+"""LinuxCNC's interpreter makes the same moves of a program with planned feeds as of the original."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tests.program.linuxcnc import difference, moves_of, needs_linuxcnc, referen
 
 pytestmark = needs_linuxcnc
 
-# Ways to write a program; the last two write other blocks for the same moves.
+# Options of `planned_program`; with the last two it writes other blocks for the same moves.
 WAYS = ({}, {"inverse_time": True}, {"feed_step": 15.0}, {"expand": True})
 
 
-# Two NURBS behind straight moves: LinuxCNC's preview takes the height of the last straight move for theirs.
+# Two NURBS after straight moves, because LinuxCNC's preview gives them the height of the last straight move.
 NURBS = """G21 G17
 G0 X0 Y0 Z2
 G1 Z0 F600
@@ -37,7 +37,7 @@ M2
 
 
 class WithoutSplines(Writer):
-    """Programs whose moves LinuxCNC's preview tells exactly."""
+    """Programs without splines, whose moves LinuxCNC's preview shows exactly."""
 
     def spline(self) -> None:
         self.line()

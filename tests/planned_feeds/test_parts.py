@@ -1,4 +1,4 @@
-"""Lines and arcs that are split where the planned speed varies: their ends, their feeds, and their words."""
+"""Lines and arcs that are split where the planned speed varies: their ends, feeds and words."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def split(text: str, machine: str = "mill", step: float = STEP, **options: objec
 
 
 def test_a_ramp_is_cut_where_the_speed_has_changed_by_a_step() -> None:
-    # 60 mm from rest to rest at 3000 mm/s², up to 424.3 mm/s: v² is 6000 times the way from the end.
+    # 60 mm from rest to rest at 3000 mm/s², up to 424.3 mm/s: v² is 6000 mm/s² × distance to the nearer end.
     text = "G21 G61\nG0 X0\nG1 X60 F60000 (there)\nG0 X0\nM2\n"
     plan = planned(text)
     result = feedplan.planned_program(plan, feed_step=STEP)

@@ -1,4 +1,4 @@
-"""Programs with planned feeds, planned again: exact methods take the plan's time, others hold their plan."""
+"""Programs with planned feeds, planned again: exact methods need the plan's time, others keep their plan."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import feedplan
 from tests.planned_feeds.programs import again, planned
 from tests.planners import controller_programs
 
-# Feeds are rounded down by less than 1e-4, and plans under limits of jerk are exact to 1e-4. What bang-bang
-# follows is fitted anew, by the feeds.
+# Allowed relative differences of the time. Feeds are rounded down by less than 1e-4, and plans with limits of
+# jerk are exact to 1e-4. The path of bang-bang is fitted again, with the new feeds.
 SAME = {"bang-bang": 0.01, "jerk-limited": 3e-4}
 
 
 def fast(text: str) -> str:
-    """The program at feeds that nothing reaches, so that nearly every block has another planned feed."""
+    """The program with feeds that are never reached, so that nearly every block has another planned feed."""
     return text.replace("F3600", "F60000").replace("F4800", "F60000").replace("F3000", "F60000")
 
 
@@ -32,7 +32,7 @@ def test_exact_methods_take_the_plans_time_again(name: str, method: str) -> None
 
 @pytest.mark.parametrize("method", ["s-curve", "ruckig"])
 def test_a_program_of_another_method_holds_its_plan(method: str) -> None:
-    # These methods lose where the greatest speed changes from block to block; the best plan loses nothing.
+    # These methods lose time where the greatest speed changes between blocks; the best plan loses none.
     if method == "ruckig":
         pytest.importorskip("ruckig")
     plan = planned(fast(controller_programs.trochoid()), method=method)
@@ -43,7 +43,7 @@ def test_a_program_of_another_method_holds_its_plan(method: str) -> None:
 
 @pytest.mark.parametrize("offset", [100.0, 1000.0])
 def test_feeds_that_differ_by_rounding_cost_nothing(offset: float) -> None:
-    # The path is cut where the feed changes: no part may be so short that rounding bends it.
+    # The path is cut where the feed changes, but no part may be so short that rounding bends it.
     def wave(more: float) -> str:
         lines = ["G21 G90 G17 G64 P0.05", f"G0 X{offset:g} Y{offset:g}"]
         for i in range(1, 1001):
@@ -57,7 +57,7 @@ def test_feeds_that_differ_by_rounding_cost_nothing(offset: float) -> None:
 
 
 def test_moves_that_turn_back_within_the_tolerance_hold_nothing_up() -> None:
-    # One piece follows the first line and the two steps back at its end, which have no place on it.
+    # One piece follows the first line and the two short steps back at its end, which have no own place on it.
     text = (
         "G21 G90 G17 G64 P0.02\nG1 X1.001 Y0 Z0 F12000\nX0.998 Z-0.002\nX0.9979 Z0\n"
         "G2 X8.998 Y0 I4 J0 P3\nG1 X11.214\nM2\n"

@@ -1,4 +1,4 @@
-"""What was written is read back: another move, stop, event or feed is an error."""
+"""The written program is read back: another move, stop, event or feed is an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random programs of all kinds come back as the same moves, no block faster, in the plan's time."""
+"""Random programs of all kinds are read back as the same moves, no block faster, in the plan's time."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from feedplan.program.program import MoveKind
 from tests.campaign import examples
 from tests.planned_feeds.programs import Writer, greatest_around, planned
 
-# How far the time of a program that is read back may be off: corners are rounded as far as its feeds ask
-# for, so that the path may differ within the tolerance. Feeds are rounded down by less than 1e-4.
+# Allowed relative difference of the time of a program that is read back. The feeds decide how much corners
+# are rounded, so the path may differ within the tolerance. Feeds are rounded down by less than 1e-4.
 SAME_TIME = 0.02
 
 
@@ -45,7 +45,7 @@ def test_moves_are_the_same_and_no_block_is_faster_than_planned(rng: random.Rand
     changed = np.isin(own.line, result.changes.line)
     rapid = own.kind == MoveKind.RAPID
     greatest = greatest_around(plan)
-    # The greatest speed is taken at places: between them it may be a little more.
+    # `greatest` is from samples: between them the speed may be slightly higher.
     assert (program.feed <= np.where(changed, greatest * (1.0 + 1e-3), np.inf))[~rapid].all()
     assert program.feed[~changed] == pytest.approx(own.feed[~changed], rel=1e-9)
     assert np.isinf(program.feed[rapid]).all()
@@ -59,7 +59,7 @@ def test_lines_keep_every_byte_but_those_of_feeds(rng: random.Random) -> None:
     result = feedplan.planned_program(plan)
     changed = set(result.changes.line.tolist())
     before, after = text.splitlines(keepends=True), result.content.splitlines(keepends=True)
-    # Lines of their own with an F come before those that rely on it.
+    # A line with only an F word may be inserted before a line that relies on it.
     extra = iter(after)
     for number, line in enumerate(before, start=1):
         new = next(extra)
@@ -79,7 +79,7 @@ def without_feed(line: bytes) -> bytes:
 
 
 def restores(new: bytes, line: bytes) -> bool:
-    """The line has an F word more, which the program had in force there."""
+    """Whether the new line has an additional F word, with the feed that the program has in force there."""
     return b"F" in new.upper() and new != line
 
 
@@ -92,7 +92,7 @@ def test_split_lines_and_arcs_are_the_same_geometry(rng: random.Random, step: fl
     own = plan.program
     assert own is not None
     assert len(program) >= len(own)
-    # Every move of the program ends where one of ours does, in order, and the way is as long.
+    # Every move of the program ends where a new move ends, in order, and the total length is the same.
     row = 0
     for target in own.target:
         while np.abs(program.target[row] - target).max() > 1e-9:
@@ -131,7 +131,7 @@ def test_expanded_and_inverse_time_programs_are_the_same_moves(rng: random.Rando
 
 
 def with_inverse_time(plan: feedplan.Plan) -> feedplan.PlannedProgram | None:
-    """The program, None where it has what inverse time is not for."""
+    """The program with inverse time; None if it contains something that inverse time does not allow."""
     try:
         return feedplan.planned_program(plan, inverse_time=True)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""What the audit says of a plan and of its setpoints, if they can be made in a moment."""
+"""Failures of the audit of a plan, and of its setpoints if they are few enough."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.setpoints import Setpoints
 
-# A plan stopped at once may take minutes: setpoints are made of those that take no longer [s].
+# Setpoints are computed for plans up to this time [s]; a plan that is stopped at once may take minutes.
 LONGEST = 60.0
 
 
@@ -20,7 +20,7 @@ def audited(
     program: Program | None = None,
     jerk: bool = True,
 ) -> tuple[str, ...]:
-    """A sentence for each limit that is broken."""
+    """A sentence for each limit that the audit finds exceeded."""
     short = profile.time <= LONGEST
     points = Setpoints(problem, profile, machine.period, "sarfraz") if short else None
     return audit(problem, profile, machine, program, points, jerk=jerk).failures

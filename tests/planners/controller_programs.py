@@ -1,4 +1,4 @@
-"""Programs of some kinds, and how long LinuxCNC's simulator takes for them."""
+"""Programs of several kinds, whose time in LinuxCNC's simulator was measured."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def trochoid(tolerance: float = 0.1) -> str:
 
 
 def zigzag(tolerance: float = 0.05) -> str:
-    """Sixty corners of every angle between lines of 2 to 9 mm in space, at 80 mm/s."""
+    """Sixty corners with various angles between lines of 2 to 9 mm in space, at 80 mm/s."""
     lines = [HEAD.format(tolerance=tolerance) + "F4800"]
     x = y = 0.0
     for i in range(60):
@@ -35,7 +35,7 @@ def pause() -> str:
 
 
 def slots(tolerance: float = 0.02) -> str:
-    """Slots of lines and half circles, tangent to each other, at 50 mm/s."""
+    """Slots made of lines and half circles, tangent to each other, at 50 mm/s."""
     lines = [HEAD.format(tolerance=tolerance) + "F3000"]
     for i in range(8):
         y, radius = 10.0 * i, 1.0 + 0.4 * i

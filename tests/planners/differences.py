@@ -1,4 +1,4 @@
-"""Plain differences of setpoints against the numbers of a machine and a program: nothing of the audit's."""
+"""Plain differences of setpoints, compared with limits and feeds without any code of the audit."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from tests.planners.posted_programs import LINEAR, Posted
 
 Array = NDArray[np.float64]
 
-# What a limit may be exceeded by, as a part of it: the audit's own pass mark.
+# Allowed relative excess of a limit, the same as in the audit.
 SHARE = 1e-6
-# Units in the last place by which a position may be off.
+# Rounding error of a position, in units in the last place.
 ROUNDING = 4.0
 NAMES = {1: "velocity", 2: "acceleration", 3: "jerk"}
 
 
 def exceeded(points: SetpointChunk, machine: Machine, period: float, jerk: bool) -> list[str]:
-    """A sentence for each direction of an axis whose limits its first, second or (`jerk`) third differences
-    exceed.
+    """A sentence for each direction of an axis whose first, second or (with `jerk`) third differences exceed
+    the limit.
 
-    Setpoints are a period apart; what positions of their size are rounded by is allowed.
+    Setpoints are a period apart; the rounding error of the greatest position is allowed.
     """
     found = []
     for column, name in enumerate(points.axes):
@@ -41,7 +41,7 @@ def exceeded(points: SetpointChunk, machine: Machine, period: float, jerk: bool)
 
 
 def too_fast(points: SetpointChunk, posted: Posted, period: float) -> list[str]:
-    """A sentence where the setpoints run faster than all lines between two of them allow."""
+    """A sentence if a step is faster than all lines between its two setpoints allow."""
     lines = points.line
     low, high = np.minimum(lines[:-1], lines[1:]), np.maximum(lines[:-1], lines[1:])
     found = []
@@ -68,7 +68,8 @@ def too_fast(points: SetpointChunk, posted: Posted, period: float) -> list[str]:
 
 
 def beside_the_path(points: SetpointChunk, posted: Posted) -> list[str]:
-    """A sentence where a setpoint is farther from the program's lines than their tolerance (linear axes)."""
+    """A sentence if a setpoint is farther from the program's lines than their tolerance (linear axes
+    only)."""
     if posted.corners is None or any(name not in LINEAR for name in points.axes):
         return []
     start, end = posted.corners[:-1], posted.corners[1:]
@@ -79,13 +80,13 @@ def beside_the_path(points: SetpointChunk, posted: Posted) -> list[str]:
         length_sq = (way**2).sum(axis=1)
         share = np.clip((to * way).sum(axis=2) / length_sq, 0.0, 1.0)
         worst = max(worst, float(np.sqrt(((to - share[..., None] * way) ** 2).sum(axis=2)).min(axis=1).max()))
-    # Exact lines are met to what coordinates are rounded by.
+    # Lines with tolerance 0 are met up to the rounding of coordinates.
     allowed = posted.tolerance * (1 + SHARE) + 1e-12 * float(np.abs(posted.corners).max())
     return [f"{worst:.6g} mm beside the program of {posted.tolerance:.6g}"] if worst > allowed else []
 
 
 def _greatest_between(limit: Array, low: NDArray[np.int32], high: NDArray[np.int32]) -> Array:
-    """max(limit[low..high]) for each pair, both ends counted; lines that move nothing have −inf."""
+    """max(limit[low..high]) for each pair, both ends included; lines without motion have −inf."""
     most = np.maximum(limit[low], limit[high])
     wide = np.flatnonzero(high - low > 1)
     for k in wide:

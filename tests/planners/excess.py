@@ -1,8 +1,9 @@
-"""How far a profile is beyond its limits, from derivatives of the true motion at places inside its phases.
+"""Excess of a profile over its limits, by derivatives of the exact motion at places inside its phases.
 
-The laws are evaluated here once more, from their definitions. The audit measures by differences and allows
-for their rounding: it can tell an excess of 1e-6. These tests ask for 1e-9 of profiles in closed form, next
-to cusps in rational numbers, and they find an error that audit or sampler could share with the planner.
+The laws of the phases are evaluated here independently, from their definitions. The audit uses differences
+and allows for their rounding, so it detects an excess of 1e-6. These tests require 1e-9 of profiles in closed
+form (next to cusps in rational numbers), and would find an error that the audit or the sampler shares with
+the planner.
 """
 
 from __future__ import annotations
@@ -19,20 +20,21 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import PhaseLaw, SpeedProfile
 
 Array = NDArray[np.float64]
-# Of a tangent, as a part of the longest one on its arc.
+# Rounding error of a tangent, as a share of the longest tangent on its arc.
 ROUNDING = 1e-15
-# Derivatives (order + 1, m, axes) at places: piece (m,), u (m,), order.
+# A function of piece (m,), u (m,) and order that returns derivatives (order + 1, m, axes).
 Motion = Callable[[NDArray[np.uint32], Array, int], Array]
 
 
 def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> tuple[float, float]:
-    """Greatest relative excess of any limit, and least use of the most used one, inside the arcs.
+    """Greatest relative excess of any limit inside the arcs, and the smallest use, over all places, of the
+    limit that is used most there.
 
-    What the arcs say of p is about `problem.curve`, what the limits are kept for the exact joints.
+    The laws of the arcs determine p along `problem.curve`; the limits are checked on the exact joints.
     """
     planned: Motion = problem.curve.evaluate
     tool: Motion = problem.path.curve.evaluate if problem.tip_curve is None else problem.tip_curve.evaluate
-    # u is rounded: where an arc is as short as that, its places cannot be told apart.
+    # Arcs so short that the rounding of u matters are left out.
     long = (profile.u1 - profile.u0) > 1e-6 * problem.path.width[profile.piece]
     piece, kind, value = profile.piece[long], profile.kind[long, None], profile.value[long, None]
     axis = np.where(profile.axis[long] == 255, 0, profile.axis[long])
@@ -40,7 +42,7 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
     rows = np.arange(len(piece))
 
     def at(motion: Motion, u: Array) -> tuple[Array, Array]:
-        """C' and C'' at places (rows, …)."""
+        """C' and C'' at parameters u (rows, …)."""
         flat = motion(np.repeat(piece, u[0].size), u.ravel(), 2)
         return flat[1].reshape(*u.shape, -1), flat[2].reshape(*u.shape, -1)
 
@@ -49,7 +51,7 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
     t1, t2 = at(tool, u)
     j1, j2 = at(planned, u)
     g, c = j1[rows, :, axis], j2[rows, :, axis]
-    # v_j² of an arc from its slower end, the way of its axis by Gauss's rule.
+    # v² of the arc's axis at the slower end; its displacement from there by Gauss quadrature.
     ends = at(planned, np.stack([u0, u1], axis=1))[0][rows, :, axis]
     with np.errstate(invalid="ignore"):
         v_sq = np.stack([p0, p1], axis=1) * ends**2
@@ -68,9 +70,10 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
             p0[:, None],
         )
         s = np.select(kinds, [(value - c * p) / g, -p * (t1 * t2).sum(axis=2) / speed_sq, -p * c / g], 0.0)
-    # Next to a cusp the way of an axis may be rounding alone, and so its sign.
+    # Next to a cusp the displacement of the axis may be all rounding, with either sign.
     p = np.maximum(p, 0.0)
-    # Next to where its axis turns round s is a difference over next to nothing: so much of it is rounding.
+    # Next to a place where the axis turns round, s is a small difference divided by nearly 0: `grain` is its
+    # rounding error.
     with np.errstate(divide="ignore", invalid="ignore"):
         grain = ROUNDING * np.abs(j1).max(axis=(1, 2))[:, None] * np.abs(c * p) / g**2
     grain = np.where(kinds[0], grain, 0.0)
@@ -87,9 +90,9 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
 
 
 def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
-    """The same excess of the axes' limits on polynomial pieces, in rational numbers.
+    """The same excess as `worst_excess`, for the axes' limits on polynomial pieces, in rational numbers.
 
-    Next to a cusp the piece's derivatives in floats may be rounding alone, and what follows from them.
+    Next to a cusp the derivatives of the piece in floats may be all rounding.
     """
     curve, worst = problem.curve, Fraction(0)
     for arc in np.flatnonzero(profile.u1 - profile.u0 > 1e-6 * problem.path.width[profile.piece]):
@@ -111,7 +114,7 @@ def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
                 p = value / g[axis] ** 2
                 s = -p * c[axis] / g[axis]
             else:
-                # v² of the axis at the slower end; p is infinite in a cusp that is passed.
+                # v² of the axis at the slower end; p is infinite in a cusp that is passed without a stop.
                 ends = [(float(profile.p0[arc]), u0), (float(profile.p1[arc]), u1)]
                 v_sq, slow = min(
                     (Fraction(p) * _value(rates, end / width)[axis] ** 2, end)
@@ -130,14 +133,14 @@ def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
 
 
 def _value(points: list[list[Fraction]], t: Fraction) -> list[Fraction]:
-    """The Bernstein polynomial with these coefficients, axis by axis."""
+    """The polynomials with these Bernstein coefficients at t, one per axis."""
     n = len(points) - 1
     basis = [comb(n, i) * t**i * (1 - t) ** (n - i) for i in range(n + 1)]
     return [sum(b * x for b, x in zip(basis, axis, strict=True)) for axis in zip(*points, strict=True)]
 
 
 def _derivative(points: list[list[Fraction]], width: Fraction) -> list[list[Fraction]]:
-    """Its derivative by u = t width."""
+    """Bernstein coefficients of the derivative by u = t width."""
     n = len(points) - 1
     return [
         [n * (y - x) / width for x, y in zip(before, after, strict=True)]

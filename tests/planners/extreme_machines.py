@@ -1,4 +1,4 @@
-"""Machines at the ends of their ranges, and programs for them."""
+"""Machines with limits at the ends of the accepted ranges, and programs for them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from feedplan import Axis, Machine
 from feedplan.machine.axis import GREATEST_ACCELERATION
 from feedplan.machine.machine import CHORD_TOLERANCES, LEAST_CHORD_SHARE, LEAST_PERIOD_SHARE, PERIODS
 
-# Corners of the ranges of machines that exist; feedplan takes some more, where a limit never matters.
+# Ranges of machines that exist; feedplan accepts some more, where a limit has no effect.
 VELOCITIES, MOST_TIMES = (1e-5, 1e7), 1e6
 RISE_TIMES, JERK_TIMES, LEAST_JERK_SHARE, LEAST_WAY = (1e-5, 1e2), (1e-5, 1e2), 1e-5, 1e-9
-# Within the ends, so that the products of rounded numbers are.
+# Keeps products of rounded numbers inside the ranges.
 _INSIDE = 1.0 + 1e-9
 
 PROGRAMS = {
@@ -26,7 +26,7 @@ PROGRAMS = {
 
 
 def extreme_machine(seed: int) -> Machine:
-    """One of the corners of the ranges; on odd seeds each axis has a corner of its own."""
+    """A machine with values at or between the ends of the ranges; for odd seeds each axis has its own."""
     draw = random.Random(seed)
     speeds = [draw.choice((VELOCITIES[0], 0.01, 250.0, VELOCITIES[1])) for _ in "XYZ"]
     speeds = [max(speed, max(speeds) / MOST_TIMES * _INSIDE) for speed in speeds]

@@ -1,4 +1,4 @@
-"""Random curves that are straight, of any degree, and the least times of a line."""
+"""Random straight curves of any degree, and the least times for straight motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StraightCase:
-    """A straight path on a machine, and what its lines are: lengths and limits along them."""
+    """A straight path on a machine; lengths `ways` between its turns [mm], and the limits along it."""
 
     path: Path
     machine: Machine
@@ -28,12 +28,12 @@ class StraightCase:
 
     @property
     def time(self) -> float:
-        """The least time without a limit of jerk [s], by the closed form of each way from rest to rest."""
+        """The least time without a limit of jerk [s]: by a closed form for each way from rest to rest."""
         return float(sum(trapezoid(way, self.velocity, self.acceleration) for way in self.ways))
 
     @property
     def smooth_time(self) -> float:
-        """The same with the limit of jerk."""
+        """The least time with the limit of jerk [s]."""
         limits = self.velocity, self.acceleration, self.jerk
         return float(sum(seven_sections(way, *limits) for way in self.ways))
 
@@ -41,7 +41,8 @@ class StraightCase:
 def straight_case(seed: int) -> StraightCase:
     """A Bézier curve or a B-spline of degree 1 to 9 on a line in one to three axes.
 
-    Half of them have weights from 0.1 to 10, half of them turn back, and spans are as short as 1e-6 of all.
+    Half of them have weights from 0.1 to 10, half of them turn back, and spans may be as short as 1e-6 of the
+    whole.
     """
     rng = np.random.default_rng(seed)
     degree, axes = int(rng.integers(1, 10)), int(rng.integers(1, 4))
@@ -74,9 +75,10 @@ def straight_case(seed: int) -> StraightCase:
 
 
 def ways(places: Array, knots: Array, degree: int, weights: Array | None) -> Array:
-    """The ways of a rational spline on one axis from each of its turns to the next.
+    """The distances that a rational spline on one axis covers between its turns.
 
-    Turns are roots of the derivative's numerator on each span, as a series of Chebyshev, and knots.
+    Candidates for turns are the knots and the roots of the derivative's numerator on each span, which is
+    written as a Chebyshev series.
     """
     weights = np.ones_like(places) if weights is None else weights
     numerator, weight = BSpline(knots, places * weights, degree), BSpline(knots, weights, degree)
@@ -95,7 +97,7 @@ def ways(places: Array, knots: Array, degree: int, weights: Array | None) -> Arr
         at.extend([*(0.5 * (low + high) + 0.5 * (high - low) * real), high])
     u = np.array(at)
     reached = np.append((numerator(u[:-1]) / weight(u[:-1])), places[-1])
-    # What is no turn, as at a double root, is passed.
+    # Candidates where the direction does not change, such as double roots, are no turns.
     steps = np.diff(reached)
     steps = steps[np.abs(steps) > 1e-13 * np.abs(places).max()]
     turned = np.flatnonzero(np.diff(np.sign(steps)) != 0) + 1
@@ -103,17 +105,17 @@ def ways(places: Array, knots: Array, degree: int, weights: Array | None) -> Arr
 
 
 def trapezoid(way: float, velocity: float, acceleration: float) -> float:
-    """The least time from rest to rest."""
+    """The least time from rest to rest with limits of velocity and acceleration [s]."""
     if way * acceleration <= velocity**2:
         return float(2 * np.sqrt(way / acceleration))
     return way / velocity + velocity / acceleration
 
 
 def seven_sections(way: float, velocity: float, acceleration: float, jerk: float) -> float:
-    """The same with a limit of jerk."""
+    """The least time from rest to rest with a limit of jerk too [s]."""
 
     def rise(v: float) -> float:
-        """The time from rest to a speed with acceleration 0 at both."""
+        """The time from rest to speed v [s], with acceleration 0 at both ends."""
         return (
             2 * np.sqrt(v / jerk) if v * jerk <= acceleration**2 else v / acceleration + acceleration / jerk
         )

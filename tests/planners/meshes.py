@@ -1,4 +1,4 @@
-"""Problems on which planners are compared: random paths of every kind with every limit, and named ones."""
+"""Problems on which planners are compared: random paths of all kinds with all limits, and named problems."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def machine_of(axes: str, velocity: float, acceleration: float, jump: float = 0.
 
 
 def on_plane(points: NDArray[np.float64], feed: float, degree: int = 3) -> Problem:
-    """A spline through the plane at most at the feed, axes of 250 mm/s and 3000 mm/s²."""
+    """A spline through points of the plane, with axes of 250 mm/s and 3000 mm/s²."""
     knots = np.concatenate([np.zeros(degree), np.linspace(0, 1, len(points) - degree + 1), np.ones(degree)])
     path = Path.from_bspline(points, knots, degree, feed=feed)
     return build_problem(path, machine_of("XY" if points.shape[1] == 2 else "XYZ", 250.0, 3000.0))
@@ -56,8 +56,8 @@ NAMED = {"butterfly": butterfly, "infinity": infinity, "trefoil": trefoil}
 
 
 def random_path_problem(seed: int) -> Problem:
-    """A random curve in two to four axes: quadratic, cubic or rational, with corners, speeds at the ends,
-    chord error and feeds, each in a part of the seeds."""
+    """A random curve in two to four axes: quadratic, cubic or rational; some seeds have corners, speeds at
+    the ends, a chord tolerance or feeds."""
     rng = np.random.default_rng(seed)
     axes = "XYZA"[: int(rng.integers(2, 5))]
     kind = ("quadratic", "cubic", "rational")[seed % 3]

@@ -1,8 +1,8 @@
-"""Random part programs as shops post them, with what each line allows, for checks that read no G-code.
+"""Random part programs as shops post them, with the greatest speed that each line allows.
 
 Six kinds: zigzags of X with a rotary axis, X and Y alone on a machine without Z, inches, scan lines with the
-noise of an STL mesh, inverse-time feed, and a new feed in every block. The generator knows the speed that
-every line allows from the numbers that it writes; nothing here asks the reader or the planner.
+noise of an STL mesh, inverse-time feed, and a new feed in every block. The generator computes the allowed
+speeds from the numbers that it writes, without the reader and the planner.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ LINEAR = "XYZ"
 
 @dataclass
 class Posted:
-    """A program's `text`, its `machine`, and per source line the greatest speed of X, Y and Z together
-    (`linear` [mm/s]) and of the rotary axes together (`rotary` [deg/s]) where the line moves no other axis.
+    """A program's `text`, its `machine`, and for each source line the greatest speed of X, Y and Z together
+    (`linear` [mm/s]) and, where the line moves no other axis, of the rotary axes together (`rotary` [deg/s]).
 
-    `corners` (m, axes) are the ends of its lines where it has lines alone, None where it has arcs, and
-    `tolerance` [mm] is how far the path may leave them.
+    `corners` (m, axes) are the ends of the lines if the program has lines only, else None; `tolerance` [mm]
+    is how far the path may be from them.
     """
 
     machine: Machine
@@ -37,18 +37,18 @@ class Posted:
 
 
 def posted_program(seed: int) -> Posted:
-    """The program of a seed; its kind is the seed's remainder by the number of kinds."""
+    """The program of a seed; its kind is the seed modulo the number of kinds."""
     kinds = (_rotary_zigzag, _plotter, _inches, _mesh_noise, _inverse_time, _new_feeds)
     return kinds[seed % len(kinds)](np.random.default_rng([seed, 7]))
 
 
 class _Post:
-    """Writes blocks and keeps what they allow; positions are in the program's unit."""
+    """Writes blocks and records what they allow; positions are in the program's unit."""
 
     def __init__(self, rng: np.random.Generator, axes: str, unit: float = 1.0) -> None:
         self.rng, self.axes, self.unit = rng, axes, unit
         self.tolerance = float(np.round(10 ** rng.uniform(-3, -0.3), 4))
-        # P is in the program's unit.
+        # The word P is in the program's unit.
         written = self.tolerance / unit
         self.blocks = [f"{'G20' if unit != 1.0 else 'G21'} G90 G94 G64 P{written:.6f}"]
         self.tolerance = round(written, 6) * unit
@@ -65,11 +65,11 @@ class _Post:
         self._move("G0", words, np.inf)
 
     def line(self, words: dict[str, float], feed: float, more: str = "") -> None:
-        """A line at `feed` [units/min], or [deg/min] where no linear axis moves."""
+        """A line at `feed` [units/min], or [deg/min] if no linear axis moves."""
         self._move("G1", words, feed / 60.0, more)
 
     def timed(self, words: dict[str, float], minutes: float) -> None:
-        """A line that takes `minutes` at least."""
+        """A line that takes at least `minutes`, in inverse time."""
         rate = float(f"{1.0 / minutes:.6g}")
         step = self._end(words) - self.at
         linear = np.linalg.norm([step[k] for k in range(len(step)) if self.axes[k] in LINEAR])
@@ -115,7 +115,7 @@ class _Post:
 
 
 def _machine(rng: np.random.Generator, axes: str) -> Machine:
-    """Axes that differ, rotary ones some times quicker; with or without a chord tolerance."""
+    """Axes with different limits, rotary ones several times faster; with or without a chord tolerance."""
     velocity = 10 ** rng.uniform(1.5, 3)
     acceleration = velocity * 10 ** rng.uniform(0.5, 2)
     jerk = acceleration * 10 ** rng.uniform(0.7, 2.5)
@@ -162,7 +162,7 @@ def _plotter(rng: np.random.Generator) -> Posted:
             post.arc(radius, rng.uniform(0, 2 * np.pi), rng.choice([-1, 1]) * rng.uniform(0.3, 6.0), feed)
         else:
             dx, dy = size * rng.normal(size=2)
-            # A word left out is an axis at rest.
+            # An axis whose word is left out rests.
             words = {"X": post.at[0] + dx, "Y": post.at[1] + dy}
             if rng.random() < 0.3:
                 words.pop(str(rng.choice(["X", "Y"])))

@@ -1,4 +1,4 @@
-"""Random curves on random machines with limits of jerk, for the planners that keep them."""
+"""Random curves on random machines with limits of jerk."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def random_problem(seed: int) -> Problem:
 
 
 def random_case(seed: int, scale: float = 1.0) -> tuple[Problem, Machine]:
-    """The same with its machine, all lengths times `scale`."""
+    """The problem of `random_problem` with all lengths times `scale`, and its machine."""
     rng = np.random.default_rng(seed)
     degree, axes = int(rng.integers(2, 6)), int(rng.integers(1, 4))
     count = degree + 1 + int(rng.integers(0, 20 if rng.random() < 0.5 else 6))
@@ -45,10 +45,10 @@ def random_case(seed: int, scale: float = 1.0) -> tuple[Problem, Machine]:
 
 
 def awkward_case(seed: int) -> tuple[Path, Machine]:
-    """A curve of degree 1 to 9 in one to five axes, made to break planners, with its machine.
+    """A curve of degree 1 to 9 in one to five axes that is difficult for planners, with its machine.
 
-    Spans as short as 1e-6 of all, rational or not, on one axis, on a line or nearly, turning back, standing
-    still for a moment, or with double and triple knots.
+    Spans are as short as 1e-6 of the whole. Curves are rational or not, in one axis, on or nearly on a line,
+    turning back, with C' = 0 at a place, or with double and triple knots.
     """
     rng = np.random.default_rng(seed)
     degree, axes = int(rng.integers(1, 10)), int(rng.choice([1, 2, 3, 5]))

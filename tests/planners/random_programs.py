@@ -12,7 +12,7 @@ CONTROLS = ["", "G64", "G64 P0.05", "G64 P0.01 Q0.01", "G61", "G61.1"]
 
 
 def random_program(seed: int) -> str:
-    """Some dozens of moves on a scale from 0.03 to 100 mm, some a hundred times smaller than others."""
+    """Some dozens of moves of 0.03 to 100 mm, some of them a hundred times smaller than the others."""
     rng = np.random.default_rng(seed)
     walk = _Walk(rng, 10 ** rng.uniform(-1.5, 2.0))
     walk.lines += [f"G21 G90 {rng.choice(CONTROLS)}", "G0 X0 Y0 Z0", f"G1 F{10 ** rng.uniform(1.5, 4.3):.1f}"]
@@ -23,7 +23,7 @@ def random_program(seed: int) -> str:
 
 
 def random_machine(seed: int) -> Machine:
-    """Three axes that differ, with or without a chord tolerance."""
+    """Three axes with different limits, with or without a chord tolerance."""
     rng = np.random.default_rng([seed, 1])
     velocity = 10 ** rng.uniform(1.3, 3)
     acceleration = velocity * 10 ** rng.uniform(0.5, 2)
@@ -36,14 +36,14 @@ def random_machine(seed: int) -> Machine:
 
 
 class _Walk:
-    """The place and the direction that a program has come to."""
+    """The position and the direction at which a program has arrived."""
 
     def __init__(self, rng: np.random.Generator, size: float) -> None:
         self.rng, self.size, self.at, self.turn = rng, size, np.zeros(3), 0.0
         self.lines: list[str] = []
 
     def step(self) -> float:
-        """A length, now and then a far smaller one [mm]."""
+        """A random length [mm]; three in ten are much smaller."""
         small = 10 ** self.rng.uniform(-2, 0) if self.rng.random() < 0.3 else 1.0
         return float(self.size * small * self.rng.uniform(0.2, 1))
 
@@ -59,7 +59,7 @@ class _Walk:
         self.to("G1", self.at + self.step() * np.array([np.cos(self.turn), np.sin(self.turn), rise]))
 
     def arc(self) -> None:
-        """A circle or helix whose radius is above what the reader takes for none."""
+        """A circle or helix; its radius is at least 0.01 mm, so that the reader accepts it."""
         radius, start, angle = max(self.step(), 0.01), *self.rng.uniform([0, 0.1], [2 * np.pi, 6.1])
         offset = np.round(radius * np.array([np.cos(start), np.sin(start)]), 5)
         left = self.rng.random() < 0.5

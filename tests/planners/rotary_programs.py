@@ -1,4 +1,4 @@
-"""Random programs with rotary and parallel axes: zigzags, arcs, splines, indexing, with feeds of any kind."""
+"""Random programs with rotary and parallel axes: zigzags, arcs, splines, indexing, all kinds of feeds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TOLERANCES = (0.001, 0.01, 0.1, 1.0)
 
 
 def rotary_machine(seed: int, axes: str) -> Machine:
-    """Axes that differ, and are mostly fast enough for the feeds."""
+    """Axes with different limits, mostly fast enough for the feeds."""
     rng = np.random.default_rng([seed, 2])
     velocity = 10 ** rng.uniform(2.0, 3.5)
     limits = np.array([velocity, 20.0 * velocity, 800.0 * velocity]) * 10 ** rng.uniform(
@@ -24,9 +24,10 @@ def rotary_machine(seed: int, axes: str) -> Machine:
 
 
 def rotary_program(seed: int, axes: str, feeds: tuple[float, float, float], inverse: bool = False) -> str:
-    """Blocks at the feeds along X, Y, Z, along U, V, W and of rotary axes alone [mm/min, deg/min].
+    """Random blocks; `feeds` are for moves of X, Y, Z, of U, V, W without these, and of rotary axes alone
+    [mm/min, mm/min, deg/min].
 
-    `inverse`: some blocks are in inverse time. Every block has its own feed.
+    With `inverse` some blocks are in inverse time. Every block has its own feed.
     """
     rng = np.random.default_rng([seed, len(axes)])
     at = dict.fromkeys(axes, 0.0)
@@ -73,7 +74,7 @@ def rotary_program(seed: int, axes: str, feeds: tuple[float, float, float], inve
             (i, j), (p, q) = size * rng.normal(size=(2, 2))
             lines.append(f"G94 F{feeds[0]:.4f} G5 I{i:.4f} J{j:.4f} P{p:.4f} Q{q:.4f} {words(['X', 'Y'])}")
         else:
-            # A chain for the fit: small steps of the same kind.
+            # Small similar steps, which the reader fits by one curve.
             moved = some(linear) + some(rotary or parallel)
             steps = {name: 0.1 * size * rng.normal() for name in moved}
             for n in range(12):

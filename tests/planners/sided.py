@@ -1,4 +1,4 @@
-"""Machines with limits that differ by direction, and paths for them."""
+"""Machines whose limits differ by direction, and paths for them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def arm(velocity: list[Pair], acceleration: list[Pair]) -> Machine:
 
 
 def pairs(rng: np.random.Generator, count: int, most: float) -> list[Pair]:
-    """Limits of which some differ by direction, by up to ten times."""
+    """Random limits (negative, positive); most differ by direction, by up to ten times."""
     sides = most * 10.0 ** rng.uniform(-1.0, 0.0, (count, 2))
     even = rng.random(count) < 0.2
     return [(-float(a), float(a if same else b)) for (a, b), same in zip(sides, even, strict=True)]
@@ -45,7 +45,7 @@ def random_path(rng: np.random.Generator, count: int, kind: str) -> Path:
 
 
 def with_sides(machine: Machine, rng: np.random.Generator) -> Machine:
-    """The machine with some part of its limits in each direction, down to a fifth."""
+    """The machine with each limit reduced in each direction, at most to a fifth."""
 
     def parts(limit: Limit) -> Pair:
         least, most = range_of(limit)
@@ -56,12 +56,12 @@ def with_sides(machine: Machine, rng: np.random.Generator) -> Machine:
 
 
 def even(machine: Machine) -> Machine:
-    """The machine with the lesser limits of both directions."""
+    """The machine with the lesser of both directions' limits in both directions."""
     return _changed(machine, size_of)
 
 
 def swapped(machine: Machine) -> Machine:
-    """The machine with the limits of each direction in the other one."""
+    """The machine with the limits of both directions exchanged."""
 
     def turned(limit: Limit) -> Pair:
         least, most = range_of(limit)

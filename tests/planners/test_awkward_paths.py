@@ -1,4 +1,4 @@
-"""Curves made to break planners: what is planned keeps every limit, the rest is refused in a sentence."""
+"""Curves that are difficult for planners: plans keep every limit, or the curve is refused in a sentence."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tests.planners.differences import exceeded
 from tests.planners.random_paths import awkward_case
 
 METHODS = ("bang-bang", "jerk-limited", "s-curve")
-# They keep accelerations on lines; on curves they look at places, and the audit tells what they miss.
+# They keep accelerations on lines; on curves they check places, and the audit reports what they miss.
 CONTROLLERS = ("arc-transition", "constant-velocity-transition", "junction-deviation", "tangential")
 COUNT = seeds(6)
-# They are run in so many parts, beside each other.
+# The seeds are divided into this many tests, which can run in parallel.
 PARTS = 3
 
 
@@ -49,16 +49,16 @@ def test_random_awkward_curves_keep_every_limit(part: int, method: str) -> None:
     assert found == []
 
 
-# Turns within 1e-20 mm between pieces that do not stand still (439, 652, 824); the time of an arc that begins
-# at a crawl (473); a direction that changes within a millisecond at the feed (711); a rest in a cusp of order
-# 4 (1056).
+# Turns within 1e-20 mm between pieces with C' ≠ 0 (439, 652, 824); the duration of an arc that begins at a
+# very low speed (473); a direction that changes within a millisecond at the feed (711); a stop in a cusp of
+# order 4 (1056).
 @pytest.mark.parametrize("seed", [439, 473, 652, 711, 824, 1056])
 def test_curves_that_broke_the_exact_planner_or_its_audit(seed: int) -> None:
     assert faults(seed, "bang-bang") == []
 
 
-# Turns finer than any grid: one (71), one of a piece that is a line but for 3e-12 mm (255). A rest whose
-# place is that of the way to it (194), durations of arcs that begin at rest (21, 275).
+# Turns finer than any grid: a single one (71), one in a piece that is straight to 3e-12 mm (255). A stop at
+# the same rounded place as the motion to it (194); durations of arcs that begin at rest (21, 275).
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve"])
 @pytest.mark.parametrize("seed", [21, 71, 194, 255, 275])
 def test_curves_that_broke_planners_with_a_limit_of_jerk_or_their_audit(seed: int, method: str) -> None:
@@ -66,7 +66,7 @@ def test_curves_that_broke_planners_with_a_limit_of_jerk_or_their_audit(seed: in
 
 
 def test_segments_are_as_short_as_the_turns_between_them() -> None:
-    # By segments of a 32nd of a piece this took 1000 s: they crept through the turn of a part.
+    # With segments of 1/32 of a piece this took 1000 s, because a whole segment around the turn was slow.
     path, machine = awkward_case(236)
     assert feedplan.plan(path, machine, method="s-curve").time < 0.4
 

@@ -1,9 +1,10 @@
-"""The exact planner: by hand, against the times of an independent implementation, every limit densely.
+"""The exact planner: by hand, against the times of an independent implementation, every limit at many places.
 
 `data/reference.npz` holds 122 random problems (seeds 700…, 0…11) and their times from an independent planner
 of the same mathematics in numpy. Per problem: `m` axes, `n` pieces, `time` [s], `v`, `a` limits, `dl`, `dr`
 the tangents (n, m) at the piece ends, `h` widths, `f` feeds, `j` (n + 1) squared junction speeds. They have
-ties, exact zeros, cusps, corners, straight runs and limits over six decades; the last twelve are CAM-like.
+equal limits of several axes, exact zeros, cusps, corners, straight runs and limits over six decades; the last
+twelve resemble CAM programs.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def problem(
     acceleration: Array,
     junction: Array,
 ) -> Problem:
-    """A problem from the tangents at both ends of each piece; each piece begins at the origin."""
+    """A problem given by the tangents at both ends of each piece; each piece begins at the origin."""
     second = left * width[:, None] / 2
     control = np.stack([np.zeros_like(left), second, second + right * width[:, None] / 2], axis=1)
     path = path_along(CompositeCurve.from_pieces(control, width), feed=feed)
@@ -82,12 +83,12 @@ def references() -> Iterator[tuple[Problem, float]]:
 
 
 def axis_count(data: NDArray[np.float64], piece: int) -> int:
-    """How many problems lie before a piece: each has one junction more than pieces."""
+    """The number of problems before a piece; each problem has one junction more than pieces."""
     return int(np.searchsorted(np.cumsum(data["n"]), piece, side="right"))  # type: ignore[call-overload]
 
 
 def worst_excess(task: Problem, profile: SpeedProfile, samples: int = 100) -> tuple[float, float]:
-    """Greatest relative excess over any limit, and the least use of the most used limit, densely sampled."""
+    """Greatest relative excess of any limit, and the smallest use of the most used limit, at many places."""
     points, width = task.path.curve.by_piece, task.path.width
     left = 2 * (points[:, 1] - points[:, 0]) / width[:, None]
     bend = (2 * (points[:, 2] - points[:, 1]) / width[:, None] - left) / width[:, None]
@@ -122,7 +123,7 @@ def worst_excess(task: Problem, profile: SpeedProfile, samples: int = 100) -> tu
 
 @st.composite
 def paths(draw: st.DrawFn) -> Problem:
-    """Smooth paths with tangents of small whole numbers: with zeros, ties, straight pieces, reversals."""
+    """Smooth paths whose tangents are small integers: zeros, equal limits, straight pieces, reversals."""
     axes, count = draw(st.integers(1, 4)), draw(st.integers(1, 8))
     whole = st.integers(-3, 3)
     knots = [draw(st.lists(whole, min_size=axes, max_size=axes)) for _ in range(count + 1)]

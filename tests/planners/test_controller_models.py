@@ -1,4 +1,4 @@
-"""The rules of grbl, Klipper, Marlin and LinuxCNC: by hand, block by block, and beside a simulator."""
+"""The rules of grbl, Klipper, Marlin and LinuxCNC: by hand, block by block, and against a simulator."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PLANE = Machine("plane", tuple(Axis(name, 100.0, A) for name in "XYZ"), period=0
 
 
 def program(points: Any, feed: float = 6000.0, tolerance: float | None = 0.01) -> str:
-    """Lines through points from the origin, feed in mm/min."""
+    """A program of lines through points from the origin; feed [mm/min]."""
     mode = "G64" if tolerance is None else f"G64 P{tolerance:g}"
     rows = [" ".join(f"{name}{v:.9f}" for name, v in zip("XYZ", point, strict=False)) for point in points]
     return "\n".join(["G21 G90 G17 G94", mode, f"F{feed:.9g}", *(f"G1 {row}" for row in rows), "M2"]) + "\n"
@@ -45,7 +45,7 @@ def problem_of(text: str, corners: Corners = Corners.PROGRAMMED, machine: Machin
 
 
 def speeds(profile: Any, problem: Problem) -> Array:
-    """Speed at the starts of the pieces and at the end [mm/s]; lines of constant |C'|."""
+    """Speeds at the starts of the pieces and at the end [mm/s], on lines with constant |C'|."""
     first = np.searchsorted(profile.piece, np.arange(len(problem.path)))
     rate = np.linalg.norm(problem.curve.evaluate(profile.piece[first], profile.u0[first], 1)[1], axis=1)
     return np.append(np.sqrt(profile.p0[first]) * rate, 0.0)
@@ -59,24 +59,24 @@ def random_polyline(seed: int, count: int = 60) -> Array:
 
 @pytest.mark.parametrize("blocks", [2, 3, 5])
 def test_a_chain_is_as_fast_as_the_blocks_behind_allow_a_stop(blocks: int) -> None:
-    # Lines of 1 mm that hardly turn: the junctions hold nothing, v² = 2 A (blocks − 1) does.
+    # Lines of 1 mm that hardly turn: the buffer limits the speed, not the junctions: v² = 2 A (blocks − 1).
     points = [(i, 1e-4 * (i % 2)) for i in range(1, 31)]
     problem = problem_of(program(points))
     known = speeds(junction_deviation.plan(problem, 1e6, blocks=blocks), problem)
     reach = 2.0 * A * np.minimum(np.minimum(np.arange(31), blocks - 1), np.arange(30, -1, -1))
     np.testing.assert_allclose(known, np.minimum(np.sqrt(reach), 100.0), rtol=1e-5)
-    # A chain that is shorter than the buffer knows its end.
+    # If all blocks fit into the buffer, the end of the program is known.
     all_known = junction_deviation.plan(problem, 1e6)
     assert junction_deviation.plan(problem, 1e6, blocks=31).time == all_known.time
     assert junction_deviation.plan(problem, 1e6, blocks=blocks).time > all_known.time
 
 
 def ring_buffer(limit: Array, gain: Array, blocks: int) -> Array:
-    """Speeds at the ends of blocks as a buffer of so many gives them, one leaving after the other."""
+    """Speeds at the ends of blocks [mm/s] by a buffer of `blocks` blocks that leave one after the other."""
     square = np.zeros(len(gain) + 1)
     for first in range(len(gain)):
         known = range(first, min(first + blocks, len(gain)))
-        # Planned to a stop at the end of the last block known, from the speed that the first one has.
+        # Planned to a stop at the end of the last known block, from the present speed of the first one.
         back = 0.0
         for i in reversed(known):
             if i == first:
@@ -107,21 +107,22 @@ def test_more_blocks_are_never_slower() -> None:
 
 
 def circle(radius: float, feed: float = 1e4) -> Problem:
-    """Half a circle; machine with one limit for all directions to the last digit only along axes."""
+    """Half a circle, on a machine with acceleration A along the axes and up to √2 A along diagonals."""
     curve = arc([radius, 0.0], (0.0, 0.0), math.pi).with_width([radius * 1.5] * 2)
     machine = Machine("fast", tuple(Axis(name, 1e4, A) for name in "XY"), period=0.001)
     return build_problem(Path.from_curve(curve, feed=feed), machine)
 
 
 def top(profile: Any, problem: Problem) -> float:
-    """The greatest speed at the ends of arcs of a profile [mm/s]."""
+    """The greatest speed at the starts of a profile's arcs [mm/s]."""
     rate = np.linalg.norm(problem.curve.evaluate(profile.piece, profile.u0, 1)[1], axis=1)
     return float((np.sqrt(profile.p0) * rate).max())
 
 
 def test_chopped_arcs_have_the_speed_from_chord_to_chord() -> None:
-    # grbl with chords within e: v² = a δ s/(1 − s), s = cos(turn/2) = 1 − e/r, about a r δ/e: by its own 0.01
-    # and 0.002 mm far beyond the axes. Along an axis a is least, along a diagonal √2 times that.
+    # grbl divides arcs into chords with an error up to e: v² = a δ s/(1 − s) with s = cos(turn/2) = 1 − e/r,
+    # about a r δ/e. With grbl's own δ = 0.01 mm and e = 0.002 mm this exceeds the axes by far, so δ is
+    # smaller here. The acceleration a is least along an axis, and √2 times that along a diagonal.
     radius, problem = 5.0, circle(5.0)
     s = 1.0 - 0.002 / radius
     slow = math.sqrt(A * 0.001 * s / (1.0 - s))
@@ -133,12 +134,12 @@ def test_chopped_arcs_have_the_speed_from_chord_to_chord() -> None:
 
 
 def test_klipper_chops_arcs_by_length_and_keeps_half_of_each_chord() -> None:
-    # Chords of 1 mm on a circle of 20 mm turn by 0.05: the circle to the middles of chords has v² = a r.
+    # Chords of 1 mm on a circle of 20 mm turn by 0.05 rad: the rule for half of each chord gives v² = a r.
     problem = circle(20.0)
     options: dict[str, Any] = {"arc_segment": 1.0, "short_lines": "half", "max_acceleration": A}
     fast = junction_deviation.plan(problem, square_corner_velocity=100.0, **options)
     assert top(fast, problem) == pytest.approx(math.sqrt(A * 20.0), rel=2e-3)
-    # And by the corner speed v₉₀ = 2 mm/s: v² = v₉₀² (√2 − 1) s/(1 − s).
+    # The corner speed v₉₀ = 2 mm/s limits to v² = v₉₀² (√2 − 1) s/(1 − s).
     s = math.cos(0.025)
     slow = junction_deviation.plan(problem, square_corner_velocity=2.0, **options)
     expected = 2.0 * math.sqrt((math.sqrt(2.0) - 1.0) * s / (1.0 - s))
@@ -165,7 +166,7 @@ def test_short_lines_hold_klipper_and_marlin_back() -> None:
     np.testing.assert_allclose(half, math.sqrt(0.5 * A * length / math.tan(turn / 2)), rtol=1e-5)
     chord = corner_speed(problem, Junctions(10.0, short_lines="arc"))[corners]
     np.testing.assert_allclose(chord, math.sqrt(A * length / turn), rtol=1e-5)
-    # Marlin's are those below 1 mm and 45° alone.
+    # Marlin's rule holds only for lines below 1 mm and turns below 45°.
     assert (corner_speed(problem, Junctions(10.0))[corners] > chord).all()
     long = problem_of(program(3.0 * points))
     assert (corner_speed(long, Junctions(10.0, short_lines="arc"))[corners] > 30.0).all()
@@ -174,7 +175,7 @@ def test_short_lines_hold_klipper_and_marlin_back() -> None:
 def test_classic_jerk_is_the_jump_of_each_axis() -> None:
     square = problem_of(program([(10, 0), (10, 10), (4, 10), (10, 10), (10, 10, 5)]))
     speed = corner_speed(square, Junctions(0.01, axis_jumps=(8.0, 9.0, 0.5)))
-    # A right angle: X stops and Y starts; back along X it counts once; Z has least.
+    # A right angle: X stops and Y starts; a reversal of X counts once; the limit of Z is the least.
     np.testing.assert_allclose(speed[1:-1], [8.0, 8.0, 8.0, 0.5])
 
 
@@ -188,7 +189,7 @@ def test_half_of_a_single_line_is_at_one_speed_by_a_cruise_ratio_of_a_half() -> 
 
 
 def by_hills(limit: Array, gain: Array, part: float) -> Array:
-    """The greatest speed of each block: no hill of the smoothed speeds is passed above its top."""
+    """The greatest speed of each block [mm/s]: that of its hill's top with `part` of the acceleration."""
     less, square = part * gain, limit.astype(float) ** 2
     square[[0, -1]] = 0.0
     for i in range(len(less)):
@@ -197,7 +198,7 @@ def by_hills(limit: Array, gain: Array, part: float) -> Array:
         square[i] = min(square[i], square[i + 1] + less[i])
     tops = np.empty(len(less))
     for i in range(len(less)):
-        # Up to where the smoothed speeds stop to rise, from wherever they stop to fall.
+        # A hill: forward as long as the smoothed speeds rise, or back as long as they fall.
         up = i
         while square[up] + less[up] <= square[up + 1] * (1 + 1e-9) and up + 1 < len(less):
             up += 1
@@ -229,7 +230,7 @@ def test_the_cruise_ratio_keeps_every_hill_below_its_smoothed_top(seed: int) -> 
     by_piece = np.zeros(len(problem.path))
     np.maximum.at(by_piece, smooth.piece, greatest)
     assert (by_piece <= tops * (1.0 + 1e-6)).all()
-    # And hills that have room reach their tops.
+    # Hills with enough room reach their tops.
     assert (by_piece >= tops * (1.0 - 1e-6)).any()
 
 
@@ -240,7 +241,7 @@ def test_limits_along_the_path_hold_in_every_direction() -> None:
     assert free.time == pytest.approx(2.0 * math.sqrt(length / (math.sqrt(2.0) * A)), rel=1e-9)
     held = junction_deviation.plan(problem, max_acceleration=400.0, max_velocity=50.0)
     assert held.time == pytest.approx(length / 50.0 + 50.0 / 400.0, rel=1e-9)
-    # The axes have what the path has, and no more: the audit compares both.
+    # The plan keeps the limits of the axes, and each axis has 1/√2 of the acceleration along the path.
     made = plan(program([(10, 10)], feed=6e4), PLANE, "junction-deviation", max_acceleration=400.0)
     assert made.audit().ok
     assert abs(made.at(1e-3).acceleration[0]) == pytest.approx(400.0 / math.sqrt(2.0), rel=1e-9)
@@ -261,7 +262,7 @@ def test_linuxcnc_turns_a_square_on_arcs_with_half_of_the_acceleration_along_the
         ramps = (2.0 * feed**2 - before**2 - after**2) / (2.0 * a)
         return (2.0 * feed - before - after) / a + (length - ramps) / feed
 
-    # The last line, before the stop, has half of the acceleration all along.
+    # The last line, before the stop, has only half of the acceleration.
     ends = line(10 - radius, 0, v) + line(10 - radius, v, 0, 0.5 * A)
     lines = ends + 2.0 * line(10 - 2.0 * radius, v, v)
     assert planner("linuxcnc")(problem).time == pytest.approx(lines + 1.5 * math.pi * radius / v, rel=1e-9)
@@ -269,7 +270,7 @@ def test_linuxcnc_turns_a_square_on_arcs_with_half_of_the_acceleration_along_the
 
 def test_arcs_of_linuxcnc_leave_along_the_path_what_the_circle_leaves() -> None:
     along_x, along_y = np.array([[1.0, 0.0]] * 2), np.array([[0.0, 1.0]] * 2)
-    # At 0.6 of A across 0.8 are left; where the bend holds the speed, a half.
+    # A bend that uses 0.6 A leaves 0.8 A along the path; where the bend itself limits the speed, 0.5 A.
     speed = np.sqrt(A * 10.0 * np.array([0.6, 5.0]))
     places = CurvePlaces(along_x, along_y, np.full((2, 2), A), np.full(2, 10.0), speed)
     ways, across = linuxcnc.on_arcs(places)
@@ -278,7 +279,7 @@ def test_arcs_of_linuxcnc_leave_along_the_path_what_the_circle_leaves() -> None:
 
 
 def test_linuxcnc_knows_so_many_segments_and_gives_no_block_less_than_a_period() -> None:
-    # Lines of 1 mm in a smooth circle of 40 sides: the arcs between touch, and two segments a corner count.
+    # Lines of 1 mm on a smooth circle of 40 sides: arcs between them touch; a corner counts as two segments.
     turn = 2.0 * np.pi * np.arange(1, 41) / 40
     points = 6.37 * np.stack([np.sin(turn), 1.0 - np.cos(turn)], axis=1)
     problem = problem_of(program(points, tolerance=0.02), Corners.ARCS)
@@ -288,7 +289,7 @@ def test_linuxcnc_knows_so_many_segments_and_gives_no_block_less_than_a_period()
     for depth in (0, 1.5, "4"):
         with pytest.raises(InputError, match=r"the depth is .*: give a whole number from 1"):
             linuxcnc.plan(problem, depth=depth)  # type: ignore[arg-type]
-    # Blocks of 0.05 mm at a period of 2 ms: 0.05/0.00204 mm/s and no more.
+    # Blocks of 0.05 mm at a period of 2 ms: the speed is at most 0.05/0.00204 mm/s.
     coarse = Machine("coarse", PLANE.axes, period=0.002)
     points = [(0.05 * i, 0.0003 * (i % 2)) for i in range(1, 200)]
     slow = problem_of(program(points, tolerance=0.02), Corners.ARCS, coarse)
@@ -311,9 +312,9 @@ def test_points_near_lines_are_left_out_and_no_others(seed: int) -> None:
     assert len(ends) < 150
     for first, last in zip(starts, ends, strict=True):
         assert distance(points[first : last + 1]) <= 0.05 + 1e-6
-        # One point more would leave one of them too far away.
+        # With the next point one of the points would be too far from the line.
         assert last == 300 or distance(points[first : last + 2]) > 0.05 - 1e-6
-    # Each piece tells the moves that it goes along, and how far it may be from them.
+    # Each piece knows the moves that it follows, and its tolerance.
     np.testing.assert_array_equal(path.move[1:, 0] <= path.move[:-1, 1] + 1, True)
     np.testing.assert_allclose(path.tolerance, 0.1)
 
@@ -337,12 +338,11 @@ def test_what_may_not_be_joined_is_not() -> None:
         (straight.replace("G1 X4\n", "G1 X4\nG61\n"), 5),  # the exact path after X4
     ):
         assert len(problem_of("G21 G90 G64 P0.01 F600\n" + words + "M2\n", Corners.JOINED).path) == pieces
-    # Q0 joins none, and a Q of its own counts in place of P.
+    # Q0 joins no lines: Q has priority over P.
     assert len(problem_of("G21 G90 G64 P0.01 Q0 F600\n" + straight + "M2\n", Corners.JOINED).path) == 8
 
 
-# Time that the simulator of LinuxCNC 2.9 takes [s], at 100 mm/s and 500 mm/s² on each axis, servo period
-# 1 ms.
+# Times in the simulator of LinuxCNC 2.9 [s], at 100 mm/s and 500 mm/s² for each axis, servo period 1 ms.
 MEASURED = {"trochoid": 10.510, "zigzag": 12.029, "slots": 13.262, "pause": 3.695}
 
 

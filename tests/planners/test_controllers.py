@@ -1,4 +1,4 @@
-"""What controllers do instead of the optimum: by hand, by their sources, and against the optimum."""
+"""What controllers do instead of the optimum: by hand, by their source code, and against the optimum."""
 
 from __future__ import annotations
 
@@ -59,7 +59,8 @@ def write(tmp_path: FilePath) -> Write:
 
 
 def side(length: float, before: float, after: float, held: float = 0.0) -> float:
-    """Time of one line at the feed between ramps at A, the speeds at both ends held so long."""
+    """Time of one line at the feed between ramps with acceleration A [s]; over the length `held` the speeds
+    of its ends are constant."""
     ramps = (2.0 * F**2 - before**2 - after**2) / (2.0 * A)
     return (2.0 * F - before - after) / A + ((length - ramps - held) / F)
 
@@ -69,7 +70,7 @@ def test_one_line_is_a_trapezoid_or_a_triangle(method: str, write: Write) -> Non
     assert plan(write([[0, 0], [10, 0]]), PLANE, method).time == pytest.approx(10.0 / F + F / A, rel=1e-12)
     short = plan(write([[0, 0], [1, 0]]), PLANE, method)
     assert short.time == pytest.approx(2.0 * math.sqrt(1.0 / A), rel=1e-12)
-    # Along a diagonal both axes do their share.
+    # Along a diagonal both axes contribute.
     diagonal = plan(write([[0, 0], [1, 1]]), PLANE, method)
     assert diagonal.time == pytest.approx(2.0 * math.sqrt(1.0 / A), rel=1e-12)
     assert short.audit().ok
@@ -80,7 +81,7 @@ def test_constant_velocity_transition_turns_a_square_by_what_a_period_allows(wri
     square = plan(write(SQUARE), PLANE, CVT)
     v = A * T
     way = v * T
-    # A corner is passed at v, a period before and a period after.
+    # A corner is passed at speed v, for one period before and one period after it.
     time = 2.0 * (side(10, 0, v, way) + T) + 2.0 * (side(10, v, v, 2 * way) + 2.0 * T)
     assert square.time == pytest.approx(time, rel=1e-12)
     assert square.path.corners is Corners.PROGRAMMED
@@ -89,7 +90,7 @@ def test_constant_velocity_transition_turns_a_square_by_what_a_period_allows(wri
 
 def test_junction_deviation_turns_a_square_by_the_formula_of_grbl_and_breaks_the_axes(write: Write) -> None:
     square = plan(write(SQUARE), PLANE, JUNCTION)
-    # The jump is along a diagonal, where √2 A is to be had; sin 45° / (1 − sin 45°) = 1 + √2.
+    # The velocity jumps along a diagonal, where √2 A is available; sin 45° / (1 − sin 45°) = 1 + √2.
     v = math.sqrt(math.sqrt(2.0) * A * 0.01 * (1.0 + math.sqrt(2.0)))
     assert square.time == pytest.approx(2.0 * side(10, 0, v) + 2.0 * side(10, v, v), rel=1e-12)
     verdict = square.audit()
@@ -116,14 +117,14 @@ def test_arc_transition_turns_a_square_on_quarters_of_circles(write: Write) -> N
 def test_a_corner_of_short_lines_takes_half_of_each(write: Write) -> None:
     points = [[0, 0], [1, 0], [1.02, 0.02], [1.02, 1]]
     path = plan(write(points), PLANE, ARCS).path
-    # Two arcs that meet in the middle of the short line, whose half is their length on it.
+    # Two arcs that meet in the middle of the short line: each takes half of it.
     assert len(path) == 4
     meeting = path.curve.control_points[path.curve.offsets[2]]
     np.testing.assert_allclose(meeting, [1.01, 0.01, 0.0], atol=1e-12)
 
 
 def test_nothing_is_left_between_corners_of_nearly_equal_lines(write: Write) -> None:
-    # Halves of lines of 0.28 mm and 2e-8 mm more meet: between them there is no line to have a direction.
+    # Each corner takes 0.14 mm of the middle line; the remaining 2e-8 mm are too short to have a direction.
     a, b, c = 0.28, 0.28 + 2e-8, 0.28
     points = [[0, 0], [a, 0], [a + 0.8 * b, 0.6 * b], [a + 0.8 * b + c, 0.6 * b]]
     made = plan(write(points, tolerance=0.1), PLANE, ARCS)
@@ -145,14 +146,14 @@ def test_the_speed_of_transition_is_that_of_the_axis_that_turns_least_willingly(
 
 @pytest.mark.parametrize("turn", [1e-4, 0.3, math.pi / 2, 2.5])
 def test_corner_speeds_follow_grbl_and_klipper(turn: float, write: Write) -> None:
-    # The jump points along Y: into the corner by −turn/2, out of it by +turn/2.
+    # The velocity jumps along Y: the direction is −turn/2 before the corner and +turn/2 after it.
     way = 10.0 * np.array([math.cos(turn / 2), math.sin(turn / 2)])
     file = write([[0.0, 0.0], [way[0], -way[1]], [2 * way[0], 0.0]])
     problem = _problem(file, PLANE, JUNCTION)
     sine = math.sin(0.5 * (math.pi - turn))
     grbl = math.sqrt(A * 0.02 * sine / (1.0 - sine))
     assert corner_speed(problem, Junctions(0.02))[1] == pytest.approx(grbl, rel=1e-5)
-    # Klipper: the deviation is v₉₀² (√2 − 1)/a, and at a right angle the speed is v₉₀.
+    # Klipper's junction deviation is v₉₀² (√2 − 1)/a, so that the speed at a right angle is v₉₀.
     deviation = 5.0**2 * (math.sqrt(2.0) - 1.0) / A
     klipper = corner_speed(problem, Junctions(0.02, 5.0))[1]
     assert klipper == pytest.approx(corner_speed(problem, Junctions(deviation))[1], rel=1e-9)
@@ -172,11 +173,11 @@ def test_a_reversal_is_a_stop_for_junction_deviation_and_a_crawl_for_the_period(
 
 
 def test_on_a_circle_each_method_has_the_speed_of_its_rule() -> None:
-    # Half a circle of 10 mm from rest to rest, with feed for all.
+    # Half a circle of radius 10 mm from rest to rest, at a feed that limits nothing.
     path = Path.from_curve(arc([10.0, 0.0], (0.0, 0.0), math.pi).with_width([15.0, 15.0]), feed=400.0)
     problem = build_problem(path, PLANE)
     top = {method: _top_speed(problem, method) for method in METHODS}
-    # Across a diagonal √2 A is to be had, less between the places where limits are taken.
+    # Along a diagonal √2 A is available; limits are checked at places only, so the top may be somewhat lower.
     assert 0.95 * math.sqrt(math.sqrt(2.0) * A * 10.0) < top[JUNCTION] < math.sqrt(math.sqrt(2.0) * A * 10.0)
     assert top[ARCS] == top[CVT] == pytest.approx(math.sqrt(0.5 * math.sqrt(3.0) * A * 10.0), rel=1e-9)
     assert top[TANGENTIAL] > 250.0
@@ -187,7 +188,7 @@ def test_on_a_circle_each_method_has_the_speed_of_its_rule() -> None:
         verdict = audit(problem, profile, PLANE, setpoints=stream)
         assert verdict.ok == (method in (ARCS, CVT)), (method, verdict.failures)
         assert not verdict.ok or profile.time > optimum
-        # Never for another reason than the axes.
+        # Only limits of the axes may be exceeded.
         assert {check.name for check in verdict.broken} <= {
             "acceleration",
             "recorded_acceleration",
@@ -201,7 +202,7 @@ def test_setpoints_from_and_to_rest_follow_a_speed_whose_square_is_linear() -> N
     profile = planner(TANGENTIAL)(problem)
     assert (profile.kind == PhaseLaw.SPEED_LINE).sum() > 2
     chunk = Setpoints(problem, profile, T).all()
-    # Times by midpoints over the root of the way, where the integrand is smooth.
+    # Times by the midpoint rule in the square root of the distance, in which the integrand is smooth.
     for i in np.flatnonzero(profile.kind == PhaseLaw.SPEED_LINE):
         u0, u1 = profile.u0[i], profile.u1[i]
         ends = np.linalg.norm(curve.evaluate([0, 0], [u0, u1], 1)[1], axis=1) ** 2 * [
@@ -224,7 +225,7 @@ def test_setpoints_from_and_to_rest_follow_a_speed_whose_square_is_linear() -> N
 
 @pytest.mark.parametrize("method", [CVT, ARCS, "linuxcnc"])
 def test_a_curve_that_slows_beside_a_place_of_its_survey_keeps_all_limits(method: str) -> None:
-    # |C'| falls to 2 % of its greatest between two of nine places.
+    # |C'| falls to 2 % of its greatest value between two of nine places.
     curve = CompositeCurve.from_bezier([[0, 0], [4, 4], [-0.18, 3.59], [4.2, 0]])
     speed = np.linalg.norm(curve.evaluate(np.zeros(1001, int), np.linspace(0.0, 1.0, 1001), 1)[1], axis=1)
     assert speed.min() < 0.03 * speed.max()
@@ -284,7 +285,7 @@ def test_second_differences_of_constant_velocity_transition_keep_every_axis(seed
     made = plan(write(points, feed=80.0), Machine.load("mill"), CVT)
     limit = made.problem.max_acceleration * (1.0 + 1e-6)
     assert (_second_differences(made) <= limit).all()
-    # The optimum under the same jumps brakes into the corner and turns: the two add up.
+    # Under the same jumps the optimum brakes into the corner while it turns: both differences add up.
     optimum = replace(made, profile=planner("bang-bang")(made.problem))
     assert (_second_differences(optimum) > limit).any()
     assert not optimum.audit().ok
@@ -299,7 +300,7 @@ def test_programs_with_arcs_are_planned_and_audited(tmp_path: FilePath) -> None:
         made = plan(file, PLANE, method)
         broken = {check.name for check in made.audit().broken}
         assert (not broken) == (method in (CVT, ARCS)), (method, made.audit().failures)
-    # Beside a curve the transition stops.
+    # Where a line meets a curve, this method stops.
     made = plan(file, PLANE, CVT)
     assert made.profile.p1[np.flatnonzero(np.diff(made.profile.piece))].min() == 0.0
 
@@ -366,7 +367,7 @@ def _top_speed(problem: Problem, method: str) -> float:
 
 
 def _random_polyline(rng: np.random.Generator) -> list[list[float]]:
-    """Forty edges of 0.05 to 5 mm; small turns, sharp ones, some none at all."""
+    """Forty edges of 0.05 to 5 mm with slight turns, sharp turns, or none."""
     length = np.exp(rng.uniform(np.log(0.05), np.log(5.0), 40))
     direction = rng.normal(size=(40, 3)) * rng.choice([0.0, 0.05, 0.5, 5.0], size=(40, 1))
     direction[0] += 1.0
@@ -387,7 +388,7 @@ def test_the_parameter_of_a_line_does_not_matter(method: str) -> None:
     for width in ([1.0, 1.0], [10.0, 10.0], [0.3, 70.0]):
         curve = CompositeCurve.joined(lines, 1e-9).with_width(np.array(width))
         path = Path.from_curve(curve, feed=F)
-        # A corner, not a stop.
+        # A corner that is passed, not a stop.
         path = replace(path, runs=np.array([0, 2]), dwell=np.zeros(1), corners=corners(method))
         times.append(planner(method)(build_problem(path, PLANE)).time)
     assert times == pytest.approx([times[0]] * 3, rel=1e-12)

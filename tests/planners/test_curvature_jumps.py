@@ -1,4 +1,4 @@
-"""Where the curvature of a path jumps: third differences of the setpoints keep the limits of jerk."""
+"""Paths whose curvature jumps: third differences of the setpoints keep the limits of jerk."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def spline(rng: np.random.Generator, degree: int) -> CompositeCurve:
 
 
 def many_pieces(rng: np.random.Generator) -> CompositeCurve:
-    """A quadratic B-spline of so many pieces that some jumps show in one difference."""
+    """A quadratic B-spline of so many pieces that several jumps fall into one third difference."""
     count = int(rng.integers(60, 400))
     t, (a, b), (c, d) = np.linspace(0.0, 1.0, count), rng.uniform(6.0, 25.0, 2), rng.uniform(0.0, 6.0, 2)
     noise = rng.uniform(-1e-3, 1e-3, (count, 2)) * rng.choice([0, 1])
@@ -57,11 +57,11 @@ def many_pieces(rng: np.random.Generator) -> CompositeCurve:
 
 
 def random_case(seed: int) -> tuple[Path, Machine]:
-    """A path of which the curvature jumps, and a machine at one of the periods."""
+    """A path whose curvature jumps, and a machine with one of the periods."""
     rng = np.random.default_rng(seed)
     kinds = (arcs_and_lines, lambda rng: spline(rng, 2), lambda rng: spline(rng, 3), many_pieces)
     curve = kinds[seed % 4](rng)
-    # The last ones have axes whose limits differ by up to a hundred times.
+    # From seed 16 on the axes' limits differ by up to a hundred times.
     spread = 2.0 if seed < 16 else 10.0
     letters = "XYZ"[: curve.axes]
     limits = 10 ** np.array([rng.uniform(*span) for span in ((1.5, 2.7), (2.5, 4.0), (3.5, 6.0))])
@@ -72,7 +72,7 @@ def random_case(seed: int) -> tuple[Path, Machine]:
 
 
 def third_differences(planned: Plan) -> Array:
-    """The greatest of each axis, less their rounding, over its limit of jerk."""
+    """The greatest third difference of each axis, minus its rounding error, over the limit of jerk."""
     period = planned.machine.period
     position = planned.setpoints().all().position
     greatest = np.abs(np.diff(position, 3, axis=0)).max(axis=0)

@@ -1,7 +1,7 @@
-"""The exact planner on pieces of any degree: published figures, what must not matter, every limit densely.
+"""The exact planner on pieces of any degree: published times, changes without effect, limits at many places.
 
 The times of the butterfly and the circle are those of an independent implementation of the same problem on
-polynomial proxies of the curves, to 1e-12 s; the circle's switching place also follows by hand.
+polynomial proxies of the curves, to 1e-12 s; the switching place of the circle also follows by hand.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class Planned:
-    """The profile along one curve, from rest to rest unless a speed is given."""
+    """A curve with its limits and its exact profile, from rest to rest."""
 
     def __init__(
         self, curve: CompositeCurve, velocity: float | Array, acceleration: float | Array, feed: float = 1e9
@@ -44,7 +44,7 @@ def random_curve(seed: int, weights: bool = True) -> CompositeCurve:
     degree, axes, count = int(rng.integers(2, 6)), int(rng.integers(2, 5)), int(rng.integers(1, 12))
     points = np.cumsum(rng.normal(size=(count + degree, axes)), axis=0)
     if seed % 3 == 0:
-        # Nearly a cusp: a control point next to the one before the last.
+        # Nearly a cusp: two successive control points nearly coincide.
         points[1 + count // 2] = points[count // 2] + 1e-3 * rng.normal(size=axes)
     inner = np.cumsum(rng.uniform(0.3, 3.0, count))
     knots = np.concatenate([np.zeros(degree + 1), inner, np.full(degree, inner[-1])])
@@ -118,7 +118,7 @@ def test_runs_that_do_not_divide_the_path_are_refused() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_quadratics_among_pieces_of_elevated_degree_take_the_same_time(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    # A C1 quadratic spline, every piece as it is, or every other one elevated.
+    # A C1 quadratic spline; some of its pieces are elevated to degree 3 or 4.
     points = np.cumsum(rng.normal(size=(40, 3)), axis=0)
     knots = np.concatenate([[0.0] * 3, np.cumsum(rng.uniform(0.3, 2.0, 37)), [37.0 * 2] * 3])
     knots[-3:] = knots[-4] + 1.0
@@ -143,7 +143,7 @@ def test_the_lemniscate_and_the_trefoil_take_their_known_times(curve: CompositeC
 
 
 def test_a_flying_lap_of_a_circle_by_hand() -> None:
-    # Each eighth of the circle is at one axis's limit: 8 √((2 − √2) r/A).
+    # On each eighth of the circle one axis is at its limit: 8 √((2 − √2) r/A).
     r, a = 10.0, 3000.0
     curve = circle([0.0, 0.0], r)
     problem = problem_along(path_along(curve), FREE, a)
@@ -154,7 +154,7 @@ def test_a_flying_lap_of_a_circle_by_hand() -> None:
 
 
 def test_a_cusp_and_a_jump_of_parameter_speed_change_nothing_that_they_should_not() -> None:
-    # A line with a cusp in its parameter, C' = 0 in the middle, is passed as a line.
+    # A line with C' = 0 in the middle is passed like any line.
     line = CompositeCurve.from_bezier([[0.0], [10.0]])
     slow = CompositeCurve.joined(
         [
@@ -166,7 +166,7 @@ def test_a_cusp_and_a_jump_of_parameter_speed_change_nothing_that_they_should_no
     assert time == pytest.approx(10 / 40 + 40 / 500, rel=1e-12)
     along = problem_along(Path.from_curve(slow, feed=FREE), 40.0, 500.0)
     assert plan(along).time == pytest.approx(time, rel=1e-10)
-    # A semicubical parabola turns back in its cusp: both halves from rest to rest.
+    # A semicubical parabola turns back in its cusp: both halves are from rest to rest.
     whole = CompositeCurve.from_bezier([[-8.0, 4.0], [8.0, -4.0], [-8.0, -4.0], [8.0, 4.0]])
     halves = whole.split([0], [0.5])
     both = sum(Planned(halves[i : i + 1], 1e9, 100.0).time for i in range(2))

@@ -1,4 +1,4 @@
-"""Cusps and places next to one: known times, every limit on random curves made to break the planner."""
+"""Cusps and places near one: known times, and every limit on random curves that are difficult."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 def bernstein(powers: Array) -> Array:
-    """Bernstein coefficients on [0, 1] of a polynomial given by its powers, lowest first."""
+    """Bernstein coefficients on [0, 1] of a polynomial with these power coefficients, lowest power first."""
     n = len(powers) - 1
     return np.array([sum(comb(i, j) / comb(n, j) * powers[j] for j in range(i + 1)) for i in range(n + 1)])
 
@@ -32,7 +32,7 @@ def bernstein(powers: Array) -> Array:
 def with_cusp(
     order: int, place: float, direction: Array, bend: Array | None = None, power: int = 1
 ) -> CompositeCurve:
-    """The curve with C' = (t − place)^order (direction + bend (t − place)^power)."""
+    """The curve with C' = (t − place)^order (direction + bend (t − place))."""
     factor = np.polynomial.Polynomial([-place, 1.0])
     rates = [factor**order * x for x in direction]
     if bend is not None:
@@ -47,7 +47,7 @@ def with_cusp(
 
 
 def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed: float) -> Problem:
-    """From rest to rest along the path of the curve: straight pieces as lines, cut in its cusps."""
+    """From rest to rest along the path of the curve: straight pieces become lines, cusps end pieces."""
     return problem_along(Path.from_curve(curve, feed=feed), velocity, acceleration)
 
 
@@ -62,7 +62,7 @@ def time_of(curve: CompositeCurve, acceleration: float | Array = 100.0, feed: fl
 def test_a_line_with_a_cusp_is_passed_where_it_goes_on_and_turned_where_it_comes_back(
     order: int, place: float
 ) -> None:
-    # The way before and after the cusp; X is the slower axis of the two.
+    # The distances before and after the cusp; X is the slower of the two axes.
     before, after = place ** (order + 1) / (order + 1), (1 - place) ** (order + 1) / (order + 1)
     ways = [before + after] if order % 2 == 0 else [way for way in (before, after) if way > 0]
     time = sum(2 * np.sqrt(3.0 * way / 100.0) for way in ways)
@@ -72,14 +72,14 @@ def test_a_line_with_a_cusp_is_passed_where_it_goes_on_and_turned_where_it_comes
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_a_curve_stops_in_its_cusp(order: int) -> None:
-    # From rest to rest on both halves: X alone is at its limit where Y needs less.
+    # From rest to rest on both halves: X alone is at its limit, Y needs less.
     curve = with_cusp(order, 0.5, np.array([1.0, 0.0]), np.array([0.0, 0.3]))
     halves = [2 * np.sqrt(0.5 ** (order + 1) / (order + 1) / 100.0)] * 2
     assert time_of(curve, np.array([100.0, 1e4])) == pytest.approx(sum(halves), rel=1e-9)
 
 
 def random_curve(seed: int) -> tuple[CompositeCurve, Array, Array, float]:
-    """A piece with a cusp or nearly one, and limits."""
+    """A piece with a cusp or nearly one, the limits of its axes, and a feed."""
     rng = np.random.default_rng(seed)
     axes, degree = int(rng.integers(1, 4)), int(rng.integers(2, 10))
     off = 0.0 if rng.random() < 0.3 else 10 ** rng.uniform(-17, -1)
@@ -119,14 +119,14 @@ def test_a_stop_for_rounding_is_told_with_its_line() -> None:
 
 
 def test_a_curve_that_all_but_rests_inside_keeps_its_limits_there() -> None:
-    # Both tangents fall to 1e-12 of their greatest without turning round.
+    # Both tangents fall to 1e-12 of their greatest value without changing their sign.
     problem = problem_of(*random_curve(3705))
     assert worst_excess(problem, plan(problem))[0] <= 1e-8
 
 
 @pytest.mark.parametrize("seed", [3422, 5957, 10814, 11046])
 def test_limits_that_floats_cannot_judge_next_to_a_cusp_are_kept(seed: int) -> None:
-    # All tangents fall to 1e-10 of their greatest or less: in floats most digits of C' and C'' are rounding.
+    # All tangents fall to 1e-10 of their greatest value or less: most digits of C' and C'' are rounding.
     problem = problem_of(*random_curve(seed))
     assert worst_excess_exactly(problem, plan(problem)) <= 1e-8
 
@@ -138,7 +138,7 @@ def test_axes_that_turn_within_rounding_of_each_other_have_a_plan(seed: int) -> 
 
 
 def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
-    # A line through a cusp: its speed squared is rounding there, and halving it gains nothing.
+    # A line through a cusp: v² is rounding there, and bisection of it gains no digits.
     problem = problem_of(*random_curve(12790))
     profile = plan(problem)
     feed = profile.kind == PhaseLaw.FEED
@@ -177,7 +177,7 @@ def test_random_curves_next_to_cusps_keep_every_limit() -> None:
         assert np.isfinite(profile.time), seed
         excess = worst_excess(problem, profile)[0]
         if excess > 1e-8 and problem.curve.weights is None:
-            # Floats cannot judge everywhere next to a cusp.
+            # Next to a cusp floats are not accurate enough everywhere.
             excess = worst_excess_exactly(problem, profile)
         assert excess <= 1e-8, seed
         slowed += len(profile.slowed) > 0

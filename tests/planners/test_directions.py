@@ -1,4 +1,4 @@
-"""Limits that differ by direction: by hand, exact in the planners of the optimum, kept by every method."""
+"""Limits that differ by direction: by hand, exact in the optimal planners, kept by every method."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from tests.planners.sided import KNOTS, Pair, arm, even, names_of, pairs, random
 
 ONE = Machine("one", (Axis("X", (-1.0, 2.0), (-4.0, 1.0)),))
 BY_HAND = [
-    # Forward 2 s to 2 mm/s over 2 mm, 0.5 s from it over 0.5 mm, 7.5 mm at 2 mm/s.
+    # Forward: 2 s and 2 mm up to 2 mm/s, 0.5 s and 0.5 mm down from it, 7.5 mm at 2 mm/s.
     (0.0, 10.0, 2.0 + 0.5 + 3.75),
-    # Backward 0.25 s to 1 mm/s over 0.125 mm, 1 s from it over 0.5 mm, 9.375 mm at 1 mm/s.
+    # Backward: 0.25 s and 0.125 mm up to 1 mm/s, 1 s and 0.5 mm down from it, 9.375 mm at 1 mm/s.
     (10.0, 0.0, 0.25 + 1.0 + 9.375),
     # A triangle: 0.8 mm up at 1 mm/s² to √1.6 mm/s, 0.2 mm down at 4 mm/s².
     (0.0, 1.0, 1.25 * math.sqrt(1.6)),
@@ -42,7 +42,7 @@ def test_one_axis_by_hand(start: float, end: float, time: float) -> None:
 
 
 def test_there_and_back_by_hand() -> None:
-    """Straight, turning back at rest: both ways with their own limits."""
+    """A line there and back, at rest where it turns: each direction has its own limits."""
     path = Path.from_points([[0.0], [10.0], [0.0]], 0.0)
     plan = feedplan.plan(path, ONE)
     assert plan.time == pytest.approx(6.25 + 10.625, rel=1e-12)
@@ -64,7 +64,7 @@ def test_the_exact_plan_meets_its_bound_and_the_audit(seed: int, kind: str) -> N
 
 @pytest.mark.parametrize("seed", range(seeds(4)))
 def test_mirrored_and_run_backward_it_takes_the_same_time(seed: int) -> None:
-    """q → −q negates all limits; q(t) → q(T − t) those of the velocity alone."""
+    """Mirroring q → −q exchanges all limits; reversing time q(t) → q(T − t) exchanges those of velocity."""
     rng = np.random.default_rng(seed)
     velocity, acceleration = pairs(rng, 3, 2.0), pairs(rng, 3, 9.0)
     points = rng.standard_normal((7, 3))
@@ -101,7 +101,7 @@ def test_other_solvers_agree(method: Any, seed: int) -> None:
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="toppra is for Linux")
 def test_toppra_itself_comes_to_the_same_time() -> None:
-    """Its constraints by direction, on a fine grid of its own."""
+    """toppra's own constraints by direction, on a fine grid."""
     import toppra
     from toppra import algorithm, constraint
 
@@ -153,7 +153,7 @@ def test_a_program_with_arcs_on_an_axis_that_lifts_slower_than_it_falls(tmp_path
 
 
 def test_the_audit_judges_each_direction(tmp_path: FilePath) -> None:
-    """What keeps the limits of one direction breaks those of the other."""
+    """A plan that keeps the limits of one direction breaks those of the other."""
     even = Machine("one", (Axis("X", 2.0, 4.0),))
     feedplan.write_plan(feedplan.plan(Path.from_bezier([[0.0], [10.0]]), even), tmp_path)
     setpoints = tmp_path / "setpoints.npz"
@@ -166,14 +166,14 @@ def test_the_audit_judges_each_direction(tmp_path: FilePath) -> None:
         assert weak.check("acceleration", "X").ratio == pytest.approx(4.0 / 3.0, rel=1e-6)
 
 
-# Those with a limit of jerk keep all limits on every path, those of controllers on lines.
+# Methods with a limit of jerk keep all limits on every path, those of controllers keep them on lines.
 SMOOTH = ("jerk-limited", "s-curve", "ruckig")
 CONTROLLERS = ("tangential", "junction-deviation", "arc-transition", "constant-velocity-transition")
 KINDS = ("curves", "lines", "rounded", "rational")
 CASES = [(method, kind) for method in SMOOTH for kind in KINDS] + [
     (method, "lines") for method in CONTROLLERS
 ]
-# How far a time may be from another one, as a part of it: what the accuracy of jerk-limited leaves to both.
+# Allowed relative difference of two times: jerk-limited is accurate to 1e-4 only.
 CLOSE = {"jerk-limited": 3e-4}
 
 
@@ -209,7 +209,7 @@ def test_mirrored_with_its_sides_swapped_a_path_takes_the_same_time(method: Any,
 
 @pytest.mark.parametrize(("method", "kind"), CASES)
 def test_sides_that_differ_by_nearly_nothing_give_the_same_plan(method: Any, kind: str) -> None:
-    """To rounding; lines of jerk-limited are by a closed formula where both sides are one."""
+    """Equal up to rounding; lines of jerk-limited have a closed form only if both sides are equal."""
     path, machine = random_case(1, kind)
     one = even(machine)
     axes = (
@@ -235,7 +235,7 @@ def test_controllers_run_one_axis_by_hand(method: Any, start: float, end: float,
 
 @pytest.mark.parametrize(("up", "down", "end"), [(1.0, 4.0, 10.0), (4.0, 1.0, -10.0)])
 def test_jerk_limited_runs_one_axis_by_hand(up: float, down: float, end: float) -> None:
-    """From 0 to V and back takes V/A + A/J, on half of the way at V."""
+    """From 0 to V and back to 0 takes V/A + A/J at each end, at half of V on average; the rest is at V."""
     speed, jerk = (2.0 if end > 0.0 else 1.0), 20.0
     machine = Machine("one", (Axis("X", (-1.0, 2.0), (-4.0, 1.0), jerk),))
     ramps = sum(

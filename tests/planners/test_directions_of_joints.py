@@ -21,7 +21,7 @@ from tests.planners.tip_programs import random_tip_program
 
 V, A, J = (-1.0, 2.0), (-4.0, 1.0), 20.0
 BELT = Machine("belt", (Axis("U", V, A, J), Axis("V", V, A, J)), kinematics="corexy")
-# The first programs of tools that move by their tips.
+# The first seeds of random tip programs that each machine can follow.
 FIRST = {"head-head": 5, "head-table": 1, "rotary-table": 1, "trunnion-ac": 3, "trunnion-bc": 2}
 PLANE = "G21 G90 G64 P0.01 F6000\nG1 X40 Y5 Z3\nG1 X60 Y40\nG3 X20 Y60 I-30 J-10\nG1 X10 Y30 Z0\nG0 X40 Y5\n"
 NOT_PLAIN = [name for name in bundled_machines() if not Machine.load(name).is_plain]
@@ -37,11 +37,11 @@ CASES = [("bang-bang", name) for name in NOT_PLAIN] + [
 @pytest.mark.parametrize(
     ("program", "time"),
     [
-        # Both joints ahead: 2 s to 2 mm/s over 2 mm, 0.5 s from it over 0.5 mm, 7.5 mm at 2 mm/s.
+        # Both joints forward: 2 s and 2 mm up to 2 mm/s, 0.5 s and 0.5 mm down from it, 7.5 mm at 2 mm/s.
         ("G1 X10", 2.0 + 0.5 + 3.75),
-        # Both back: 0.25 s to 1 mm/s over 0.125 mm, 1 s from it over 0.5 mm, 9.375 mm at 1 mm/s.
+        # Both back: 0.25 s and 0.125 mm up to 1 mm/s, 1 s and 0.5 mm down from it, 9.375 mm at 1 mm/s.
         ("G1 X-10", 0.25 + 1.0 + 9.375),
-        # One ahead and one back, at the lesser speed; to either side one of them has 1 mm/s².
+        # One forward and one back, at the lower speed; for each change of speed one of them has 1 mm/s².
         ("G1 Y10", 1.0 + 1.0 + 9.0),
         ("G1 Y-10", 1.0 + 1.0 + 9.0),
     ],
@@ -51,7 +51,7 @@ def test_two_belts_by_hand(program: str, time: float) -> None:
     assert made.time == pytest.approx(time, rel=1e-9)
     assert made.lower_bound == pytest.approx(time, rel=1e-6)
     assert made.audit().ok
-    # Jerk adds half of A/J to each change of speed.
+    # Jerk adds A/(2 J) to each change of speed.
     smooth = plan(f"G21 G90 F60000\n{program}\n", BELT, "jerk-limited")
     changes = {"G1 X10": (1.0, 4.0), "G1 X-10": (4.0, 1.0)}.get(program, (1.0, 1.0))
     assert smooth.time == pytest.approx(time + sum(0.5 * a / J for a in changes), rel=1e-4)
@@ -97,7 +97,7 @@ def _apart(limit: Any) -> tuple[float, float]:
 
 @pytest.mark.parametrize("jerk", [False, True])
 def test_the_audit_judges_each_direction_of_a_joint(jerk: bool) -> None:
-    """X ahead and back moves both joints so: what keeps limits of one direction breaks those of the other."""
+    """X moves both joints forward and back: a plan for limits of one direction breaks those of the other."""
     both = Machine("even", (Axis("U", 2.0, 4.0, J), Axis("V", 2.0, 4.0, J)), kinematics="corexy")
     made = plan("G21 G90 F60000\nG1 X10\nG1 X0\n", both, "jerk-limited" if jerk else "bang-bang")
     limits = made.problem.max_velocity, made.problem.max_acceleration

@@ -1,4 +1,4 @@
-"""Every machine that is accepted gives a plan that the audit accepts, or one sentence."""
+"""Every accepted machine gives a plan that the audit accepts, or a refusal in one sentence."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tests.planners.extreme_machines import PROGRAMS, extreme_machine
 
 SEEDS = seeds(1)
 MOST = 20_000
-# What states between segments may be improved for: their first ones are a plan [s].
+# Time for which ruckig may improve the states between its segments [s]; its first states are a plan already.
 TIME_LIMITS = {"ruckig": 0.2}
 
 
 def faults(machine: Machine, text: str, method: str) -> tuple[str, ...]:
-    """A sentence for everything that is wrong with a plan; none where there is none."""
+    """A sentence for everything that is wrong with a plan; empty if it is refused."""
     try:
         planned = plan(text, machine, method, max_setpoints=MOST, time_limit=TIME_LIMITS.get(method))
     except FeedplanError:
@@ -54,7 +54,7 @@ def test_accelerations_recorded_along_arcs_of_many_periods_have_the_digits_of_th
     assert faults(extreme_machine(seed), PROGRAMS[name], "s-curve") == ()
 
 
-# The last setpoint before a stop is some nanometres short of it, and the next run begins a period later.
+# The last setpoint before a stop is some nanometres short of it; the next run begins a period later.
 @pytest.mark.parametrize(
     ("velocity", "acceleration", "period"), [(1e7, 1e10, 0.05), (250.0, 2.5e6, 0.01), (0.01, 1e3, 10.0)]
 )

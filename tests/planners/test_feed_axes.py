@@ -1,4 +1,4 @@
-"""Feeds hold along the axes that RS-274 says, at every place of the followed path, by every method."""
+"""Feeds count along the axes that RS-274 defines, at every place of the path and with every method."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NATIVE = ("bang-bang", "jerk-limited", "s-curve")
 HEURISTIC = ("tangential", "junction-deviation", "arc-transition", "constant-velocity-transition")
 FOREIGN = ("ruckig", "toppra", "casadi", "clarabel")
 GROUPS = ("XYZ", "UVW", "ABC")
-# Every third program is in inverse time.
+# Every third seed gives a program in inverse time.
 SEEDS = range(seeds(3)) if CAMPAIGN else (1, 2)
 
 FAST = Machine(
@@ -32,7 +32,7 @@ FAST = Machine(
 
 
 def speeds(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Speed along each group of axes over each period (n, 3), by differences, and the pieces at both ends."""
+    """Speed along each group of axes in each period (n, 3), by differences, and the pieces at both ends."""
     rows = plan.setpoints().all()
     groups = np.array([[name in letters for name in rows.axes] for letters in GROUPS])
     way, step = np.diff(rows.position, axis=0), np.diff(rows.t)
@@ -44,7 +44,7 @@ def speeds(plan: Plan) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[
 
 
 def leading(program: Program) -> NDArray[np.int64]:
-    """The group that the feed of each move counts along, from its words; 3 for none."""
+    """The group of axes along which the feed of each move counts, from its words; 3 for none."""
     group = np.full(len(program), 3)
     starts = np.concatenate([program.start[None], program.target[:-1]])
     moves = program.target != starts
@@ -56,7 +56,7 @@ def leading(program: Program) -> NDArray[np.int64]:
 
 
 def check(plan: Plan) -> float:
-    """No step is faster than a feed of the moves about it; the greatest use of a feed."""
+    """Asserts that no step is faster than a feed of the moves around it; the greatest use of a feed."""
     assert plan.program is not None
     program, group = plan.program, leading(plan.program)
     speed, before, after = speeds(plan)
@@ -99,7 +99,7 @@ def test_no_block_is_faster_than_its_feed(axes: str, method: str, tmp_path: File
         uses.append(check(plan))
         if seed % 3 == 2:
             continue
-        # With one feed along X, Y and Z no place off the rapids is faster.
+        # All feeds along X, Y and Z are equal, so no step outside rapids may be faster.
         speed, before, after = speeds(plan)
         cut = np.isfinite(plan.path.feed)
         steps = cut[before] & cut[after]
@@ -117,7 +117,7 @@ def test_other_methods_keep_feeds_along_their_axes(method: str, tmp_path: FilePa
     file = tmp_path / "feed.ngc"
     file.write_text(text)
     plan = feedplan.plan(file, FAST, method=method, **options)
-    # What controllers do at corners is not always within the accelerations.
+    # Methods of controllers may exceed accelerations at corners.
     broken = [found.name for found in plan.audit().broken]
     assert "feed" not in broken
     assert not broken or method in HEURISTIC
@@ -126,36 +126,36 @@ def test_other_methods_keep_feeds_along_their_axes(method: str, tmp_path: FilePa
 
 @pytest.mark.parametrize("method", NATIVE)
 def test_a_blend_of_a_linear_and_a_rotary_move_keeps_both_feeds(method: str, tmp_path: FilePath) -> None:
-    # F60: 1 mm/s along X, then 1 deg/s about A; in between both hold.
+    # F60: 1 mm/s along X, then 1 deg/s about A; on the blend between them both hold.
     plan = planned("G21 G90 G94 G64 P0.5\nG1 F60 X10\nA10\nM2\n", FAST, method, tmp_path)
     assert len(plan.path.runs) == 2
     assert len(plan.path) >= 3
     speed, _, _ = speeds(plan)
     for k in (0, 2):
         assert 1.0 - 1e-5 < speed[:, k].max() <= 1.0 + 1e-6
-    # 10 mm and 10 deg less what the blend cuts off, and no slower than the way through the corner.
+    # 10 mm and 10 deg, less what the blend cuts off; the way through the corner takes no longer.
     assert 19.0 < plan.time < 20.1
 
 
 def test_a_line_along_x_and_a_runs_at_the_feed_along_x(tmp_path: FilePath) -> None:
-    # X10 A90 at F60: 1 mm/s along X and 9 deg/s about A for ten seconds, and some for the start and the end.
+    # X10 A90 at F60: 1 mm/s along X and 9 deg/s about A for ten seconds, plus speeding up and down.
     plan = planned("G21 G90 G94 G61\nG1 F60 X10 A90\nM2\n", FAST, "bang-bang", tmp_path)
     speed, _, _ = speeds(plan)
     assert speed[:, 0].max() == pytest.approx(1.0, rel=1e-9)
     assert speed[:, 2].max() == pytest.approx(9.0, rel=1e-9)
-    # Axis A speeds up with 20 000 deg/s² to 9 deg/s: the ends cost 9/20 000 s.
+    # A changes its speed by 9 deg/s at 20 000 deg/s²: both ends together cost 9/20 000 s.
     assert plan.time == pytest.approx(10.0 + 9.0 / 20000.0, abs=1e-9)
 
 
 def test_inverse_time_is_the_time_of_a_block(tmp_path: FilePath) -> None:
-    # 10 mm and 90 deg in 1/6 min, then 45 deg alone in as much.
+    # 10 mm and 90 deg in 1/6 min, then 45 deg alone in another 1/6 min.
     text = "G21 G90 G93 G61\nG1 X10 A90 F6\nA45 F6\nM2\n"
     plan = planned(text, FAST, "bang-bang", tmp_path)
     assert plan.time == pytest.approx(20.0 + 9.0 / 20000.0 + 4.5 / 20000.0, abs=1e-9)
 
 
 def test_a_zero_of_the_counted_speed_inside_a_piece_limits_nothing() -> None:
-    # X turns back in the middle of a parabola on which A goes on.
+    # X turns back in the middle of a parabola while A moves on.
     path = Path.from_bezier([[0, 0], [5, 20], [0, 40]], axes="XA", feed=1.0)
     plan = feedplan.plan(path, replace(FAST, axes=(FAST.axes[0], FAST.axes[3])))
     assert plan.audit().ok, plan.audit().failures
@@ -195,7 +195,7 @@ def test_the_audit_refuses_a_plan_made_with_other_feeds(doctored: str, tmp_path:
         path = replace(path, feed=1.5 * path.feed, group_feed=1.5 * path.group_feed)
         fast = feedplan.plan(path, FAST)
     else:
-        # The speed in all axes in place of that along X.
+        # A limit of the speed in all axes instead of the feed along X.
         path = replace(path, group_feed=None, feed=np.full(len(path), 5.1))
         fast = feedplan.plan(path, FAST)
     verdict = replace(fast, program=plan.program).audit()

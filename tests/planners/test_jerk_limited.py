@@ -1,4 +1,4 @@
-"""Profiles of limited jerk: known times, limits between the grid's places, other solvers, sentences."""
+"""Profiles of limited jerk: known times, limits between the grid's stations, other solvers, messages."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ from tests.planners.random_paths import random_case, random_problem
 
 plan = planner("jerk-limited")
 COUNT = seeds(12)
-# They are run in so many parts, beside each other.
+# The seeds are divided into this many tests, which can run in parallel.
 PARTS = 12
-# What limits may be exceeded by, as a part of them.
+# Allowed relative excess of a limit.
 EXCESS = 1e-6
-# What the planner is asked for where nothing is said.
+# The default accuracy of the planner.
 ACCURACY = 1e-4
-# When plans are stopped [s]: at once, or in a campaign, where what is reached may differ, at any moment.
+# Time limits after which plans are stopped [s]. Only a campaign uses other moments than 0, because the result
+# then depends on the computer's speed.
 MOMENTS = [0.0, 0.003, 0.03] if SEEDS else [0.0]
 
 
@@ -69,7 +70,7 @@ def test_nobody_changes_the_bound_of_a_plan() -> None:
 
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve", "ruckig"])
 def test_a_square_with_stops_takes_as_long_as_by_hand(method: str) -> None:
-    # A side: 0.21 s and 10.5 mm to 100 mm/s, 79 mm at it, 0.21 s down: 1.21 s.
+    # Each side: 0.21 s and 10.5 mm up to 100 mm/s, 79 mm at 100 mm/s, 0.21 s down: 1.21 s.
     corners = [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0], [0.0, 0.0]]
     problem = build_problem(Path.from_points(corners, 0.0), curves_machine(100.0, 500.0, 50_000.0))
     profile = planner(method)(problem)
@@ -91,7 +92,7 @@ def test_published_curves_take_no_longer_than_known(curve: object, time: float) 
 def test_a_feed_far_below_the_limits_is_held_in_few_arcs() -> None:
     problem = build_problem(Path.from_curve(lemniscate(), feed=10.0), CURVES)
     profile = plan(problem)
-    # From rest to the feed, and back, √(v/J) each is lost, with the jerk along the direction of the ends.
+    # The start and the end lose √(v/J) each against the feed, with the jerk along the direction of the ends.
     way = problem.derivatives(np.zeros(1, np.uint32), np.zeros(1), 1)[1][0]
     jerk = 50_000.0 * np.linalg.norm(way) / np.abs(way).max()
     assert profile.time == pytest.approx(problem.path.length / 10.0 + 2 * np.sqrt(10.0 / jerk), rel=1e-6)
@@ -119,7 +120,7 @@ def test_other_solvers_find_the_same_time_on_the_same_grid() -> None:
 
 
 def faults_of(seed: int, **options: float) -> list[str]:
-    """What is wrong with the plan of a random curve: by its arcs, and by the audit with setpoints."""
+    """What is wrong with the plan of a random curve: by exact derivatives, and by the audit."""
     problem, machine = random_case(seed)
     profile = planner("jerk-limited", **options)(problem)
     excess = jerk_excess(problem, profile)
@@ -137,7 +138,7 @@ def test_random_curves_keep_every_limit_whenever_they_are_stopped(part: int) -> 
 
 
 def test_a_piece_is_not_cut_where_its_speed_hardly_changes() -> None:
-    # A corner of degree 7 leaves its lines with three derivatives: its speed per parameter is flat there.
+    # A corner of degree 7 continues its lines in three derivatives: its parameter speed is flat there.
     control = np.array(
         [
             [0.6171706581843494, 0.03421859924724033],
@@ -158,7 +159,7 @@ def test_a_piece_is_not_cut_where_its_speed_hardly_changes() -> None:
 
 
 def test_the_chord_speed_is_kept_where_the_radius_comes_to_be_the_tolerance() -> None:
-    # A parabola whose radius at its tip is 2/3 of the tolerance: a smaller circle allows no less speed.
+    # A parabola whose radius at its tip is 2/3 of the chord tolerance: smaller radii allow no less speed.
     curve = CompositeCurve.from_bezier([[-0.1, 1.5], [0.0, -1.5], [0.1, 1.5]]).elevated(5)
     machine = replace(curves_machine(500.0, 50_000.0, 5e7), chord_tolerance=0.01, period=0.004)
     assert_held(build_problem(Path.from_curve(curve, axes=("X", "Y"), feed=FREE), machine))
@@ -170,7 +171,7 @@ def test_a_piece_of_a_nanometre_keeps_the_limit_of_jerk() -> None:
     path = replace(Path.from_curve(curve, axes=("X", "Y"), feed=90.0), feed=np.array([90.0, 91.0, 92.0]))
     problem = build_problem(path, CURVES)
     profile = plan(problem)
-    # A ramp at each end, and the piece.
+    # One ramp at each end, and the short piece.
     by_jerk = profile.piece[profile.kind == PhaseLaw.PATH_JERK]
     assert set(by_jerk.tolist()) == {0, 1, 2}
     assert (profile.kind[profile.piece == 1] == PhaseLaw.PATH_JERK).all()
@@ -179,8 +180,7 @@ def test_a_piece_of_a_nanometre_keeps_the_limit_of_jerk() -> None:
 
 
 def test_turns_after_a_long_way_keep_the_limit_of_jerk(tmp_path: FilePath) -> None:
-    # The length from the start, 1.2 km, has a rounding error of 2e-10 mm, and the phases in the turns are as
-    # short as 1e-4 mm.
+    # The length from the start, 1.2 km, has a rounding error of 2e-10 mm; phases may be as short as 1e-4 mm.
     turns = """\
 X4.5705 Y58.4434 Z1.4321
 X4.5903 Y58.4430 Z1.4320
@@ -197,15 +197,15 @@ X4.6665 Y56.7251 Z2.1839
     assert audited(made.problem, made.profile, made.machine) == ()
 
 
-# Turns so sharp that the tool rests at them or nearly, rests beside turns, cusps on lines and on curves of
-# degree 2 and more, ends next to rest, two axes in turn at their greatest speeds, a ramp of 0.3 nm at the end
-# of 721 mm, a bend of 1e-7 mm on 4 mm.
+# Turns so sharp that the tool rests in them or nearly, stops next to turns, cusps on lines and on curves of
+# degree 2 and more, ends next to rest, two axes that reach their greatest speeds alternately, a ramp of 0.3
+# nm at the end of 721 mm, a bend of 1e-7 mm on 4 mm.
 @pytest.mark.parametrize("seed", [53, 83, 115, 339, 538, 724, 2512, 3328, 4010, 4213, 4930, 6726, 6955, 7840])
 def test_curves_that_all_but_stop_keep_every_limit(seed: int) -> None:
     assert faults_of(seed) == []
 
 
-# The acceleration is built up on 5e-9 mm of 559, and on 5e-12 mm of 6.
+# The acceleration is built up within 5e-9 mm of a path of 559 mm, and within 5e-12 mm of one of 6 mm.
 @pytest.mark.parametrize(("size", "feed", "acceleration"), [(100.0, 100.0, 3000.0), (1.0, 1.0, 300.0)])
 def test_a_jerk_limit_too_high_to_matter_is_kept_next_to_rest(
     size: float, feed: float, acceleration: float
@@ -225,15 +225,15 @@ def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
 @pytest.mark.parametrize("seconds", MOMENTS)
 def test_a_time_limit_at_any_moment_gives_a_plan_that_keeps_the_limits(seconds: float) -> None:
     problem = random_problem(5)
-    # What was not stopped is within its accuracy of the least time, what was may be anywhere above that.
+    # Without a stop a plan is within its accuracy of the least time; a stopped one may be slower.
     assert assert_held(problem, time_limit=seconds) >= plan(problem).time * (1 - ACCURACY)
     assert faults_of(0, time_limit=seconds) == []
 
 
 def test_setpoints_of_a_plan_that_creeps_are_where_it_is() -> None:
-    # A setpoint 1e-8 mm before the turn is as near to the path behind it, where the plan is 1 ms later.
+    # A setpoint 1e-8 mm before the turn is just as near to the path behind it, which is 1 ms later.
     assert faults_of(1734, time_limit=0.0) == []
-    # In its first period the tool moves 1e-10 mm, and does not wait.
+    # In its first period the tool moves by 1e-10 mm: it does not wait.
     assert faults_of(3576, time_limit=0.0) == []
 
 
@@ -246,7 +246,7 @@ def test_speeds_at_the_ends_are_met_or_refused_with_the_speed_that_can_be_had() 
     assert excess.worst <= EXCESS
     assert profile.time < rest
     assert (profile.a0[0], profile.a1[-1]) == (0.0, 0.0)
-    # 250 mm/s of both axes, at 45 degrees.
+    # Both axes at 250 mm/s, at 45 degrees.
     with pytest.raises(InfeasibleError, match=r"no profile ends at 400 mm/s: at most 353\.") as fault:
         plan(build_problem(path, CURVES, end_speed=400.0))
     assert fault.value.reachable == pytest.approx(250 * np.sqrt(2), rel=1e-2)
@@ -262,7 +262,7 @@ def _round_corner() -> Path:
 
 def test_jumps_of_curvature_hold_the_speed_and_are_told() -> None:
     made = plan_program(_round_corner(), CURVES, "jerk-limited")
-    # v²/10 mm jumps by no more than lets three quarters of it over a period use 65 % of 50 000 mm/s³.
+    # The acceleration jumps by v²/10 mm; three quarters of the jump in a period may use 65 % of 50 000 mm/s³.
     allowed = np.sqrt(0.65 / 0.75 * 10.0 * 50_000.0 * CURVES.period)
     problem, profile = made.problem, made.profile
     assert jerk_excess(problem, profile).worst <= EXCESS

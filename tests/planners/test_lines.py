@@ -1,4 +1,4 @@
-"""Straight curves of every degree, rational ones among them: the closed forms of lines."""
+"""Straight curves of every degree, also rational ones, against the closed forms for lines."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from tests.planners.lines import seven_sections, straight_case, trapezoid, ways
 def test_the_closed_forms_by_hand() -> None:
     assert trapezoid(1.0, 1e9, 1.0) == 2.0
     assert trapezoid(1.0, 0.5, 1.0) == 2.5
-    # Jerk 1 up, down, down, up for half a second each; with a level of acceleration; with one of speed.
+    # In turn: jerk 1 up, down, down and up for half a second each; with constant acceleration between; with
+    # constant speed between.
     assert seven_sections(2 * 0.5**3, 1e9, 1e9, 1.0) == pytest.approx(2.0, rel=1e-15)
     assert seven_sections(6.0, 1e9, 1.0, 1.0) == pytest.approx(6.0, rel=1e-15)
     assert seven_sections(10.0, 2.0, 1.0, 1.0) == pytest.approx(8.0, rel=1e-15)
-    # C' = 8 (t − 1/4)(t − 3/4) on [0, 1]: 1/6 to and fro.
+    # C' = 8 (t − 1/4)(t − 3/4) on [0, 1]: 1/6 forward, back and forward.
     places, knots = np.array([0.0, 0.5, -1 / 3, 1 / 6]), np.repeat([0.0, 1.0], 4)
     np.testing.assert_allclose(ways(places, knots, 3, None), [1 / 6, 1 / 6, 1 / 6], rtol=1e-14)
 
@@ -34,7 +35,7 @@ def test_random_straight_curves_take_the_time_of_their_lines(part: int) -> None:
         case = straight_case(seed)
         plan = feedplan.plan(case.path, case.machine)
         assert plan.time == pytest.approx(case.time, rel=1e-9), seed
-        # The bound is that time, and no plan is below it but for its rounding.
+        # The bound equals that time; up to rounding no plan is below it.
         bound = _solvers.lower_bound(plan.problem, plan.profile)
         assert -1e-12 < 1.0 - bound / plan.time < 1e-9, seed
         assert plan.lower_bound <= plan.time
@@ -43,7 +44,7 @@ def test_random_straight_curves_take_the_time_of_their_lines(part: int) -> None:
         assert audit.ok, (seed, audit)
 
 
-# The curve turns so near to a knot that both are one place but for rounding.
+# The curve turns so near to a knot that only rounding separates both.
 @pytest.mark.parametrize("seed", [21692, 26825, 29391])
 def test_curves_that_turn_beside_a_knot_take_the_time_of_their_lines(seed: int) -> None:
     case = straight_case(seed)
@@ -54,19 +55,19 @@ def test_with_a_limit_of_jerk_they_take_the_time_of_seven_sections() -> None:
     for seed in range(seeds(150) // 10):
         case = straight_case(seed)
         plan = feedplan.plan(case.path, case.machine, method="jerk-limited")
-        # By a grid of finite accuracy.
+        # The planner uses a grid and stops at a finite accuracy.
         assert 1 - 1e-9 < plan.time / case.smooth_time < 1 + 1e-3, seed
         assert plan.audit().ok, seed
 
 
 def test_a_nearly_straight_curve_of_degree_8_keeps_its_limits() -> None:
-    # The digits of ways on it: by the first rows of a triangular system alone, 1e-3 of them would be wrong.
+    # By the first rows of a triangular system alone, the distances on this curve would be wrong by 1e-3.
     x = [0, 2.644493, 2.954229, 3.528299, 3.665004, 4.182987, 5.398824, 5.957132, 6.506717]
     y = [0, -0.237082, -0.26485, -0.316316, -0.328572, -0.37501, -0.484011, -0.534064, -0.583335]
     weights = [9.059503, 6.113606, 2.886845, 0.520373, 3.588859, 0.115375, 9.26802, 7.639332, 0.136602]
     machine = Machine("plane", (Axis("X", 50, 500), Axis("Y", 50, 500)))
     plan = feedplan.plan(Path.from_bezier(np.stack([x, y], axis=1), weights), machine)
-    # X alone governs.
+    # X alone limits the motion.
     assert plan.time == pytest.approx(trapezoid(6.506717, 50, 500), rel=1e-9)
     assert plan.gap < 1e-9
     assert plan.audit().ok

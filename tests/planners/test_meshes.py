@@ -1,4 +1,4 @@
-"""The planners that solve on a mesh: against the exact one, against each other, and what users are told."""
+"""The planners that solve on a mesh: against the exact planner, against each other, and their messages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.constraints.test_joints import random_problem, without_travel
 from tests.planners.meshes import NAMED, machine_of, random_path_problem
 
 MESHED = ("toppra", "casadi", "clarabel")
-# The exact planner gives away so much of a chord-error limit, in v².
+# By this relative amount of v² the exact planner stays below a chord-error limit.
 CHORD = 2e-4
 
 
@@ -39,13 +39,13 @@ def test_a_joint_that_only_rounding_moves_gives_no_arc_its_duration() -> None:
 
 
 def line_problem(**limits: Any) -> Problem:
-    """100 mm along X at most at 100 mm/s, with 1000 mm/s²."""
+    """A line of 100 mm along X, at most 100 mm/s, with 1000 mm/s²."""
     path = Path.from_bezier([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]], feed=100.0)
     return build_problem(path, machine_of("XY", 200.0, 1000.0), **limits)
 
 
 def audited(problem: Problem, profile: SpeedProfile) -> Audit:
-    """The verdict where corners may jump as the problem says."""
+    """The verdict on a machine that allows velocity jumps, as the problem does at corners."""
     axes = zip(problem.axes, problem.max_velocity, problem.max_acceleration, strict=True)
     machine = Machine(
         "any",
@@ -91,7 +91,7 @@ def test_the_solvers_agree_with_the_exact_time_as_meshes_get_finer(name: str) ->
     for fine, coarse in (convex[::-1], above[::-1]):
         assert -1e-7 < fine < 0.6 * coarse
     assert convex[1] < above[1]
-    # Collocation is optimistic but for the first, coarse meshes.
+    # Collocation is optimistic, except on coarse meshes.
     assert below[1] < 0.5 * above[1]
     assert abs(below[1]) < 0.6 * abs(below[0])
 
@@ -117,12 +117,12 @@ def test_other_solvers_agree_on_random_paths_and_none_is_below_the_bound(seed: i
     def time_by(plan: Callable[..., SpeedProfile], cells: int) -> float:
         with suppress(SolverError):
             return plan(problem, cells=cells).time
-        # On so coarse a mesh nothing slower has the speeds that are given at the ends.
+        # On such a coarse mesh no profile that starts or ends at the given speeds is feasible.
         assert problem.start_speed > 0 or problem.end_speed > 0
         return np.nan
 
     convex, nonlinear = (time_by(solver.plan, 12) for solver in (clarabel, casadi))
-    # Each lowers limits where its own solution goes beyond them.
+    # Each solver lowers limits that its own solution exceeds.
     assert np.isnan([convex, nonlinear]).any() or convex == pytest.approx(nonlinear, rel=2e-4)
     for time in (convex, nonlinear, time_by(toppra.plan, 24)):
         assert not time < least * (1 - 1e-9)
@@ -163,7 +163,8 @@ def test_a_program_is_planned_sampled_and_audited(method: str, tmp_path: FilePat
 
 
 def test_a_cusp_of_a_straight_piece_is_passed_at_speed() -> None:
-    # q' vanishes at both inner ends. As on a line of 100 mm nothing stops there: 80 ms up, 80 ms down.
+    # q' vanishes at the inner ends of both pieces, but the motion does not stop: 80 ms up, 80 ms down, as on
+    # a line of 100 mm.
     points = [[[0.0, 0.0], [30.0, 40.0], [30.0, 40.0]], [[30.0, 40.0], [30.0, 40.0], [60.0, 80.0]]]
     curve = CompositeCurve.from_pieces(points, [50.0, 50.0]).elevated(3)
     path = Path.from_curve(curve, feed=100.0)
@@ -175,7 +176,7 @@ def test_a_cusp_of_a_straight_piece_is_passed_at_speed() -> None:
 
 
 def test_a_cusp_that_turns_is_a_stop() -> None:
-    # (u², u³) from u = −1 to 1: in the cusp the tool stands, and p is finite.
+    # (u², u³) from u = −1 to 1: the tool stops in the cusp, and p is finite.
     points = [[1.0, -1.0], [-1.0 / 3.0, 1.0], [-1.0 / 3.0, -1.0], [1.0, 1.0]]
     curve = CompositeCurve.from_bezier(points, width=2.0).split([0], [1.0])
     path = Path.from_curve(curve, feed=100.0)
@@ -287,7 +288,7 @@ def test_nothing_is_printed(method: str, capfd: pytest.CaptureFixture[str]) -> N
 
 @pytest.mark.parametrize("degree", [2, 3])
 def test_the_audit_measures_arcs_of_constant_parameter_acceleration(degree: int) -> None:
-    # (u, u²/2) from rest with s = 10: y accelerates with 10 u + p = 30 u, up to 60 mm/s² at u = 2.
+    # (u, u²/2) from rest with s = 10: the acceleration of y is 10 u + p = 30 u, up to 60 mm/s² at u = 2.
     curve = CompositeCurve.from_bezier([[0.0, 0.0], [1.0, 0.0], [2.0, 2.0]], width=2.0).elevated(degree)
     path = Path.from_curve(curve, feed=100.0)
     speed = float(np.sqrt(40.0) * np.hypot(1.0, 2.0))

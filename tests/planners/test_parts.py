@@ -1,4 +1,4 @@
-"""Runs that are planned apart are those of the whole plan, bit for bit; and a plan is the same every time."""
+"""Runs that are planned separately equal those of the whole plan, bit for bit, and plans are reproducible."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TIP = (
 
 
 class Others:
-    """Works on `parts` at a time, on copies as a line to another computer makes them."""
+    """Works on `parts` at a time, on copies such as a connection to another computer makes."""
 
     def __init__(self, parts: int) -> None:
         self._parts, self.given = parts, 0
@@ -90,7 +90,7 @@ def test_methods_that_take_no_parts_and_limits_of_time_say_so() -> None:
 
 
 def test_a_plan_is_the_same_on_any_number_of_threads() -> None:
-    """Threads end in any order: a sum in that order has other last digits."""
+    """Threads end in any order; a sum in that order would have other last digits."""
     code = """
 import feedplan
 from tests.service.servers import long_part

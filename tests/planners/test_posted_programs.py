@@ -1,4 +1,4 @@
-"""Programs as shops post them, from text to setpoints: audit and plain differences agree."""
+"""Programs as shops post them, from text to setpoints: checked by the audit and by plain differences."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from tests.planners.differences import beside_the_path, exceeded, too_fast
 from tests.planners.posted_programs import posted_program
 
 SEEDS = seeds(4)
-# They are run in so many parts, beside each other.
+# The seeds are divided into this many tests, which can run in parallel.
 PARTS = 2
-# What states between segments may be improved for: their first ones are a plan [s].
+# Time for which ruckig may improve the states between its segments [s]; its first states are a plan already.
 TIME_LIMITS = {"ruckig": 0.2}
-# Programs of more setpoints are planned for a machine of a longer period, in which they have so many.
+# A program with more setpoints is planned again with a longer period that gives this number.
 MOST_SETPOINTS = 60_000
 
 
@@ -58,14 +58,14 @@ def faults(seed: int, method: str, folder: Path) -> list[str]:
     ]
 
 
-# A table of lengths that was right half-way alone (241, 775, 823); a jerk that changes within half a
+# A table of lengths that was right only half-way (241, 775, 823); a jerk that changes within half a
 # micrometre (1863).
 @pytest.mark.parametrize("seed", [241, 775, 823, 1863])
 def test_programs_that_broke_a_limit_of_jerk(seed: int, tmp_path: Path) -> None:
     assert faults(seed, "jerk-limited", tmp_path) == []
 
 
-# At a long servo period sections of less than 1e-7 of it were left out of short neighbours.
+# At a long servo period, sections shorter than 1e-7 of it were left out of short phases.
 @pytest.mark.parametrize(("seed", "method"), [(371, "s-curve"), (1343, "ruckig")])
 def test_programs_at_long_periods_whose_recorded_durations_were_wrong(
     seed: int, method: str, tmp_path: Path

@@ -13,7 +13,7 @@ from tests.planners.audited import audited
 from tests.planners.random_programs import random_machine, random_program
 
 SEEDS = seeds(4)
-# They are run in so many parts, beside each other.
+# The seeds are divided into this many tests, which can run in parallel.
 PARTS = 4
 
 

@@ -1,4 +1,4 @@
-"""The profiles of segments, two-pass and state to state: limits kept, and which is the faster."""
+"""The profiles of s-curve (two passes) and ruckig (state to state): limits, and which one is faster."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_states_between_segments_make_profiles_faster_and_keep_every_limit() -> 
     assert faults == []
 
 
-# Its spline ends in a piece of 3e-5 mm, on which sections at a constant speed are as short as rounding.
+# Its spline ends in a piece of 3e-5 mm, on which sections at constant speed are as short as rounding.
 SLIVER = """
 G21 G90 G64
 G0 X28.24815 Y6.04278 Z5.80670
@@ -73,7 +73,7 @@ def test_a_section_as_short_as_rounding_keeps_its_time(tmp_path: FilePath) -> No
 
 
 def own_time(limits: list[float], length: float, speeds: tuple[float, float]) -> float:
-    """What the package ruckig says of a line with limits of velocity, acceleration and jerk along it [s]."""
+    """The time of the package ruckig for a line with these limits of velocity, acceleration and jerk [s]."""
     given, trajectory = InputParameter(1), Trajectory(1)
     given.current_position, given.target_position = [0.0], [length]
     given.current_velocity, given.target_velocity = [speeds[0]], [speeds[1]]
@@ -91,14 +91,14 @@ def test_lines_take_ruckigs_own_time(method: str) -> None:
         direction = random.normal(size=3)
         direction /= np.linalg.norm(direction)
         length, feed = 10.0 ** random.uniform([-3, 0.5], [3.5, 3])
-        # One line, or several on end.
+        # One line, or several lines in the same direction.
         cuts = np.sort(random.uniform(0.0, length, case % 4))
         ends = direction * np.concatenate([[0.0], cuts, [length]])[:, None]
         lines = [CompositeCurve.from_bezier(ends[i : i + 2]) for i in range(len(ends) - 1)]
         path = Path.from_curve(CompositeCurve.joined(lines), feed=feed)
         limits = (rows / np.abs(direction)[:, None]).min(axis=0).tolist()
         limits[0] = min(limits[0], feed)
-        # Speeds that can be had: so much of what is reached from rest on a quarter of the way.
+        # Reachable speeds: shares of the speed that is reached from rest on a part of the line.
         most = min(limits[0], (length / 8 * limits[1]) ** (1 / 2), (length**2 / 64 * limits[2]) ** (1 / 3))
         for start, end in ((0.0, 0.0), (0.5, 0.0), (0.3, 0.9)):
             problem = build_problem(path, machine, start_speed=start * most, end_speed=end * most)

@@ -1,4 +1,4 @@
-"""No planner has a length or a time of its own: what is scaled with its machine takes the same time."""
+"""No planner contains a length or a time: a path that is scaled with its machine takes the same time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.campaign import seeds
 from tests.planners.random_paths import random_case
 
 CLOSE = 1e-6
-# Of the axes X, Y, Z [mm/s, mm/s², mm/s³].
+# Velocity, acceleration and jerk of the axes X, Y, Z [mm/s, mm/s², mm/s³].
 LIMITS = [(200.0, 2500.0, 60_000.0), (250.0, 3000.0, 50_000.0), (180.0, 3500.0, 70_000.0)]
 FEED, CHORD = 150.0, 0.002
 SPLINE = np.random.default_rng(7).uniform(-20.0, 20.0, (6, 3))
@@ -26,7 +26,7 @@ PATHS = ("spline", *LINES)
 
 
 def problem_of(name: str, scale: float) -> Problem:
-    """A path on its machine, all lengths times `scale`."""
+    """A path and its machine, with all lengths times `scale`."""
     if name == "spline":
         path = Path.from_nurbs(scale * SPLINE, KNOTS, 3, feed=scale * FEED)
     else:

@@ -1,4 +1,4 @@
-"""Feeds down to 1e-6 mm/s: ramps are shorter than the rounding of the places they are at."""
+"""Feeds down to 1e-6 mm/s: ramps are shorter than the rounding of positions."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from feedplan.planners import limits_jerk
 from tests.campaign import SEEDS as CAMPAIGN
 from tests.campaign import seeds
 
-# Speeds [mm/s]: the fastest feed that once failed, and the least that is promised; in a campaign one between.
+# Speeds [mm/s]: the fastest feed that once failed, the least that is promised, in a campaign one between.
 SPEEDS = (3e-3, 1e-4, 1e-6) if CAMPAIGN else (3e-3, 1e-6)
 EXACT = ("bang-bang", "jerk-limited", "s-curve", "ruckig")
 HEURISTIC = ("junction-deviation", "arc-transition", "constant-velocity-transition")
-# This one does not keep the accelerations of curves at any feed: it is asked to move along a line.
+# This method exceeds accelerations on curves at any feed, so it only moves along a line.
 LINE_ONLY = ("tangential",)
 
 MACHINE = Machine(
@@ -63,7 +63,7 @@ def test_profile_and_setpoints_of_slow_feeds_are_right(name: str, method: str, t
         end = slow.problem.curve.control_points[-1]
         assert np.abs(chunk.position[-1] - end).max() < 1e-12
         assert slow.lower_bound <= slow.time * (1.0 + 1e-12)
-        # Segments of one greatest speed each: on rotary blends the feed allows more on parts of them.
+        # Here segments have one greatest speed each, but on parts of rotary blends the feed allows more.
         one_speed = name == "rotary" and method in ("s-curve", "ruckig")
         assert slow.gap < (0.02 if one_speed else 1e-3)
 
@@ -84,7 +84,7 @@ def test_every_setpoint_of_a_short_slow_path_is_right(method: str, tmp_path: Pat
 
 
 def random_moves(rng: np.random.Generator) -> str:
-    """Moves of some of the axes, all at one feed."""
+    """Random moves of some of the axes, all at one feed."""
     lines = ["G0 X100", "G1 F{f}"]
     for _ in range(rng.integers(1, 5)):
         places = {"X": 100.0, "Y": 0.0, "Z": 0.0, "A": 0.0}
@@ -94,8 +94,8 @@ def random_moves(rng: np.random.Generator) -> str:
 
 
 def test_no_bound_of_jerk_limited_is_above_the_time_of_s_curve(tmp_path: Path) -> None:
-    # Both follow the same path: a plan that keeps all limits is no faster than the bound.
-    # A first plan of which v² was below 0 between two nodes: no time at all (20).
+    # Both methods follow the same path, so no plan that keeps all limits is faster than the bound. With seed
+    # 20 a first plan once had v² < 0 between two stations, and so no time.
     for seed in (*range(SEEDS), 20):
         rng = np.random.default_rng(seed)
         moves, speed = random_moves(rng), 10.0 ** rng.uniform(-6.0, 0.0)

@@ -1,4 +1,4 @@
-"""The time limit of jerk-limited: what is there at once, what is left out, and what a plan says of it."""
+"""The time limit of jerk-limited: the first plan, what is left out, and what the plan says about it."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def named(curve: object) -> Problem:
 
 @pytest.fixture
 def program(tmp_path: FilePath) -> FilePath:
-    """A program of three runs at 100 mm/s, the second one a line."""
+    """A program with three runs at 100 mm/s; the second run is a line."""
     file = tmp_path / "part.ngc"
     file.write_text(PROGRAM.format(feed=6000))
     return file
 
 
 def problems(tmp_path: FilePath) -> list[Problem]:
-    """Named and random curves, and a program with feeds far below what the axes allow, at which the method
+    """Named and random curves, and a program with feeds far below what the axes allow, for which the method
     s-curve is nearly optimal."""
     found = [named(curve) for curve in (lemniscate, trefoil, butterfly)]
     found += [random_problem(seed) for seed in range(SEEDS)]
@@ -91,11 +91,11 @@ def test_without_time_there_is_a_first_plan_on_a_coarse_grid_and_nothing_more(
     first, best = (jerk_limited.FIRST_RESOLUTION, False), (jerk_limited.RESOLUTION, True)
     assert planned == [first]
     assert plan.audit().ok
-    # Enough time, but all of it is kept for what follows.
+    # There is enough time, but all of it is reserved for what follows the plan.
     profile = jerk_limited.plan(plan.problem, time_limit=1e6, reserve=lambda first: 1e6)
     assert profile.stopped
     assert planned == [first] * 2
-    # Enough for all.
+    # Enough time for all.
     profile = jerk_limited.plan(plan.problem, time_limit=1e6, reserve=lambda first: 1.0)
     assert not profile.stopped
     assert planned[2:] == [first, best]
@@ -116,7 +116,7 @@ def test_each_run_is_the_fastest_that_there_is(program: FilePath) -> None:
     assert (np.diff(best.runs) > 0).all()
     assert len(best.runs) == 4
     one = int(best.runs[1])
-    # One that has only the first run, the other one has all of them.
+    # One profile has the first run only, the other one all runs.
     names = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
     part = replace(best, **{n: getattr(best, n)[:one] for n in names}, runs=np.array([0, one, one, one]))
     joined = fastest_runs([other, part])
@@ -134,7 +134,7 @@ def test_a_limit_is_one_for_all_that_becomes_of_a_program(program: FilePath) -> 
     setpoints = plan_program(program, MACHINE, "s-curve").setpoints()
     ticks = iter([104.0, 104.01])
     limit.clock = lambda: next(ticks, 104.01)
-    # A 64th of the setpoints took 10 ms.
+    # A sample of 1/64 of the setpoints took 10 ms.
     assert limit.keep_for(setpoints) == pytest.approx(64 * 0.01 * FOLLOWING)
     assert limit.left == pytest.approx(10.0 - 4.01 - 64 * 0.01 * FOLLOWING)
     limit.kept = 1e3
@@ -175,7 +175,7 @@ def test_an_accuracy_that_the_plan_reaches_and_the_bound_does_not_prove_is_told(
     assert f"{200 * accuracy:.2g} % for what finer grids may gain" in sentence
     own = float(sentence.removeprefix(start).split()[0]) / 100
     assert own == pytest.approx(plan.summary()["estimated_gap"], rel=0.05)
-    # On a finer grid, and converged further, the time is less by no more than the accuracy, about.
+    # A plan on a finer grid, with more iterations, is faster by about the accuracy at most.
     best = plan_program(path, MACHINE, "jerk-limited", accuracy=1e-5).time
     assert own < accuracy
     assert plan.time <= best * (1.0 + 2.0 * accuracy)
@@ -186,7 +186,7 @@ def test_what_falls_short_is_said_in_words() -> None:
     profile = planner("jerk-limited")(named(lemniscate))
 
     def said(time: float, accuracy: float = 1e-3, **more: object) -> tuple[str, ...]:
-        """With a bound of the time over `time`."""
+        """The sentences about a plan whose time is `time` times its lower bound."""
         return shortfalls(
             replace(profile, **more),  # type: ignore[arg-type]
             profile.time / time,

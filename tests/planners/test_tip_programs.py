@@ -17,9 +17,9 @@ from tests.planners.tip_programs import random_tip_program
 SEEDS = seeds(1)
 MACHINES = ["trunnion-ac", "trunnion-bc", "head-table", "head-head", "rotary-table"]
 METHODS = ["bang-bang", "jerk-limited", "s-curve", "ruckig"]
-# What states between segments may be improved for: their first ones are a plan [s].
+# Time for which ruckig may improve the states between its segments [s]; its first states are a plan already.
 TIME_LIMITS = {"ruckig": 0.2}
-# Reasons to refuse a program that a machinist accepts.
+# Allowed reasons to refuse a program that a machinist would accept.
 REASONS = (
     r"its travel (begins|ends) at",
     r"the tool is at a tool axis parallel to",
@@ -29,7 +29,8 @@ REASONS = (
     r"goes to machine positions and G43\.[45] is in force: cancel it by G49 before",
 )
 
-# What a tool of 120 mm on a BC trunnion does after the way up, by what is at fault where it fails.
+# Common sequences, most of them with a tool of 120 mm on a BC trunnion after a retract; each has its
+# difficulty as its name.
 UP = "G21 G90 G94\nG0 Z400\n"
 PROGRAMS = {
     "the first block changes the meaning": (
@@ -97,7 +98,7 @@ def excess(planned: Plan, jerk: bool) -> list[str]:
 
 
 def broken(text: str, machine: Machine, method: str, refuses: bool = True) -> list[str]:
-    """What audit and differences say of the plan; nothing of a program that `refuses` lets be refused."""
+    """Failures by audit and differences; none if `refuses` and the reason of the refusal is allowed."""
     try:
         program = read_gcode(text, machine, name="part.ngc")
         if len(program) == 0:
@@ -128,7 +129,7 @@ def test_random_sequences_keep_every_limit(name: str, method: str) -> None:
     assert {seed: sentences for seed, sentences in found.items() if sentences} == {}
 
 
-# The path turns the most at the end of a piece: cut 1e-5 mm beside it, its way has no digits for that.
+# The path turns most at the end of a piece; a piece cut 1e-5 mm beside it has too few digits of length.
 @pytest.mark.parametrize(("name", "seed"), [("head-head", 38), ("head-head", 637), ("rotary-table", 45)])
 def test_programs_that_broke_a_limit_of_jerk(name: str, seed: int) -> None:
     machine = Machine.load(name)

@@ -1,9 +1,9 @@
 """toppra on a mesh aligned with the knots brackets the exact time from both sides.
 
-Collocation asks for the limits at the nodes alone and is optimistic. The one-sided scheme asks for them at
-both ends of every cell with the cell's own q''; on a quadratic piece the acceleration is linear in a cell, so
-that its profile is feasible, on other curves and joints it is so to the second order. Both meet at the exact
-time as the mesh refines.
+Collocation keeps the limits at the stations only and is optimistic. The one-sided scheme keeps them at both
+ends of every interval with the interval's own q''. On a quadratic piece the acceleration is linear in an
+interval, so this profile is feasible; on other curves and joints it is feasible up to second order. Both
+times converge to the exact one as the mesh is refined.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tests.constraints.test_joints import random_problem
 
 
 def cam_problem(count: int, seed: int) -> Problem:
-    """A C1 quadratic B-spline with steps of 0.3 to 3 mm and some sharp bends, its limits drawn at random."""
+    """A C1 quadratic B-spline with steps of 0.3 to 3 mm and some sharp bends, and random limits."""
     rng = np.random.default_rng(seed)
     heading, polygon = np.array([1.0, 0.0, 0.0]), [np.zeros(3)]
     for _ in range(count + 1):
@@ -63,7 +63,8 @@ def test_both_schemes_close_in_on_the_exact_time(seed: int) -> None:
 def test_both_schemes_close_in_on_the_exact_time_of_joints(name: str, seed: int) -> None:
     problem = random_problem(name, seed)
     exact = plan(problem).time
-    # The pieces are cut already. One error may pass through zero on its way, both together do not.
+    # The pieces are short already, so the mesh counts intervals per piece. One error may pass through 0, but
+    # not both at once.
     meshes = [math.ceil(cells / len(problem.path)) for cells in (500, 2000)]
     coarse, fine = (
         max(

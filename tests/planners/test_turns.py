@@ -1,4 +1,4 @@
-"""Paths that turn back: the tool rests for no time, and its acceleration goes on."""
+"""Paths that turn back: the tool rests for no time, and its acceleration does not vanish."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ def there_and_back(length: float, times: int, feed: float = 1e5) -> str:
 
 
 def test_long_strokes_turn_back_at_the_greatest_acceleration() -> None:
-    # From rest without acceleration to V: V/A + A/J, over half of V for so long. With A at once: A/(2 J)
-    # less, over A³/(24 J²) less.
+    # From rest with acceleration 0 to V: V/A + A/J, at V/2 on average. If the acceleration begins at A, it
+    # takes A/(2 J) less time and A³/(24 J²) less distance. `stop` and `turn` are the losses against a
+    # constant speed V.
     stop = 0.5 * (V / A + A / J)
     turn = V / A + A / (2 * J) - (V * stop - A**3 / (24 * J**2)) / V
     made = planned(there_and_back(100.0, 4))
@@ -36,7 +37,8 @@ def test_long_strokes_turn_back_at_the_greatest_acceleration() -> None:
 
 
 def test_short_strokes_swing_with_full_jerk() -> None:
-    # From a to −a at −J in 2 a/J, over 2 a³/(3 J²); the first and the last stroke have one end without.
+    # From acceleration a to −a at jerk −J: 2 a/J and 2 a³/(3 J²). The first and the last stroke have
+    # acceleration 0 at one end.
     length, strokes = 2.0, 40
     a = (1.5 * length * J**2) ** (1 / 3)
     first = (length * J**2 / (1 / 3 + 0.125**0.5)) ** (1 / 3)
@@ -70,7 +72,7 @@ def test_random_strokes_keep_all_limits_and_are_never_slower_than_with_stops(see
         way = scale * 10.0 ** rng.uniform(-1.0, 0.0)
         place += way if i % 2 else -way
         feed = 60 * V * 10.0 ** rng.uniform(-1.5, 0.5)
-        # Some strokes have two feeds, and some turns are corners.
+        # Some strokes have two feeds, and some turns are corners of less than 180°.
         if rng.random() < 0.3:
             middle = place - (0.3 * way if i % 2 else -0.3 * way)
             moves.append(f"G1 X{middle * direction[0]:.12f} Y{middle * direction[1]:.12f} F{2 * feed:.4f}")
@@ -89,7 +91,7 @@ def test_a_pause_at_the_turn_lets_the_acceleration_vanish() -> None:
 
 
 def test_arcs_there_and_back_take_one_acceleration_at_each_turn() -> None:
-    # A line and a half circle there, both back: neither side of a turn is a line with one feed.
+    # A line and a half circle there, and both back: at no turn is a side a line with a single feed.
     lap = "G1 X4 Y4 F9000\nG2 X10 Y4 I3 J0\nG3 X4 Y4 I-3 J0\nG1 X0 Y0 F15000"
     paused = planned(lap.replace("\nG3", "\nG4 P0.000000001\nG3"))
     made = planned(lap)

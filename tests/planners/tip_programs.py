@@ -1,4 +1,4 @@
-"""Random five-axis programs: G43.4, G43.5 and G49 in any order, turns, retracts, the way home."""
+"""Random five-axis programs: G43.4, G43.5 and G49 in any order, turns, retracts, and the way home."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ TIP, VECTOR, JOINTS = "G43.4", "G43.5", "G49"
 
 
 def random_tip_program(seed: int, machine: Machine) -> str:
-    """Five to twelve blocks, some of which a machinist would think twice about."""
+    """Five to twelve random blocks, some of them unusual for a machinist."""
     rng = np.random.default_rng([seed, *machine.name.encode()])
     return _Program(rng, machine).text()
 
 
 class _Program:
-    """What the words mean where the program has come to."""
+    """Writes blocks and keeps the coordinate mode in which words are read."""
 
     def __init__(self, rng: np.random.Generator, machine: Machine) -> None:
         self.rng, self.machine = rng, machine
@@ -49,7 +49,7 @@ class _Program:
         return "\n".join([*self.lines, "M30", ""])
 
     def number(self, low: float, high: float) -> str:
-        """A number, now and then a round one."""
+        """A random number, sometimes a round one."""
         value = self.rng.uniform(low, high)
         return f"{value:.0f}" if self.rng.random() < 0.3 else f"{value:.3f}"
 
@@ -57,7 +57,7 @@ class _Program:
         return str(self.rng.choice(["G0", "G0", "G1"]))
 
     def place(self) -> str:
-        """Words of X, Y and Z, some of them left out."""
+        """Words of X, Y and Z, some left out."""
         if self.coordinate_mode == JOINTS:
             low, high = self.machine.axis("Z").travel
             z = self.number(low + 0.6 * (high - low), low + 0.95 * (high - low))
@@ -68,7 +68,7 @@ class _Program:
         return " ".join(word for word, keep in zip(words, kept, strict=True) if keep) or words[0]
 
     def angles(self) -> str:
-        """Rotary words, one or all."""
+        """Rotary words, of one axis or of all."""
         words = []
         for axis in self.rotary:
             tilts = len(self.rotary) > 1 and axis.name != "C"
@@ -78,7 +78,7 @@ class _Program:
         return " ".join(word for word, keep in zip(words, kept, strict=True) if keep) or words[0]
 
     def direction(self) -> str:
-        """I, J, K: the tool upright or leaning."""
+        """I, J, K for a tool that is upright or tilted."""
         if self.rng.random() < 0.15:
             return "K1"
         lean = self.rng.uniform(0.05, 0.9)
@@ -118,7 +118,7 @@ class _Program:
             self.lines.append(f"G91 G0 Z{self.number(5, 60)}\nG90")
 
     def small(self) -> None:
-        """A step so short that all of it is start and stop."""
+        """A step so short that the tool only starts and stops."""
         letters = ["X", "Y", "Z", *(axis.name for axis in self.rotary if self.coordinate_mode != VECTOR)]
         step = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-3, 0)
         self.lines.append(f"G91 {self.code()} {self.rng.choice(letters)}{step:.4f}\nG90")

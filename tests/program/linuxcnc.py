@@ -1,4 +1,4 @@
-"""Programs read by LinuxCNC's interpreter, and by feedplan, as lists of moves that can be compared."""
+"""Reads programs with LinuxCNC's interpreter and with feedplan, as lists of moves that can be compared."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PYTHON = "/usr/bin/python3"
 FOLDERS = (Path("/usr/share/linuxcnc/ncfiles"), Path("/usr/share/doc/linuxcnc/examples/sample-configs"))
 ABSENT = "LinuxCNC is not installed: apt-get install linuxcnc-uspace"
 
-# Moves agree within this [mm, deg].
+# Allowed difference of moves [mm, deg].
 TOLERANCE = 1e-9
 AXES = "XYZABCUVW"
 
@@ -33,7 +33,7 @@ Move = list[Any]
 def reference(
     programs: Sequence[Path], tools: Path, ini: Path | None = None
 ) -> list[tuple[list[Move], str | None]]:
-    """The moves of each program in LinuxCNC's interpreter with a tool table, and why it stops."""
+    """The moves of each program in LinuxCNC's interpreter with a tool table, and its error if it stops."""
     requests = [
         json.dumps({"program": str(program), "tools": str(tools), "ini": str(ini) if ini else None})
         for program in programs
@@ -55,13 +55,13 @@ def reference(
 
 
 def printed(program: Path, tools: Path) -> list[Move]:
-    """The moves of a program as the command `rs274` prints them, to four decimals in its units.
+    """The moves of a program as the command `rs274` prints them, with four decimals in its units.
 
-    The Python module takes the end of the last straight move for the place after a tool change, this command
-    does not.
+    After a tool change the Python module assumes that the tool is at the end of the last straight move; this
+    command does not.
     """
     with tempfile.TemporaryDirectory() as folder:
-        # This command takes the lengths of the table for inches.
+        # This command reads the lengths of the table as inches.
         table = Path(folder, "tools.tbl")
         table.write_text(re.sub(r"([XYZUVWD])([-+.\d]+)", _in_inches, tools.read_text()))
         done = subprocess.run(
@@ -82,7 +82,7 @@ def _in_inches(word: re.Match[str]) -> str:
 
 
 class _Printed:
-    """Follows what `rs274` prints."""
+    """Collects the moves that `rs274` prints."""
 
     def __init__(self) -> None:
         self.unit = 1.0
@@ -134,7 +134,7 @@ class _Printed:
 
 
 def moves_of(program: Program) -> list[Move]:
-    """The moves of a program that was read, in the form of `reference`."""
+    """The moves of a program that feedplan has read, in the form of `reference`."""
     columns = [AXES.index(name) for name in program.axes]
     arcs = iter(range(len(program.arc_move)))
     curves = iter(range(len(program.spline_move)))
@@ -164,13 +164,13 @@ def moves_of(program: Program) -> list[Move]:
 
 
 def _turns(angle: float) -> int:
-    """LinuxCNC's count of an arc's turns, those begun, with the sign of its direction."""
+    """The number of turns that an arc begins, as LinuxCNC counts them, with the sign of its direction."""
     whole = math.ceil(abs(angle) / math.tau - 1e-6)
     return int(math.copysign(max(whole, 1), angle))
 
 
 def _points_of_spline(program: Program, row: int, line: int, start: np.ndarray) -> list[Move]:
-    """The points of a spline in LinuxCNC's preview: 15 for each control point, even in the parameter."""
+    """The points of a spline in LinuxCNC's preview: 15 per control point, evenly spaced in the parameter."""
     assert program.splines is not None
     first, last = program.spline_pieces[row : row + 2]
     widths = program.splines.width[first:last]
@@ -203,9 +203,9 @@ def _bezier(program: Program, piece: int, t: float) -> np.ndarray:
 def difference(
     ours: Sequence[Move], theirs: Sequence[Move], tolerance: float = TOLERANCE, so_far: bool = False
 ) -> str | None:
-    """Where two lists of moves part, in a sentence; straight moves of no length do not count.
+    """The first difference of two lists of moves, in a sentence; straight moves of no length are ignored.
 
-    `so_far`: theirs end before ours.
+    With `so_far` the second list may end earlier.
     """
     mine, others = _moving(ours), _moving(theirs)
     for i in range(len(others) if so_far else max(len(mine), len(others))):

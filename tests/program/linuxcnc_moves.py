@@ -1,4 +1,4 @@
-"""What LinuxCNC's interpreter makes of part programs, in full precision; for the Python of its module.
+"""Moves that LinuxCNC's interpreter makes of part programs, at full precision; runs in its module's Python.
 
 Reads lines `{"program": path, "tools": path of a tool table, "ini": path or null}` from standard input and
 writes one line of JSON for each: `moves`, a list of
@@ -27,12 +27,12 @@ import gcode
 
 INCH = 25.4
 
-# Some programs run for ever; longer ones are given up [s].
+# Some programs never end: each is stopped after this time [s].
 PATIENCE = 60
 
 
 class Canon:
-    """Takes the interpreter's moves, and turns them into machine coordinates."""
+    """Receives the interpreter's moves and converts them to machine coordinates."""
 
     def __init__(self, tools):
         self.tools = tools
@@ -44,7 +44,7 @@ class Canon:
         self.parameter_file = str(Path(os.environ["HOME"], "parameters.var"))
         self.spindle = (-1,) + (0.0,) * 12 + (0,)
 
-    # What the interpreter tells.
+    # Calls by which the interpreter reports moves and modes.
 
     def next_line(self, state):
         self.line = state.sequence_number
@@ -124,7 +124,7 @@ class Canon:
     def check_abort(self):
         return False
 
-    # What the interpreter asks.
+    # Calls by which the interpreter asks for values.
 
     def get_tool(self, pocket):
         if pocket == 0:
@@ -146,7 +146,7 @@ class Canon:
         return True
 
     def machine(self, place):
-        """A place of the program in machine coordinates."""
+        """A position of the program in machine coordinates."""
         place = [value + shift for value, shift in zip(place, self.g92, strict=True)]
         turn = math.radians(self.angle)
         x, y = place[:2]
@@ -156,12 +156,12 @@ class Canon:
 
 
 def scaled(values):
-    """Inches of X Y Z U V W as mm."""
+    """Converts X Y Z U V W from inches to mm."""
     return [value if 3 <= axis < 6 else value * INCH for axis, value in enumerate(values)]
 
 
 def load_tools(library, path):
-    """Gives the interpreter a tool table; its tools in order."""
+    """Loads a tool table into the interpreter; returns its tools in order."""
     assert library.tooldata_load(path.encode(), None) == 0
     tools = []
     for line in Path(path).read_text().splitlines():
@@ -180,7 +180,7 @@ def main():
     library._Z13tooldata_initb(False)
     for line in sys.stdin:
         sys.stdout.flush()
-        # The interpreter keeps modes from program to program, and crashes on some.
+        # One process per program, because the interpreter keeps modes between programs and may crash.
         child = os.fork()
         if child == 0:
             signal.alarm(PATIENCE)

@@ -1,7 +1,7 @@
-"""How feedplan reads programs, beside LinuxCNC's interpreter: `python -m tests.program.readings FOLDER...`.
+"""Compares feedplan's reader with LinuxCNC's interpreter: `python -m tests.program.readings FOLDER...`.
 
-Prints a table of the programs in the folders (LinuxCNC's samples without any): read the same, refused with
-the reason, or different.
+Prints one line for each program in the folders (default: LinuxCNC's samples): read the same, refused with the
+reason, or different.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from tests.program.linuxcnc import ABSENT, FOLDERS, Move, difference, moves_of, 
 
 ENDINGS = (".ngc", ".nc", ".gc", ".gcode", ".tap", ".h", ".mpf")
 
-# So far off are moves that `rs274` prints to four decimals of an inch [mm].
+# Allowed difference of moves that `rs274` prints with four decimals of an inch [mm].
 PRINTED = 0.004
 
 
 class Verdict(StrEnum):
     SAME = "the same"
-    SAME_AS_PRINTED = "the same as printed"  # where the Python module loses the place after a tool change
-    SAME_SO_FAR = "the same so far"  # to where LinuxCNC stops
-    NO_MOVES = "no moves"  # in LinuxCNC neither
+    SAME_AS_PRINTED = "the same as printed"  # and the Python module is wrong after a tool change
+    SAME_SO_FAR = "the same so far"  # up to the place where LinuxCNC stops
+    NO_MOVES = "no moves"  # refused by feedplan, and without moves in LinuxCNC
     REFUSED_BY_BOTH = "refused by both"
     REFUSED = "refused"
     DIFFERENT = "different"
@@ -38,7 +38,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Reading:
-    """What became of a program, and why."""
+    """The verdict on a program, and its reason."""
 
     file: Path
     verdict: Verdict
@@ -46,7 +46,7 @@ class Reading:
 
 
 def programs_in(folders: Iterable[Path]) -> list[Path]:
-    """The part programs below folders, by their endings."""
+    """The part programs in folders and their subfolders, found by their endings."""
     files = (file for folder in folders for file in folder.rglob("*") if file.suffix.lower() in ENDINGS)
     return sorted({file for file in files if file.is_file()})
 
@@ -87,7 +87,7 @@ def _compared(file: Path, tools: Path, ours: list[Move], moves: list[Move], erro
 
 
 def main(names: Sequence[str]) -> int:
-    """Prints the table; 1 where a program differs."""
+    """Prints the table; returns 1 if a program differs."""
     if shutil.which("rs274") is None:
         print(f"Nothing is compared. {ABSENT}")
         return 0

@@ -1,4 +1,4 @@
-"""Drawings: entities of a model space to moves, each against its own definition."""
+"""Drawings: each entity of a model space becomes moves that follow its own definition."""
 
 import io
 import math
@@ -217,7 +217,7 @@ def test_what_is_no_drawing_is_one_sentence() -> None:
         read(lambda space: space.add_text("part"))
     with pytest.raises(ProgramError, match=r"part\.dxf entity 1 goes farther than 1e"):
         read(lambda space: space.add_line((0, 0), (2e6, 0)))
-    # From far away, and on a circle that goes there between two near places.
+    # Points too far away, and an arc between two near points that reaches too far.
     with pytest.raises(ProgramError, match=r"part\.dxf entity 1 goes farther than 1e"):
         read(lambda space: space.add_circle((0, 0), math.inf))
     for vertices in ([(1e30, 0), (0, 10, 0, 0, 0.5), (5, 5)], [(0, 0, 0, 0, 1e30), (0, 10)]):

@@ -1,4 +1,4 @@
-"""What happens between moves keeps its place, its line and its order."""
+"""Events between moves keep their place, their line and their order."""
 
 import numpy as np
 

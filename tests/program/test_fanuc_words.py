@@ -1,4 +1,4 @@
-"""Words of Fanuc's and Haas's controls make the moves that LinuxCNC makes of programs of the same meaning."""
+"""Words of Fanuc and Haas controls make the moves that LinuxCNC makes of programs with the same meaning."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 from tests.program.linuxcnc import difference, moves_of, needs_linuxcnc, reference
 
-# Places turned by 40 degrees about X3 Y2 are those of work coordinates that are turned and shifted so.
+# A rotation by 40 degrees about X3 Y2, written as rotated and shifted work coordinates.
 ABOUT = "X[3-3*COS[40]+2*SIN[40]] Y[2-3*SIN[40]-2*COS[40]] R40"
 MOVES = "G0 X5 Y1\nG1 X9 Z-1\nG3 X9 Y5 J2\nG2 X12 Y3 R4\nG91 G1 X2\nG90 G81 X1 Y2 Z-3 R1\nG80"
 

@@ -1,4 +1,4 @@
-"""What coverage-guided fuzzing of the reader has found, and mutations of it: each is read or refused."""
+"""Inputs found by coverage-guided fuzzing of the reader, and mutations of them: each is read or refused."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan.program.read import read_program
 from tests.hostile import mutated
 
 CORPUS = Path(__file__).parents[2] / "solvers" / "fuzz" / "corpus.tar.xz"
-# A loop may run for so many moves; mutations of each input.
+# Greatest number of moves of a program with loops; number of mutations of each input.
 MOVES, MUTATIONS = 10_000, 2
 
 
@@ -26,12 +26,12 @@ def corpus() -> list[bytes]:
 
 
 def wrong(text: bytes, machine: Machine) -> str:
-    """What is wrong with how the reader ends, if anything."""
+    """What is wrong with the outcome of reading; empty if nothing is."""
     try:
         program = read_program(text, machine, max_moves=MOVES)
     except FeedplanError as refusal:
         return "" if len(str(refusal)) <= LONGEST else f"a refusal of {len(str(refusal))} letters"
-    except BaseException as defect:  # a panic of native code is no Exception
+    except BaseException as defect:  # a panic of native code is no subclass of Exception
         return f"{type(defect).__name__}: {defect}"
     return "" if np.isfinite(program.target).all() else "a move to no place"
 

@@ -16,7 +16,7 @@ def read(text: str) -> Program:
 
 
 def rows(text: str, skip: int = 1) -> list[Row]:
-    """Targets and whether they are reached by feed, from the move `skip` on."""
+    """Targets and whether they are reached at a feed, without the first `skip` moves."""
     program = read(text)
     reached = [math.isfinite(feed) for feed in program.feed]
     return [(*target, feed) for target, feed in zip(program.target.tolist(), reached, strict=True)][skip:]
@@ -86,12 +86,12 @@ def test_cycles_that_turn_the_spindle_back_or_stop_it_tell_so() -> None:
         events = read(f"S500 {start}\nG98 G0 Z5\n{cycle}").events
         return list(zip(events.move.tolist(), events.words(), strict=True))[2:-1]
 
-    # The moves: up to Z5, down to R, to the bottom, up again.
+    # The moves: to Z5, down to R, to the bottom, up again.
     assert told("M3", "G84 X0 Z-5 R1") == [(3, "G4 P0"), (3, "M4"), (4, "M3")]
     assert told("M4", "G74 X0 Z-5 R1") == [(3, "G4 P0"), (3, "M3"), (4, "M4")]
     assert told("M4", "G86 X0 Z-5 R1 P2") == [(3, "G4 P2"), (3, "M5"), (4, "M4")]
     assert told("M3", "G33.1 Z-5 K1") == [(2, "M4"), (3, "M3")]
-    # A spindle that stands is left alone.
+    # A spindle at rest is not started.
     assert told("M5", "G84 X0 Z-5 R1") == [(3, "G4 P0")]
 
 

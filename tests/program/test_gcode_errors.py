@@ -1,4 +1,4 @@
-"""What is not understood or cannot be followed is one sentence with file, line and word."""
+"""Words that are unknown or impossible give one sentence with file, line and word."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Parameters, O words and subprograms; what they mean is compared with LinuxCNC in test_linuxcnc."""
+"""Parameters, O words and subprograms; test_linuxcnc compares their meaning with LinuxCNC."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Known moves, written as G-code in random ways, come back as they were."""
+"""Known moves that are written as G-code in random ways are read back unchanged."""
 
 import math
 import random
@@ -15,14 +15,14 @@ CENTRE = "IJK"
 
 
 def number(value: float) -> str:
-    """A decimal that is within 1e-13 of the value, written as posts differ."""
+    """A decimal within 1e-13 of the value, with the variations of posts."""
     text = f"{value:.13f}".rstrip("0")
     return text if random.random() < 0.5 else text.rstrip(".")
 
 
 @dataclass
 class Writer:
-    """Writes moves as blocks and keeps what the reader must find; places are machine coordinates in mm."""
+    """Writes moves as blocks and records the expected result; positions are machine coordinates in mm."""
 
     rng: random.Random
     lines: list[str] = field(default_factory=lambda: ["G21"])
@@ -46,7 +46,7 @@ class Writer:
         return self.work[self.system] + self.shift
 
     def block(self, *words: str) -> None:
-        """Words in any order, case and spacing."""
+        """The words as one block, in random order, case and spacing."""
         mixed = [word if self.rng.random() < 0.7 else word.lower() for word in words if word]
         self.rng.shuffle(mixed)
         gap = self.rng.choice(["", " ", "\t", "  "])
@@ -97,7 +97,7 @@ class Writer:
             self.block(rng.choice(["M3", "M5", "M8", "M0"]))
 
     def axis_words(self, target: np.ndarray, needed: str = "") -> list[str]:
-        """Words of the axes that move, and sometimes of those that do not."""
+        """Words of the axes that move, and sometimes of axes that do not."""
         words = []
         for k, axis in enumerate("XYZ"):
             if target[k] == self.position[k] and axis not in needed and self.rng.random() < 0.5:

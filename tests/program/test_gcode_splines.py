@@ -23,7 +23,7 @@ def read(text: str, machine: Machine | None = None) -> Program:
 
 
 def curves(program: Program) -> list[CompositeCurve]:
-    """The splines of a program one by one, each from where it starts to its target."""
+    """The splines of a program one by one, each from its start to its target."""
     whole = program.splines
     assert whole is not None
     starts = program.starts()

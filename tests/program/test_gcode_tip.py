@@ -1,4 +1,4 @@
-"""G43.4, G43.5 and G49: what axis words mean, and that a change of it moves no joint."""
+"""G43.4, G43.5 and G49: the meaning of axis words, and that no change of it moves a joint."""
 
 import math
 import re
@@ -26,7 +26,7 @@ def read(text: str, machine: Machine | str | None = "trunnion-ac") -> Program:
 
 
 def joints(program: Program, machine: Machine, row: int, place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Joint positions of a place in the words of a row, by the machine's own kinematics."""
+    """Joint positions for a position in the words of a row, by the machine's own kinematics."""
     assert program.coordinate_mode is not None
     assert program.tool_length is not None
     length = float(program.tool_length[row])
@@ -70,7 +70,7 @@ def test_a_change_of_meaning_moves_no_joint(name: str) -> None:
         before = joints(program, machine, row - 1, program.target[row - 1])
         after = joints(program, machine, row, starts[row])
         turns = (after - before)[3:] / 360
-        # A direction is reached by two pairs of angles; the joints that follow it choose.
+        # Two pairs of angles give the same direction, so only directions are compared.
         if CoordinateMode.VECTOR in (program.coordinate_mode[row - 1], program.coordinate_mode[row]):
             direction = [
                 axis_words(machine, program.axes, CoordinateMode.VECTOR).kinematics.tip(q)
@@ -80,12 +80,12 @@ def test_a_change_of_meaning_moves_no_joint(name: str) -> None:
         else:
             assert turns == pytest.approx(np.round(turns), abs=1e-12)
             assert after[:3] == pytest.approx(before[:3], abs=1e-9)
-    # Every change is a full stop before it.
+    # The tool stops before every change.
     assert program.stop[program.change_move - 1].all()
 
 
 def test_joints_after_directions_follow_them_from_where_they_were() -> None:
-    # Twice around with the tool tilted by 30 degrees: C goes on counting, A stays.
+    # Twice around with the tool tilted by 30 degrees: C counts the turns, A keeps its angle.
     sine, cosine = math.sin(math.radians(30)), math.cos(math.radians(30))
     turn = [math.radians(angle) for angle in range(0, 721, 40)]
     blocks = "\n".join(f"I{sine * math.cos(a):.9f} J{sine * math.sin(a):.9f} K{cosine:.9f}" for a in turn)
@@ -101,7 +101,7 @@ def test_an_upright_tool_leaves_the_first_axis_where_it_is() -> None:
 
 
 def test_the_tip_is_on_the_part_by_hand() -> None:
-    # A-90 about (y, z) = (0, 50) with the tool 77 mm long: the face point (0, 0) is at joints (50, 127).
+    # A-90 about (y, z) = (0, 50) with a tool of 77 mm: the point (0, 0) of the face is at joints (50, 127).
     program = read("G0 A-90 Y50 Z127\nG43.1 Z77\nG43.4\nG1 X1")
     assert program.change_start[0] == pytest.approx([0, 0, 0, -90, 0], abs=1e-12)
     assert program.target[-1] == pytest.approx([1, 0, 0, -90, 0], abs=1e-12)
@@ -110,7 +110,7 @@ def test_the_tip_is_on_the_part_by_hand() -> None:
 
 def test_axes_that_are_not_named_stay_where_the_tip_is() -> None:
     program = read("G0 X1 Y2 Z300\nG43.4 H1\nG1 Z20\nG91 G1 X3")
-    # The machine's tool is 120 mm long.
+    # The tool in the machine file is 120 mm long.
     assert program.change_start.tolist() == [[1, 2, 180, 0, 0]]
     assert program.target[1:].tolist() == [[1, 2, 20, 0, 0], [4, 2, 20, 0, 0]]
 
@@ -166,7 +166,7 @@ def test_directions_are_unit_vectors_with_missing_words_zero() -> None:
     root = math.sqrt(0.5)
     expected = np.array([[0.6, 0, 0.8], [0.6, 0, 0.8], [0, -root, root], [0, 0, 1], [0, 0, 1]])
     assert program.target[:, 5:] == pytest.approx(expected)
-    # What turns the tool alone is in deg/s.
+    # A block that only turns the tool has its feed in deg/s.
     assert program.feed.tolist() == [10, 10, 10, 10, math.inf]
     assert read("G20 F60 G43.5 H1\nG1 I3 K4\nX1").feed.tolist() == [1, 25.4]
     assert read("G93 G43.5 H1\nG1 J3 K3 F2").feed.tolist() == pytest.approx([45 * 2 / 60])

@@ -1,4 +1,4 @@
-"""Programs mean here what they mean in LinuxCNC's interpreter, wherever it accepts them."""
+"""Programs have the same moves as in LinuxCNC's interpreter, if that accepts them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def written(folder: Path, texts: dict[str, str]) -> list[Path]:
 
 
 def check(files: list[Path], tools: Path, names: list[str]) -> None:
-    """Each program has the moves that LinuxCNC makes of it."""
+    """Asserts that each program has the moves that LinuxCNC makes of it."""
     table = read_tools(tools)
     wrong = []
     for file, name, (moves, error) in zip(files, names, reference(files, tools), strict=True):
@@ -62,7 +62,7 @@ def check(files: list[Path], tools: Path, names: list[str]) -> None:
 
 @pytest.mark.parametrize("collection", ["codes", "compensation"])
 def test_each_code_makes_linuxcncs_moves(collection: str, tmp_path: Path, tools: Path) -> None:
-    """The programs of a collection, `=== name` before each: every code, every kind of corner."""
+    """The programs of a collection, each after `=== name`: every code and every kind of corner."""
     text = Path(__file__).with_name(f"linuxcnc_{collection}.txt").read_text()
     texts = dict(part.split("\n", 1) for part in text.split("=== ")[1:])
     assert len(texts) > 19
@@ -70,7 +70,7 @@ def test_each_code_makes_linuxcncs_moves(collection: str, tmp_path: Path, tools:
 
 
 def random_path(seed: int) -> str:
-    """Lines and arcs beside which a tool goes, that meet at all angles; some are too small for it."""
+    """Lines and arcs with radius compensation that meet at all angles; some are too small for the tool."""
     rng = random.Random(seed)
     code = rng.choice(("G41.1", "G42.1"))
     blocks = [f"{code} D{rng.uniform(0.2, 2):.3f}", f"G1 X{rng.uniform(4, 9):.3f} Y{rng.uniform(-9, 9):.3f}"]
@@ -131,7 +131,7 @@ def random_program(seed: int) -> str:
     for block in blocks:
         first, second = next(labels), next(labels)
         renamed.append(block.replace("o1 ", f"o{first} ").replace("o2 ", f"o{second} "))
-    # LinuxCNC does not convert the tool's length where the units change later.
+    # LinuxCNC does not convert the tool length when the units change later.
     units = rng.choice(("G20", "G21"))
     return "\n".join([f"{units} #1=1 #2=2 #3=3 #4=4 #5=5 #6=6 #7=7 #8=8 G0 X1 Y1", *renamed])
 
@@ -140,10 +140,10 @@ def random_program(seed: int) -> str:
 def test_random_programs_make_linuxcncs_moves(
     make: Callable[[int], str], tmp_path: Path, tools: Path
 ) -> None:
-    """What LinuxCNC refuses is left out; feedplan alone refuses corners only that have no room for the tool.
+    """Skips what LinuxCNC refuses; feedplan alone may refuse corners without room for the tool.
 
-    LinuxCNC looks at the length that a corner leaves of a move where the next corner has an offset of its
-    own, feedplan always.
+    LinuxCNC checks the length that a corner leaves of a move only if the next corner has an offset of its
+    own; feedplan checks it always.
     """
     seeds = range(int(os.environ.get("FEEDPLAN_SEEDS", "100")))
     files = written(tmp_path, {str(seed): make(seed) for seed in seeds})
@@ -175,12 +175,12 @@ REFUSED = {
     "lathe_g7x_face_boring.ngc": "each control cuts this cycle in passes of its own",
     "lathe_g7x_quadrants.ngc": "each control cuts this cycle in passes of its own",
 }
-# Its loop ends by LE between equal sums, which the interpreter takes for equal from its version 2.9 on.
+# Its loop ends by LE between equal sums, which the interpreter treats as equal from version 2.9 on.
 ROUNDED = "threading.ngc"
 
 
 def test_the_samples_of_linuxcnc_make_its_moves(tmp_path: Path) -> None:
-    """Each sample reads the same or is refused by name: `python -m tests.program.readings` prints which."""
+    """Each sample is read the same or is refused by name; `python -m tests.program.readings` lists them."""
     files = programs_in(FOLDERS)
     library = [file for file in files if "ngcgui_lib" in file.parts]
     files += [call for file in library if (call := call_of(file, tmp_path))]
@@ -197,7 +197,7 @@ def test_the_samples_of_linuxcnc_make_its_moves(tmp_path: Path) -> None:
 
 
 def call_of(subroutine: Path, folder: Path) -> Path | None:
-    """A program that calls a subroutine of the library with its arguments as they are by default."""
+    """A program that calls a subroutine of the library with its default arguments."""
     text = subroutine.read_text(errors="replace")
     arguments = re.findall(r"^\s*#<[^>]+>\s*=\s*#(\d+)\s*(?:\(\s*=\s*([-+.\d]+))?", text, re.MULTILINE)
     values = {int(number): value or "1" for number, value in arguments}

@@ -1,4 +1,4 @@
-"""Which bundled machine a program fits, and what is said of axes that a machine lacks."""
+"""Which bundled machine a program fits, and the message about axes that a machine lacks."""
 
 from pathlib import Path
 from typing import Any

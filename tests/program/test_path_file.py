@@ -1,4 +1,4 @@
-"""Path files: curves in JSON to spline moves, and what is wrong with them in one sentence."""
+"""Path files: curves in JSON become spline moves; errors in them give one sentence."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Programs from files: what is no program is one sentence."""
+"""Programs from files: anything that is not a program gives one sentence."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Programs as files, texts, bytes and streams: all are read the same, by their name or by how they begin."""
+"""Programs as files, texts, bytes and streams: all are recognised by their name or by their first bytes."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_the_language_is_that_of_the_name_or_of_the_first_characters(tmp_path: P
 
 
 class Slow(io.BytesIO):
-    """Gives a byte at a time, as a pipe may, and counts those it gave."""
+    """Returns one byte at a time, as a pipe may, and counts the calls."""
 
     given = 0
 

@@ -1,4 +1,4 @@
-"""Tool tables of LinuxCNC, and what programs take from them."""
+"""Tool tables of LinuxCNC, and the values that programs take from them."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ TABLE = "; tools of the shop\nT1 P2 X+1.5 Z-50.25 A90 D6 Q9 ;6 mm T9\n\nt12 p-1 
 
 def test_a_line_is_a_tool(tmp_path: Path) -> None:
     file = tmp_path / "tool.tbl"
-    file.write_text("\ufeff" + TABLE, "utf-8")  # editors of Windows put a byte order mark before a text
+    file.write_text("\ufeff" + TABLE, "utf-8")  # editors of Windows write a byte order mark first
     offset = (1.5, 0.0, -50.25, 90.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert read_tools(file) == (Tool(1, 2, offset, 6.0, 9), Tool(12, 0, (0.0,) * 9, 0.5, 0))
 

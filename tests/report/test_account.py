@@ -1,4 +1,4 @@
-"""The parts of a plan's time and length: by hand, and for every method."""
+"""How a plan's time and length are divided: by hand, and for every method."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_the_shares_of_all_limits_are_the_whole_time(method: str) -> None:
 
 
 def test_each_phase_of_limited_jerk_has_its_limit() -> None:
-    # 300 mm/s at 2000 mm/s² and 40 000 mm/s³: 0.05 s of jerk four times, 0.1 s at full acceleration twice.
+    # 300 mm/s at 2000 mm/s² and 40 000 mm/s³: four times 0.05 s of jerk, twice 0.1 s at full acceleration.
     made = planned("G0 X150", "jerk-limited", accuracy=1e-5)
     assert made.time == pytest.approx(0.7, rel=1e-4)
     shares = parts(made)
@@ -95,7 +95,7 @@ def test_the_tool_counts_on_machines_programmed_by_its_tip() -> None:
     # Corners are rounded within 0.01 mm.
     assert told.feed.length == pytest.approx(30.0, abs=0.02)
     assert told.feed.turn == pytest.approx(math.hypot(30.0, 60.0), abs=0.1)
-    # It starts with all joints at 0; the tip is 120 mm below, by the tool's length.
+    # All joints start at 0, so the tip is 120 mm below (the tool's length).
     assert told.rapid.length == pytest.approx(270.0, abs=0.02)
 
 
@@ -118,7 +118,7 @@ def test_stops_are_counted_by_cause() -> None:
     }
     by_cause = {row.cause: row for row in made.account.stops}
     assert by_cause["dwell (G4)"].pause == 0.5
-    # From 10 mm/s to rest in 2 √(10/40 000) s at 40 000 mm/s³, and back: half of both times is lost.
+    # From 10 mm/s to rest takes 2 √(10/40 000) s at 40 000 mm/s³, and as long back: half of both is lost.
     assert by_cause["programmed stop (M0, M1, M60)"].lost == pytest.approx(
         2.0 * math.sqrt(10 / 4e4), rel=0.05
     )
@@ -176,12 +176,12 @@ def test_the_page_the_table_and_plan_json_say_the_same(tmp_path: Path, capsys: A
 def test_more_arcs_than_moments_have_the_same_shares(monkeypatch: pytest.MonkeyPatch) -> None:
     made = planned("G64 P0.02\nF6000\nG1 X30 Y2\nG1 X90 Y-10\nG0 X0\nG1 Y3", "jerk-limited")
     exact = parts(made)
-    # The moments are spread evenly over the whole time, as if there were more phases than moments.
+    # With fewer moments than phases, the moments are spread evenly over the whole time.
     monkeypatch.setattr("feedplan.report.activity._MOMENTS", len(made.profile) - 1)
     even = account(made.problem, made.profile, made.program, True)
     assert math.fsum(share.part for share in even.limits) == pytest.approx(1.0)
     found = {share.limit: share.part for share in even.limits}
-    # Few moments may miss a limit that few phases use.
+    # A few moments may miss a limit that only few phases use.
     both = exact.keys() | found.keys()
     assert {limit: found.get(limit, 0.0) for limit in both} == pytest.approx(
         {limit: exact.get(limit, 0.0) for limit in both}, abs=0.02

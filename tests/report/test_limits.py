@@ -1,4 +1,4 @@
-"""The limit curve and the caps over length: by hand, against linear programming, and along a profile."""
+"""The limit curve and the speed caps over length: by hand, against linear programming, along a profile."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
 
 
 def test_on_a_bend_the_cross_axis_carries_all() -> None:
-    # Along X with a curvature of 1/10 mm: Y has the acceleration v²/10, so 500 mm/s² allow v² = 5000.
+    # Along X with curvature 1/10 mm: Y has the acceleration v²/10, so 500 mm/s² allow v² = 5000 mm²/s².
     most = np.array([300.0, 500.0])
     p = limit_curve(np.array([[1.0, 0.0]]), np.array([[0.0, 0.1]]), most, -most)
     assert p == pytest.approx([5000.0])
@@ -64,7 +64,7 @@ def test_the_square_rises_to_its_feed_and_stops_at_its_corners(square: Any) -> N
 def bend(
     square: Any, kind: PhaseLaw, axis: int, value: float, p: tuple[float, float]
 ) -> tuple[Any, SpeedProfile]:
-    """A quarter turn as a parabola from X to Y, of width 10, in one phase."""
+    """A quarter turn from X to Y as a parabola, with parameter width 10, in one phase."""
     path: Path = replace(
         square.path,
         curve=CompositeCurve.from_pieces([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]], [10.0]),
@@ -115,7 +115,7 @@ def test_arcs_of_limited_jerk_have_the_speed_of_their_length(square: Any) -> Non
     middle = len(samples.speed) // 2
     assert samples.speed[middle] == pytest.approx(300.0 * (0.5 * length / 100.0) ** (2 / 3), rel=1e-6)
     assert samples.speed[[0, -1]] == pytest.approx([0.0, v1], rel=1e-6)
-    # v² from 100 to 400 without acceleration at the ends: half-way between them in the middle.
+    # v² from 100 to 400 mm²/s² with acceleration 0 at both ends: its mean is reached half-way.
     problem, profile = bend(square, PhaseLaw.SPEED_CUBIC, 255, 0.0, (25.0, 100.0))
     samples = sampled(problem, profile)
     assert samples.speed[middle] == pytest.approx(math.sqrt(250.0), rel=1e-6)

@@ -1,4 +1,4 @@
-"""Time per limit and slowest lines of the square, by hand."""
+"""Time lost by each limit, and the slowest lines, of the square by hand."""
 
 from __future__ import annotations
 
@@ -68,13 +68,13 @@ def test_a_rapid_is_measured_against_its_axes(square: Any) -> None:
     problem = replace(square.problem, path=path, feed=np.full(4, 1000.0))
     row = slowest_lines(problem, square.profile)[0]
     assert row.rapid
-    # 20 mm at the 100 mm/s of the axis would take 0.2 s, not the 0.02 s that 1000 mm/s suggest.
+    # 20 mm take 0.2 s at the axis's 100 mm/s, not 0.02 s at the 1000 mm/s of the problem's feed.
     assert row.lost == pytest.approx(0.3)
     assert row.wanted == pytest.approx(100.0)
 
 
 def test_the_worst_lines_come_first_up_to_the_given_number(square: Any) -> None:
-    # The third side at half of the feed: 0.05 s up, 0.75 s at 25 mm/s, 0.05 s down instead of 0.4 s.
+    # The third side at half of the feed: 0.05 s up, 0.75 s at 25 mm/s, 0.05 s down instead of 0.4 s in all.
     slow = {
         name: getattr(square.profile, name).copy() for name in ("u0", "u1", "p0", "p1", "value", "duration")
     }

@@ -1,4 +1,4 @@
-"""Time per tool and operation, by hand: subprograms, tool changes, dwells; the sum is the plan's time."""
+"""Time per tool and operation, by hand: subprograms, tool changes, dwells; their sum is the plan's time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import feedplan
 from feedplan import Axis, InputError, Machine, Path
 from feedplan.report.operations import OperationTime, by_tool
 
-# 100 mm/s are reached after 0.1 s and 5 mm, so 20 mm take 0.3 s.
+# 100 mm/s are reached after 0.1 s and 5 mm, so 20 mm from rest to rest take 0.3 s.
 MACHINE = Machine("hand", [Axis(name, 100.0, 1000.0) for name in "XYZ"])
 HEAD = "G21 G90 G61\nF6000\n"
 

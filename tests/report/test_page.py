@@ -96,7 +96,7 @@ def test_a_failed_audit_names_what_is_broken_where(broken_square: Any, tmp_path:
     text = page(broken_square, tmp_path / "report.html")
     assert "Audit FAILED" in text
     assert "1 limit is broken" in text
-    # It may be faster than the bound, which holds for plans within the limits.
+    # Such a plan may be faster than the bound, which holds for plans that keep the limits.
     assert '<dt>Gap to the bound</dt><dd class="short">–<small></small></dd>' in text
     assert "no plan of this path that keeps the limits is faster than" in text
     assert f"<li>{broken_square.verdict.failures[0]}</li>" in text
@@ -186,7 +186,7 @@ def test_source_lines_are_those_of_the_reader_and_curves_have_none(tmp_path: Pat
         lines = (b"G21 G90", b"", b"G1 X10 F6000", b"M2", b"")
         row = '<td class="n">3</td><td class="code"><code>G1 X10 F6000</code></td>'
         assert row in slowest("part.ngc", end.join(lines))
-    # The number of a curve is no line of the file.
+    # Curves are numbered, but their numbers are no lines of the file.
     curves = b'{"feed": 80,\n"curves": [\n{"degree": 1, "control_points": [[0, 0], [10, 0]]}]}\n'
     told = slowest("curves.json", curves)
     assert '<td class="n">1</td>' in told

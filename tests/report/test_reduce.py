@@ -56,7 +56,7 @@ def test_the_mean_of_a_sawtooth_is_its_middle() -> None:
 
 
 def test_the_mean_is_over_x_not_over_samples() -> None:
-    # Nine tenths of the samples are in the first tenth of x, where the value is 1; elsewhere it is 0.
+    # Nine tenths of the samples lie in the first tenth of x, where the value is 1; elsewhere it is 0.
     x = np.concatenate([np.linspace(0.0, 0.1, 900), np.linspace(0.1, 1.0, 101)[1:]])
     curves = Envelope(1000, 2)
     curves.add(x, np.zeros(1000, np.int32), (x <= 0.1).astype(float)[:, None])

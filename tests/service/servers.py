@@ -1,4 +1,4 @@
-"""Starts servers as users do, and checks every answer by the service's own OpenAPI document."""
+"""Starts servers as users do, and checks every answer against the service's own OpenAPI document."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from urllib.parse import quote, urlencode, urlsplit
 from feedplan.client.transport import form
 
 PART = b"G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nG2 X30 Y10 R10\nM2\n"
-# A job that runs long enough for tests to act while it runs, and short enough to wait for.
+# Options of a job that runs long enough to test while it runs, and short enough to wait for.
 LONG = {"machine": "mill", "method": "jerk-limited", "options": '{"accuracy": 1e-5, "time_limit": 60}'}
 ENDED = ("done", "failed", "cancelled")
 
 
 def long_part(seed: int = 0) -> bytes:
-    """A program whose plan by `LONG` takes some seconds."""
+    """A program whose plan with the options `LONG` takes some seconds."""
     rows = [
         f"X{k % 97 + 0.37 * (k % 5) + 1e-3 * seed:.3f} Y{k * 7 % 89 + 0.1 * (k % 3):.3f}" for k in range(4000)
     ]
@@ -47,7 +47,7 @@ class Answer:
 
     @property
     def detail(self) -> str:
-        """The sentence of a problem; checks that it is one."""
+        """The sentence of an answer that reports a problem; asserts that it does."""
         assert self.headers["content-type"] == "application/problem+json"
         problem = self.json
         assert problem["status"] == self.status
@@ -74,7 +74,7 @@ class Server:
         self.start()
 
     def start(self) -> None:
-        """Starts the server, also after an end, and waits until it can be reached."""
+        """Starts the server, perhaps again, and waits until it can be reached."""
         self.process = subprocess.Popen(
             self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
         )
@@ -99,7 +99,7 @@ class Server:
         headers: Mapping[str, str] | None = None,
         query: Any = None,
     ) -> Answer:
-        """Sends a request; the answer must be one that the documentation has."""
+        """Sends a request; asserts that the documentation contains the answer."""
         parts = urlsplit(self.url)
         connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=60)
         try:
@@ -145,14 +145,14 @@ class Server:
         raise AssertionError(f"the job is still {found['state']}")
 
     def planned(self, program: bytes = PART, **fields: str) -> dict[str, Any]:
-        """A job that has ended."""
+        """Submits a program and returns its job when it has ended."""
         answer = self.submit(program, **fields)
         assert answer.status in (200, 202), answer.content
         return self.wait(answer.json["id"])
 
     @property
     def fork_server(self) -> int:
-        """The fork server that starts the processes of jobs."""
+        """The process id of the fork server, which starts the processes of jobs."""
         [own] = [
             child
             for child in _children(self.process.pid)
@@ -162,7 +162,7 @@ class Server:
 
     @property
     def workers(self) -> list[int]:
-        """The processes of the running jobs."""
+        """The process ids of the running jobs."""
         return _children(self.fork_server)
 
     @property
@@ -198,7 +198,7 @@ def _children(process: int) -> list[int]:
 
 @contextmanager
 def running(store: Path, *options: str, token: str | None = None) -> Iterator[Server]:
-    """A server; its messages about defects fail the test."""
+    """A running server; the test fails if it prints messages about defects."""
     server = Server(store, *options, token=token)
     try:
         yield server
@@ -208,7 +208,7 @@ def running(store: Path, *options: str, token: str | None = None) -> Iterator[Se
 
 
 def events_of(server: Server, job: str, last: int | None = None) -> list[tuple[int, str, dict[str, Any]]]:
-    """The number, kind and data of all events of a job, until its end."""
+    """Number, kind and data of all events of a job until its end, after the event `last`."""
     headers = {} if last is None else {"Last-Event-ID": str(last)}
     text = server.send("GET", f"/v1/jobs/{quote(job)}/events", headers=headers).content.decode()
     found = []

@@ -1,4 +1,4 @@
-"""`feedplan.Client` and `--server` of the command line give the same results as without a service."""
+"""`feedplan.Client` and the command line's `--server` give the same results as without a service."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from feedplan.machine.controller import Controller
 from tests.service.servers import PART, Server, long_part
 
 NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
-# Rows that differ by computer, or that a service does not have.
+# Rows that differ between computers, or that a service does not have.
 OWN = ("computing", "files")
 
 
@@ -41,7 +41,7 @@ def part(tmp_path: Path) -> Path:
 def test_the_calls_are_those_of_the_package(name: str, local: Any) -> None:
     def parameters(function: Any) -> list[tuple[str, Any, Any]]:
         known = inspect.signature(function).parameters.values()
-        # A service uses its own cluster.
+        # A service chooses its own cluster.
         others = ("self", "elsewhere")
         return [(own.name, own.kind, own.default) for own in known if own.name not in others]
 
@@ -132,7 +132,7 @@ def test_an_audit_is_the_same_on_axes_of_other_units() -> None:
 
 
 def test_methods_are_compared(client: feedplan.Client, part: Path) -> None:
-    # The machine has no limits of jerk, which one of the methods needs.
+    # The machine has no limits of jerk, but one of the methods needs them.
     mill = feedplan.Machine.load("mill")
     mine = replace(mill, axes=tuple(replace(axis, max_jerk=math.inf) for axis in mill.axes))
     methods = ["bang-bang", "s-curve"]

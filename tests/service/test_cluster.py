@@ -1,4 +1,4 @@
-"""The queue of the service on a Dask cluster: jobs as on this computer, also after losses of the cluster."""
+"""The service's queue on a Dask cluster: jobs run as on one computer, also after losses of the cluster."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_a_job_outlives_its_worker_and_a_server_its_end(
     first, second = (own.submit(medium + b"(%d)\n" % k, **fields).json["id"] for k in range(2))
     read(first)
     cluster.kill_a_worker()
-    # No job is lost when the scheduler is started again, or the server is killed.
+    # No job is lost when the scheduler is restarted or the server is killed.
     cluster.wait_for(2)
     read(second)
     cluster.kill_scheduler()

@@ -1,4 +1,4 @@
-"""The service's documentation: answers agree with the OpenAPI document, the page needs no network."""
+"""The service's documentation: answers agree with the OpenAPI document, and its page needs no network."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ GOOD = {"host": "localhost:8000", "authorization": f"Bearer {TOKEN}"}
 
 
 def asked(headers: dict[str, str], path: str = "/v1/jobs", token: str | None = TOKEN) -> tuple[int, str]:
-    """The status and the sentence of an answer; 299 if the guard lets the request through."""
+    """Status and sentence of the answer; status 299 if the guard lets the request through."""
     sent: list[dict[str, Any]] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:

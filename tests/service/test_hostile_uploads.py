@@ -1,4 +1,4 @@
-"""Damaged requests: each has an answer in one sentence, no file is lost or left, memory is bounded."""
+"""Damaged requests: each gets an answer in one sentence, no file is lost or left over, memory is bounded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.hostile import DRAWING, MACHINE, PATH_FILE, PROGRAM, mutated
 from tests.service.servers import ENDED, Answer, Server
 
 SEEDS = seeds(120)
-# Greatest growth of memory for small requests [bytes].
+# Greatest allowed growth of memory by small requests [bytes].
 GROWTH = 1 << 28
 FIELDS = {
     "machine": MACHINE.decode(),
@@ -67,7 +67,7 @@ REQUESTS: tuple[Callable[[int, random.Random], Request], ...] = (
 
 
 def sent(server: Server, body: bytes, headers: dict[str, str]) -> Answer:
-    """Sends a request again until the queue has room; returns the answer."""
+    """Repeats a request until the queue has room; returns the answer."""
     while True:
         answer = server.send("POST", "/v1/jobs", body, headers)
         if answer.status != 429:

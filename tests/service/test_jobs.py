@@ -1,4 +1,4 @@
-"""Jobs from their request to their results, as clients see them."""
+"""Jobs from the request to the results, as clients see them."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_an_equal_request_is_not_planned_twice(server: Server) -> None:
     ]
     assert {answer.status for answer in others} == {202}
     assert len({answer.json["id"] for answer in others}) == len(others)
-    # The text of a bundled machine is that machine.
+    # The text of a bundled machine is recognised as that machine.
     as_text = server.submit(machine=feedplan.Machine.load("mill").to_toml(), options='{"tolerance": 0.031}')
     assert as_text.json["id"] == first["id"]
 
@@ -319,7 +319,7 @@ def test_jobs_are_cancelled_and_deleted_while_they_run(server: Server) -> None:
     assert server.send("DELETE", f"/v1/jobs/{jobs[1]}").status == 404
     assert server.send("DELETE", f"/v1/jobs/{jobs[2]}").status == 204
     assert server.planned(options='{"tolerance": 0.061}')["state"] == "done", "the workers are free again"
-    # The folder goes when the process of the job has ended, which nobody waits for.
+    # The folder is removed when the process of the job has ended; no request waits for this.
     end = time.monotonic() + 10.0
     while (folder / jobs[1]).exists() and time.monotonic() < end:
         time.sleep(0.05)

@@ -1,4 +1,4 @@
-"""After kill -9 of the server and of its workers at random moments no job is lost or done twice."""
+"""After kill -9 of the server and of workers at random moments no job is lost or done twice."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KILLS = JOBS // 10
 
 
 def program(number: int) -> bytes:
-    """A short program, different for each number; every seventh takes longer."""
+    """A short program, different for each number; every seventh is longer."""
     rows = "".join(f"X{k % 23}.{number % 10} Y{k % 17}\n" for k in range(300 if number % 7 == 0 else 5))
     return b"(%d)\n" % number + PART.replace(b"M2\n", b"") + f"G1\n{rows}M2\n".encode()
 
@@ -32,7 +32,7 @@ def kill(process: int) -> None:
 
 
 def sent(server: Server, number: int) -> Answer | None:
-    """The answer to a request, None if the server ended before it."""
+    """The answer to a request; None if the server ended before it answered."""
     try:
         return server.submit(program(number), key=f"key-{number}")
     except (OSError, ValueError):
@@ -61,7 +61,7 @@ def test_no_job_is_lost_or_done_twice(tmp_path: Path) -> None:
                 for worker in server.workers[:1]:
                     kills["worker"] += 1
                     kill(worker)
-        if number == 2:  # an orderly end
+        if number == 2:  # once, the server ends in order
             assert server.end() == ""
             server.start()
         answer = sent(server, number)
@@ -71,7 +71,7 @@ def test_no_job_is_lost_or_done_twice(tmp_path: Path) -> None:
         assert answer.status in (200, 202)
         job = answer.json["id"]
         assert accepted.setdefault(number, job) == job
-    # The server ends once more while jobs wait and run; the next server does the rest.
+    # The server is killed once more while jobs wait and run; the next server completes them.
     kill(server.process.pid)
     server.process.communicate()
     server.start()
@@ -99,7 +99,7 @@ def test_no_job_is_lost_or_done_twice(tmp_path: Path) -> None:
 
 
 def require_whole(server: Server, done: dict[str, Any], text: bytes) -> None:
-    """Checks that the job was planned once, and has the plan of its own program."""
+    """Asserts that the job was planned once and has the plan of its own program."""
     assert done["state"] == "done", done
     states = [data["state"] for _, kind, data in events_of(server, done["id"]) if kind == "state"]
     assert states.count("done") == 1

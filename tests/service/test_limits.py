@@ -1,4 +1,4 @@
-"""Every limit is enforced, and the error has its name, its value and a remedy."""
+"""Every limit is enforced; the error names the limit, its value and a remedy."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def named(problem: Any) -> tuple[str, float]:
-    """The limit of a problem; checks that the sentence names it and that there is a remedy."""
+    """Name and value of the limit in a problem; asserts that the sentence names it and has a remedy."""
     limit = problem["limit"]
     assert re.search(rf"\b{limit['name']}\b", problem["detail"])
     assert problem["remedy"]
@@ -52,7 +52,7 @@ def named(problem: Any) -> tuple[str, float]:
 def test_size_of_a_request(small: Server) -> None:
     answer = small.submit(b"(" + b"x" * BIG + b")\n")
     assert (answer.status, named(answer.json)) == (413, ("max_upload", 0.2))
-    # Without Content-Length the request is refused when it exceeds the limit.
+    # Without Content-Length the request is refused as soon as it exceeds the limit.
     parts = urlsplit(small.url)
     with socket.create_connection((parts.hostname, parts.port)) as line:
         head = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
@@ -67,7 +67,7 @@ def test_size_of_a_request(small: Server) -> None:
 
 
 def test_the_client_tells_why_a_program_is_refused_before_it_has_arrived(small: Server) -> None:
-    # So much that it is still being sent when the answer comes.
+    # The program is so long that it is still being sent when the answer arrives.
     program = b"(" + b"x" * 30_000_000 + b")\n"
     with pytest.raises(feedplan.InputError, match="which is max_upload: split the program"):
         feedplan.Client(small.url).plan(program, "mill")
@@ -100,7 +100,7 @@ def test_lines_and_moves_and_setpoints(small: Server) -> None:
 
 
 def test_time_of_a_job(small: Server) -> None:
-    # With `time_limit` it would be refused for its many setpoints before the time is over.
+    # With a `time_limit` the job would be refused for too many setpoints before its time is over.
     done = small.planned(long_part(), **LONG | {"options": '{"accuracy": 1e-5}'})
     assert done["state"] == "failed"
     assert named(done["problem"]) == ("max_time", 1.5)
@@ -131,7 +131,7 @@ def test_memory_of_a_job_and_size_of_all(tmp_path: Path) -> None:
 
 
 def test_results_beyond_the_size_of_all_jobs_are_not_kept(tmp_path: Path) -> None:
-    # A report alone is greater than a megabyte.
+    # The report alone is larger than a megabyte.
     with running(tmp_path, "--max-disk", "2.5") as server:
         assert server.planned()["state"] == "done"
         second = server.planned(options='{"tolerance": 0.03}')
@@ -140,7 +140,7 @@ def test_results_beyond_the_size_of_all_jobs_are_not_kept(tmp_path: Path) -> Non
         assert second["problem"]["status"] == 507
         kept = sum(file.stat().st_size for file in (tmp_path / "jobs").rglob("*") if file.is_file())
         assert kept < 2.5e6
-        # There is room for requests, and for another result in place of the first.
+        # There is room for requests, and for another result instead of the first.
         first = server.get("/v1/jobs").json["jobs"][-1]
         server.send("DELETE", f"/v1/jobs/{first['id']}")
         assert server.planned(options='{"tolerance": 0.03}')["state"] == "done"

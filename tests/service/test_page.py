@@ -51,7 +51,7 @@ def _with_token(folder: Path) -> tuple[str, str]:
 
 
 def _used(address: str, program: Path, folder: Path, *token: str) -> dict[str, Any]:
-    """The facts that the script of the user has collected."""
+    """The facts that the script with the user's actions has collected."""
     command = ["node", str(ROOT / "page" / "test" / "page.mjs"), address, str(program), str(folder), *token]
     done = subprocess.run(
         command, env={**os.environ, "CHROMIUM": str(CHROMIUM)}, capture_output=True, text=True, check=False
@@ -80,7 +80,7 @@ def facts(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, A
 def test_the_token_is_asked_for_once_and_sent_as_a_header_to_the_service_only(
     facts: dict[str, Any],
 ) -> None:
-    # The browser reports two refusals of the service: the missing token, and a wrong limit.
+    # The browser reports two refusals by the service: the missing token, and a wrong limit.
     assert [error for error in facts["errors"] if "401" not in error and "422" not in error] == []
     assert facts["machines"] > 10
     addresses = [one for one in facts["requests"] if not one["url"].startswith(("data:", "blob:"))]
@@ -262,14 +262,14 @@ def test_the_legend_of_a_report_leaves_the_limits_readable(
         assert seen["drawn"]
         assert [head["text"] for head in seen["heads"] if head["covered"]] == []
         assert seen["heads"][1]["text"].endswith(f"limits {limits}")
-        # Both charts of the speed tell its unit, and that they are cut.
+        # Both speed charts show their unit, and that they are cut at the top.
         assert re.fullmatch(r"speed \[mm/s\]  rapids up to \d+\.\d mm/s run out of the chart", seen["length"])
         assert seen["heads"][0]["text"] == seen["length"]
 
 
 @in_a_browser
 def test_the_legend_of_many_setpoints_leaves_the_limits_readable(tmp_path: Path) -> None:
-    """Curves of more setpoints than the chart has pixels are means with ranges, and the legend says so."""
+    """Curves with more setpoints than pixels are drawn as means with ranges, and the legend says so."""
     steps = "\n".join(f"X{k % 2} Y{0.01 * k:.2f} Z{0.1 * (k % 3):.1f}" for k in range(3000))
     program = f"G21 G90 G64 P0.05\nG1 F3000\n{steps}\nM2\n"
     feedplan.write_plan(feedplan.plan(program, "mill"), tmp_path, formats=[])

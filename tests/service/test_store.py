@@ -1,4 +1,4 @@
-"""The store after the end of a server at any moment."""
+"""The store is consistent after the server ended at any moment."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_running_job_of_a_server_that_ended_waits_again(tmp_path: Path) -> Non
     again = store.claim()
     assert again is not None
     assert (again["id"], again["attempt"]) == (first["id"], 2)
-    # Progress of the first attempt, from a process that was left over, is ignored.
+    # Progress that a surviving process of the first attempt reports is ignored.
     store.progress(running, "write", 1.0, 1.0)
     store.finish(running, "done", result={"time": 2.0}, problem=None)
     assert store.job(first["id"])["state"] == "running"

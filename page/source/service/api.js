@@ -4,7 +4,7 @@ import { element } from "../parts.js";
 
 const KEPT = "feedplan-token";
 
-/* A refusal of the service, in its own sentence; `line` is the line of the program. */
+/* A refusal by the service, with its sentence; `line` is a line of the program or null. */
 export class Refused extends Error {
   constructor(problem) {
     super(problem.detail ?? problem.title ?? "the service gave no answer");
@@ -12,12 +12,12 @@ export class Refused extends Error {
   }
 }
 
-/* The answer to a request; asks the user for the token if it is missing. Raises Refused. */
+/* The answer to a request; asks the user for the token if it is missing or wrong. Raises Refused. */
 export async function request(address, options = {}) {
   for (;;) {
     const token = sessionStorage.getItem(KEPT);
     const headers = { ...options.headers, ...(token ? { Authorization: `Bearer ${token}` } : {}) };
-    // Without credentials the browser does not open its own window for a password.
+    // With "omit" the browser does not open its own window for a password.
     const answer = await fetch(address, { ...options, headers, credentials: "omit" });
     if (answer.status === 401) {
       await askToken(Boolean(token));
@@ -30,7 +30,7 @@ export async function request(address, options = {}) {
 
 export const json = async (address, options) => (await request(address, options)).json();
 
-/* Saves the answer of an address as a file. */
+/* Saves the answer to a GET request as a file. */
 export async function download(address, name) {
   const url = URL.createObjectURL(await (await request(address)).blob());
   const link = element("a");
@@ -41,7 +41,7 @@ export async function download(address, name) {
 
 let asking = null;
 
-/* Requests that need the token at the same time share one question. */
+/* Asks the user for the token; requests that need it at the same time share one dialog. */
 function askToken(wasWrong) {
   asking ??= new Promise((resolve) => {
     const dialog = element("dialog");

@@ -1,4 +1,4 @@
-/* The page of the service: takes a program, has it planned, and shows and compares plans. */
+/* The page of the service: accepts a program, has it planned, and shows and compares plans. */
 
 import "./service.css";
 

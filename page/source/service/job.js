@@ -12,7 +12,7 @@ export async function planned(order, { onProgress, signal } = {}) {
   form.append("machine", order.machine);
   form.append("method", order.method);
   form.append("options", JSON.stringify(order.options));
-  // The request itself is not aborted: its job may be accepted already, and only the answer has its name.
+  // The request itself is not aborted: the job may be accepted already, and only the answer has its id.
   const job = await json("/v1/jobs", { method: "POST", body: form });
   try {
     signal?.throwIfAborted();
@@ -27,8 +27,8 @@ export async function planned(order, { onProgress, signal } = {}) {
   return opened(job.id, order);
 }
 
-/* A job that is done: { job, summary (plan.json), data (of the drawing), run, order }. Raises Refused with the
-   reason of a failed job. */
+/* The result of a job: { job, summary (plan.json), data (of the drawing), run, order }. Raises Refused with the
+   reason if the job has failed. */
 export async function opened(id, order = null) {
   const job = await json(`/v1/jobs/${id}`);
   if (job.problem) throw new Refused(job.problem);

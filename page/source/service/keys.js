@@ -2,7 +2,7 @@
 
 import { PathView } from "../path_view.js";
 
-const FEW = 0.002, MANY = 0.02; // steps over the whole time
+const FEW = 0.002, MANY = 0.02; // steps as shares of the whole time
 
 export function keys(result, help) {
   const { cursor, player, path } = result;

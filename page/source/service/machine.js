@@ -1,4 +1,4 @@
-/* The machine that a program is planned on: chosen by name, and edited as a table of limits or as a file. */
+/* The machine for planning: chosen by name, and edited as a table of limits or as a file. */
 
 import { numbersIn } from "../numbers.js";
 import { element } from "../parts.js";
@@ -14,7 +14,7 @@ export class MachineChoice {
   #info = null; // the service's description of the machine; null if none is chosen
   #wait = 0;
 
-  /* `told` is the element for errors in an edited machine. */
+  /* `told` is the element that shows errors in an edited machine. */
   constructor(select, table, text, told) {
     Object.assign(this, { select, table, text, told });
     select.addEventListener("change", () => this.#choose());
@@ -36,7 +36,7 @@ export class MachineChoice {
     this.#choose();
   }
 
-  /* The machine in a request: a name, or the text of a machine file. */
+  /* The machine as requests name it: a name, or the text of a machine file. */
   get order() {
     return this.#text ?? this.select.value;
   }
@@ -63,7 +63,7 @@ export class MachineChoice {
     this.#fill();
   }
 
-  /* Shows that the machine is not one of the bundled ones. */
+  /* Sets the text of a machine file, and shows that the machine is not one of the bundled ones. */
   #edited(text) {
     this.#text = text;
     if (!this.select.querySelector(`[value=${EDITED}]`)) this.select.append(new Option(EDITED, EDITED));

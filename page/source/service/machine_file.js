@@ -11,7 +11,7 @@ export function described(machine, limits = {}) {
   return json("/v1/machines", { method: "POST", body, headers: { "Content-Type": "application/json" } });
 }
 
-/* A limit as text: empty without a limit, two numbers if the directions differ. */
+/* A limit as text: empty if there is none, two numbers if the directions differ. */
 export const written = (limit) => (limit === null ? "" : [limit].flat().join(", "));
 
 /* A limit times a factor, in both directions. */

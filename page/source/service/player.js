@@ -4,7 +4,7 @@ import { clock } from "../numbers.js";
 import { element } from "../parts.js";
 
 const PACES = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30, 100, 300];
-const STEPS = 4000; // steps of the slider
+const STEPS = 4000; // number of positions of the slider
 
 export class Player {
   #frame = 0;

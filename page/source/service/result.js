@@ -1,4 +1,4 @@
-/* Shows a plan (figures, tool path, player, speed, axes, slow lines, source), and another plan beside it. */
+/* Shows a plan (figures, tool path, player, speed, axes, slow lines, source), and another plan for comparison. */
 
 import { AxesPlot } from "../axes_plot.js";
 import { Cursor } from "../cursor.js";
@@ -15,7 +15,7 @@ const FORMATS = ["npz", "csv", "parquet", "json", "halstreamer", "npz-compressed
 const ENDINGS = { "npz-compressed": "npz", halstreamer: "halstream" };
 
 export class Result {
-  /* `at(id)` gives an element of the page. */
+  /* `at(id)` returns an element of the page. */
   constructor(at) {
     this.at = at;
     this.cursor = new Cursor();
@@ -74,7 +74,7 @@ export class Result {
     this.#follow(this.cursor.time);
   }
 
-  /* Sets the cursor to the begin of a source line. */
+  /* Sets the cursor to the time at which a source line begins. */
   goTo(line) {
     const time = this.plan.run.timeOfLine(line);
     this.source.choose(line);

@@ -3,15 +3,15 @@
 import { element } from "../parts.js";
 
 const ROW = 19; // height of a line in pixels
-const LINES = 1 << 17; // lines found between two reactions to the user
-const MOST = 12_000_000; // greatest height in pixels that a browser can scroll
+const LINES = 1 << 17; // lines that are found between two reactions to the user
+const MOST = 12_000_000; // greatest height that browsers can scroll, in pixels
 
 export class SourceText {
   #bytes = new Uint8Array(0);
   #starts = [0];
   #chosen = 0;
 
-  /* `onLine(number)` is called with the line that was clicked. */
+  /* `onLine(number)` gets the number of the line that was clicked. */
   constructor(container, onLine) {
     this.container = container;
     this.room = container.appendChild(element("div", "room"));
@@ -24,7 +24,7 @@ export class SourceText {
     new ResizeObserver(() => this.#draw()).observe(container);
   }
 
-  /* Shows a program (a Blob); without `hasLines` no line of it is marked. */
+  /* Shows a program (a Blob); if `hasLines` is false, no line is ever marked. */
   async show(blob, hasLines = true) {
     this.hasLines = hasLines;
     const bytes = new Uint8Array(await blob.arrayBuffer()), starts = [0];

@@ -1,5 +1,5 @@
-/* Chooses what a plan is compared with: a controller of today or another method. The settings of a controller are
-   those of the machine file if it names this controller, else the controller's defaults; each can be changed. */
+/* Chooses what a plan is compared with: a controller of today or another method. The settings of a controller come
+   from the machine file if it names this controller, else they are the controller's defaults; each can be changed. */
 
 import { numbersIn } from "../numbers.js";
 import { element } from "../parts.js";
@@ -13,7 +13,7 @@ export class Today {
   #methods = [];
   #plan = null;
   #own = null; // the controller of the machine file
-  #given = {}; // parameters that were changed here
+  #given = {}; // parameters that the user has changed here
 
   /* `onChoice()` is called when the choice or a setting has changed. */
   constructor(select, table, onChoice) {
@@ -36,7 +36,7 @@ export class Today {
     this.#methods = methods.map(({ name }) => name);
   }
 
-  /* Takes a plan; nothing is chosen. */
+  /* Sets the plan to compare; nothing is chosen yet. */
   async show(plan) {
     this.#plan = plan;
     this.#own = null;
@@ -54,7 +54,7 @@ export class Today {
     this.#fill();
   }
 
-  /* The chosen plan to make, { order, words }; null if nothing is chosen. */
+  /* The plan to make for the comparison, { order, words }; null if nothing is chosen. */
   get order() {
     const { order } = this.#plan, name = this.select.value;
     if (!name) return null;

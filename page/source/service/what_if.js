@@ -5,7 +5,7 @@ import { element } from "../parts.js";
 import { planned } from "./job.js";
 import { LIMITS, described, scaled } from "./machine_file.js";
 
-const PAUSE = 120; // time for which a slider must rest before planning [ms]
+const PAUSE = 120; // time that a slider must rest before planning starts [ms]
 
 /* The factor at a position of a slider, from 1/4 to 4; 1 (as planned) at position 0. */
 const factorAt = (position) => 2 ** (position / 50);
@@ -47,7 +47,7 @@ export class WhatIf {
     this.back.addEventListener("click", () => this.reset());
   }
 
-  /* Takes the plan to change. */
+  /* Sets the plan that the sliders change. */
   async show(plan) {
     this.#base = plan;
     this.quiet();
@@ -95,7 +95,7 @@ export class WhatIf {
     this.#soon(PAUSE);
   }
 
-  /* Plans with the changes after `wait` ms. */
+  /* Plans with the changes after `pause` ms. */
   #soon(pause) {
     clearTimeout(this.#wait);
     if (this.#isDue) this.#wait = setTimeout(() => this.#plan(), pause);

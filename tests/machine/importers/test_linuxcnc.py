@@ -1,4 +1,4 @@
-"""INI files of LinuxCNC become machines: units, includes, gantries, and what LinuxCNC's own reader reads."""
+"""INI files of LinuxCNC become machines: units, includes, gantries, agreement with LinuxCNC's reader."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def limits(machine: Machine) -> dict[str, tuple[object, ...]]:
 
 
 def test_a_setting_that_a_later_one_contradicts_is_told(tmp_path: Path) -> None:
-    """LinuxCNC takes the first as well, and people look at the last."""
+    """LinuxCNC uses the first of two values too, but people tend to look at the last."""
     again = "[JOINT_0]\nMAX_VELOCITY = 300.0\nMAX_LIMIT = 9.5\n[DISPLAY]\nCYCLE = 1\nCYCLE = 2\n"
     found = find_machine(ini(MILL + again, tmp_path))
     assert found.warnings == (

@@ -103,7 +103,7 @@ def test_controllers_bring_the_parameters_of_their_models(tmp_path: Path) -> Non
     parameters = {"junction_deviation": 0.01, "arc_tolerance": 0.004, "planner_blocks": 60}
     assert hal.controller is not None
     assert (hal.controller.name, hal.controller.parameters) == ("grblhal", parameters)
-    # A deviation of 0, an exact stop, is none that the model knows.
+    # A junction deviation of 0 means exact stops, which are no value of this parameter of the model.
     stops = import_machine(file(GRBL + "\n$11=0\n", tmp_path, "stops.txt"))
     assert stops.controller is not None
     assert "junction_deviation" not in stops.controller.parameters

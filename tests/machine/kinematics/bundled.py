@@ -1,4 +1,4 @@
-"""Every bundled machine with the tips it can reach without being singular."""
+"""Kinematics of every bundled machine, and random tips that it reaches without being singular."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from feedplan.machine.rotary import RotaryChain, ToolVector
 
 
 def all_kinematics() -> dict[str, Kinematics]:
-    """One of every bundled machine, and each five-axis machine programmed by tool direction, both poses."""
+    """Kinematics of every bundled machine; five-axis ones also programmed by tool direction, both poses."""
     found = {name: Machine.load(name).inverse for name in bundled_machines()}
     for name, kinematics in list(found.items()):
         if isinstance(kinematics, RotaryChain) and len(kinematics.joint_names) == 5:
@@ -22,7 +22,7 @@ def all_kinematics() -> dict[str, Kinematics]:
 
 
 def random_tips(kinematics: Kinematics, count: int, seed: int) -> NDArray[np.float64]:
-    """Tips (count, axes) at X, Y from 20 to 150 mm: off every axis of the bundled machines."""
+    """Tips (count, axes) at X, Y from 20 to 150 mm, away from every axis of the bundled machines."""
     generator = np.random.default_rng(seed)
     tips = generator.uniform(20.0, 150.0, size=(count, len(kinematics.tip_names)))
     for column, name in enumerate(kinematics.tip_names):

@@ -1,4 +1,4 @@
-"""Kinematics in machine files: every type builds, users add theirs, what is wrong is one sentence."""
+"""Kinematics in machine files: every type builds, users can add types, and errors are one sentence."""
 
 from __future__ import annotations
 
