@@ -29,9 +29,7 @@ def bernstein(powers: Array) -> Array:
     return np.array([sum(comb(i, j) / comb(n, j) * powers[j] for j in range(i + 1)) for i in range(n + 1)])
 
 
-def with_cusp(
-    order: int, place: float, direction: Array, bend: Array | None = None, power: int = 1
-) -> CompositeCurve:
+def with_cusp(order: int, place: float, direction: Array, bend: Array | None = None) -> CompositeCurve:
     """The curve with C' = (t − place)^order (direction + bend (t − place))."""
     factor = np.polynomial.Polynomial([-place, 1.0])
     rates = [factor**order * x for x in direction]
