@@ -22,7 +22,7 @@
 mod chain_rule;
 mod shape;
 
-use crate::path_problem::Limits as AxisLimits;
+pub use crate::path_problem::Limits as AxisLimits;
 use crate::s_curve::Limits;
 use feedplan_planner::problem::{greater, Fault};
 pub use shape::{bounded, bounded_until, sampled, Curve, Shape};
