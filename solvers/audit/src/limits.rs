@@ -1,6 +1,7 @@
 //! The limits of the machine and of the path that hold at all places.
 
-use super::{vectors, PASS_EXCESS};
+use super::tolerance::PASS_EXCESS;
+use super::vectors;
 
 /// Number of speeds that a feed can limit: along X, Y, Z; along U, V, W; of all other axes; and of all axes together.
 pub const FEEDS: usize = 4;

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::Tally;
+use super::tally::Tally;
 
 /// Progress callback: gets the number of phases, pieces or moves checked since its last call. It may stop the audit by a panic.
 pub type Seen<'a> = &'a (dyn Fn(usize) + Sync);

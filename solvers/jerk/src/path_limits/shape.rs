@@ -183,17 +183,17 @@ impl<const M: usize> Part<M> {
         let joints = velocities(curve.joints, curve.weight, d.as_ref());
         let tip = curve.tip.map(|tip| velocities(tip, curve.weight, d.as_ref()));
         let path: &[Velocity] = tip.as_ref().map_or(&joints, |tip| tip);
-        let (mut q, mut size) = (Function::constant(0.0), 0.0);
+        let (mut q, mut error) = (Function::constant(0.0), 0.0);
         for v in path {
             q = q.combine(1.0, &v.g.multiply(&v.g), 1.0);
-            size += v.terms.range().1.powi(2);
+            error += ROUNDINGS * v.size().powi(2) + v.error * (2.0 * v.size() + v.error);
         }
-        let q = Rounded { function: q, error: ROUNDINGS * size };
+        let q = Rounded { function: q, error };
         let weight = d.map(|function| Rounded { function, error: ROUNDINGS * function.range().1 });
         Self {
             joints: joints.map(|v| {
                 let n = v.bend(path);
-                let x = Rounded { function: v.g, error: ROUNDINGS * v.terms.range().1 };
+                let x = Rounded { function: v.g, error: v.rounding() };
                 Terms { x, n, n_rate: n.derivative() }
             }),
             tip: tip.map(|tip| tip.map(|v| v.bend(path))),
@@ -270,47 +270,73 @@ impl<const M: usize> Part<M> {
     }
 }
 
-/// G of a coordinate, and the absolute values of the terms that it is the sum of.
+/// G of a coordinate.
 #[derive(Clone, Copy)]
 struct Velocity {
     g: Function,
+    /// The sums of the absolute values of the terms of each coefficient.
     terms: Function,
+    /// The error of the coefficients because the coordinates were moved.
+    error: f64,
 }
 
 impl Velocity {
+    /// The greatest coefficient of `terms`.
+    fn size(&self) -> f64 {
+        self.terms.range().1
+    }
+
+    /// The error of X.
+    fn rounding(&self) -> f64 {
+        ROUNDINGS * self.size() + self.error
+    }
+
     /// N of this coordinate, for a tool path with these velocities.
     fn bend(&self, path: &[Self]) -> Rounded {
         let (mut n, mut terms) = (Function::constant(0.0), Function::constant(0.0));
+        let mut error = 0.0;
         for other in path {
             let degree = self.g.degree().max(other.g.degree());
             let lift = |p: &Function| p.elevate(degree);
             n = n.combine(1.0, &other.g.multiply(&lift(&self.g).wronskian(&lift(&other.g))), 1.0);
             let size = lift(&self.terms).wronskian_magnitude(&lift(&other.terms));
             terms = terms.combine(1.0, &other.terms.multiply(&size), 1.0);
+            // A Wronskian of a and b is at most 4 · degree · |a| |b|; so much (a + δa) (b + δb)² is more than a b².
+            let [(a, da), (b, db)] = [self, other].map(|v| (v.size(), v.error));
+            error += 4.0 * degree as f64 * ((a + da) * (2.0 * b + db) * db + b * b * da);
         }
-        Rounded { function: n, error: ROUNDINGS * terms.range().1 }
+        Rounded { function: n, error: ROUNDINGS * terms.range().1 + error }
     }
 }
 
-/// G of every coordinate. The coordinates are moved to begin at 0, which keeps their differences exact.
+/// G of every coordinate. The coordinates are moved to begin at 0, which keeps their differences nearly exact.
 fn velocities<const K: usize>(control: &[[f64; K]], weight: &[f64], d: Option<&Function>) -> [Velocity; K] {
     std::array::from_fn(|k| {
         let moved = |i: usize| control[i][k] - control[0][k];
         let weighted = |i: usize| moved(i) * weight.get(i).copied().unwrap_or(1.0);
         let n = Function::from_bernstein((0..control.len()).map(weighted));
+        let lost = |i: usize| rounding_of_difference(control[i][k], control[0][k]);
+        let lost = (0..control.len()).map(lost).fold(0.0, f64::max);
+        let degree = n.degree() as f64;
         match d {
             None => {
-                let size = |i: usize| control[i][k].abs().max(control[0][k].abs());
-                let most = (0..control.len()).map(size).fold(0.0, f64::max);
-                // Moving a coordinate has a rounding error of less than a unit in the last place of the greatest coordinate.
                 let g = n.derivative();
-                let margin = 2.0 * n.degree() as f64 * most * f64::EPSILON / ROUNDINGS;
-                let terms = g.magnitude().combine(1.0, &Function::constant(margin).elevate(g.degree()), 1.0);
-                Velocity { g, terms }
+                Velocity { g, terms: g.magnitude(), error: 2.0 * degree * lost }
             }
-            Some(d) => Velocity { g: n.wronskian(d), terms: n.wronskian_magnitude(d) },
+            Some(d) => {
+                let most = d.range().1;
+                let error = 4.0 * degree * most * most * lost;
+                Velocity { g: n.wronskian(d), terms: n.wronskian_magnitude(d), error }
+            }
         }
     })
+}
+
+/// The absolute value of the rounding error of a − b, which is a number too (Dekker 1971).
+fn rounding_of_difference(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    let back = difference - a;
+    ((a - (difference - back)) - (b + back)).abs()
 }
 
 /// Length of the control polygon.
