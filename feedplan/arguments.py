@@ -24,6 +24,8 @@ _LONGEST = 60
 
 def shown(value: object) -> str:
     """A text for any value, on one short line."""
+    if type(value).__module__ == "numpy" and getattr(value, "shape", None) == ():
+        value = value.item()  # type: ignore[attr-defined]  # without the name of its type
     try:
         text = " ".join(_SHOWN.repr(value).split())
     except ValueError:  # Python prints no integer of more than 4300 digits

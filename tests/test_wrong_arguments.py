@@ -320,6 +320,11 @@ def test_a_sentence_is_one_line_and_loses_its_middle_where_it_is_long() -> None:
     assert path in str(feedplan.InputError(f"{path} is missing: write it"))
 
 
+def test_a_number_of_numpy_is_shown_as_a_number() -> None:
+    with pytest.raises(FeedplanError, match=r"^axis X: max_jerk is 0\.001: give a number from"):
+        Axis("X", 100.0, 1000.0, max_jerk=np.float64(1e-3))
+
+
 def test_a_period_of_zero_is_refused_and_not_the_machines() -> None:
     with pytest.raises(feedplan.InputError, match="the period is 0 s: give a positive number"):
         feedplan.plan(PROGRAM, "mill").setpoints(0)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from feedplan import Axis, Machine, Path, Plan, plan
 from feedplan.curves.composite import CompositeCurve
+from feedplan.machine.axis import JERK_TIMES
 from tests.campaign import seeds
 
 Array = NDArray[np.float64]
@@ -66,6 +67,8 @@ def random_case(seed: int) -> tuple[Path, Machine]:
     letters = "XYZ"[: curve.axes]
     limits = 10 ** np.array([rng.uniform(*span) for span in ((1.5, 2.7), (2.5, 4.0), (3.5, 6.0))])
     own = spread ** rng.uniform(-1.0, 1.0, (len(letters), 3)) * limits
+    # A machine takes no jerk that needs longer to reach the acceleration.
+    own[:, 2] = np.maximum(own[:, 2], 1.001 * own[:, 1] / JERK_TIMES[1])
     axes = tuple(Axis(k, *row[:2], max_jerk=row[2]) for k, row in zip(letters, own, strict=True))
     path = Path.from_curve(curve, axes=tuple(letters), feed=10 ** rng.uniform(0.5, 3.0))
     return path, Machine("random", axes, period=PERIODS[seed // 4 % 4])
