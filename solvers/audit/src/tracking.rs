@@ -246,7 +246,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         };
         let place = found.place;
         let [step, next_step] = self.steps(from, place, known.map_or(0.0, |before| before.nearest.step));
-        // Off the path the distance is what is wrong: no time is known there.
+        // The time error of a place off the path is unknown; only its distance is judged.
         let late = if found.distance > close && found.error.is_infinite() { 0.0 } else { found.error };
         let (off, bend) = (found.distance - rounding, self.columns().curve(place.piece).bounds()[0]);
         let mut nearest =

@@ -258,7 +258,7 @@ impl<const M: usize> Part<M> {
         bound: &mut Shape<M>,
     ) {
         let all = self.map(Rounded::range);
-        // With their errors: where these are much of a bound, shorter parts make it no closer.
+        // The values at the middle include their errors: if an error dominates a bound, halving the part cannot tighten it.
         seen.include(&self.map(Rounded::middle));
         if depth == MAX_DEPTH || is_met(&all, seen) {
             bound.include(&all);
@@ -301,7 +301,7 @@ impl Velocity {
             n = n.combine(1.0, &other.g.multiply(&lift(&self.g).wronskian(&lift(&other.g))), 1.0);
             let size = lift(&self.terms).wronskian_magnitude(&lift(&other.terms));
             terms = terms.combine(1.0, &other.terms.multiply(&size), 1.0);
-            // A Wronskian of a and b is at most 4 · degree · |a| |b|; so much (a + δa) (b + δb)² is more than a b².
+            // |W(a, b)| ≤ 4 · degree · |a| |b| for a Wronskian W. The factor below is (a + δa) (b + δb)² − a b².
             let [(a, da), (b, db)] = [self, other].map(|v| (v.size(), v.error));
             error += 4.0 * degree as f64 * ((a + da) * (2.0 * b + db) * db + b * b * da);
         }
@@ -332,7 +332,7 @@ fn velocities<const K: usize>(control: &[[f64; K]], weight: &[f64], d: Option<&F
     })
 }
 
-/// The absolute value of the rounding error of a − b, which is a number too (Dekker 1971).
+/// The absolute value of the rounding error of a − b, computed exactly (Dekker 1971).
 fn rounding_of_difference(a: f64, b: f64) -> f64 {
     let difference = a - b;
     let back = difference - a;
