@@ -183,18 +183,18 @@ impl<const C: usize> Polynomial<C> {
         Self { n: self.n, c }
     }
 
-    #[inline(always)]
+    #[inline]
     pub fn scale(&self, factor: f64) -> Self {
         self.map(|value| factor * value)
     }
 
     /// The polynomial with the absolute value of each coefficient.
-    #[inline(always)]
+    #[inline]
     pub fn magnitude(&self) -> Self {
         self.map(f64::abs)
     }
 
-    #[inline(always)]
+    #[inline]
     pub fn multiply(&self, other: &Self) -> Self {
         let (short, long) = if self.n <= other.n { (self, other) } else { (other, self) };
         if short.n == 0 {
@@ -227,7 +227,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// The same polynomial as one of degree `n`.
-    #[inline(always)]
+    #[inline]
     pub fn elevate(&self, n: usize) -> Self {
         let mut c = self.c;
         if self.n == 0 {
@@ -247,7 +247,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// a p + b q.
-    #[inline(always)]
+    #[inline]
     pub fn combine(&self, a: f64, other: &Self, b: f64) -> Self {
         if self.n == other.n {
             self.sum(a, other, b)
@@ -259,7 +259,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// a p + b q of one degree.
-    #[inline(always)]
+    #[inline]
     fn sum(&self, a: f64, other: &Self, b: f64) -> Self {
         let mut c = [0.0; C];
         for i in 0..self.width() {
@@ -273,7 +273,7 @@ impl<const C: usize> Polynomial<C> {
         Self::padded_len(self.n)
     }
 
-    #[inline(always)]
+    #[inline]
     pub fn derivative(&self) -> Self {
         let mut c = [0.0; C];
         if self.n == 0 {
@@ -286,7 +286,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// p' q − p q' of two polynomials of one degree; its degree is 2 n − 2.
-    #[inline(always)]
+    #[inline]
     pub fn wronskian(&self, other: &Self) -> Self {
         let n = self.n;
         debug_assert_eq!(n, other.n);
@@ -324,7 +324,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// The m of degree `degree` with m' w − m w' = p and m(0) = 0, so that (m/w)' = p/w².
-    #[inline(always)]
+    #[inline]
     pub fn antiderivative(&self, weight: &Self, degree: usize) -> Self {
         let mut c = [0.0; C];
         if weight.n == 0 {
@@ -340,7 +340,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// The polynomial without its known root of order `r` at 0.
-    #[inline(always)]
+    #[inline]
     pub fn deflate(&self, r: usize) -> Self {
         let r = r.min(self.n);
         let mut c = [0.0; C];
@@ -349,7 +349,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// p(1 − x).
-    #[inline(always)]
+    #[inline]
     pub fn reverse(&self) -> Self {
         let mut c = self.c;
         match self.n {
@@ -386,7 +386,7 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// Whether no Bernstein coefficient, and so no value, is below `least`.
-    #[inline(always)]
+    #[inline]
     pub fn is_above(&self, least: f64) -> bool {
         self.coefficients().iter().zip(&BINOMIALS[self.n]).all(|(&value, binomial)| value >= least * binomial)
     }

@@ -8,7 +8,7 @@ const MAX_DEPTH: u32 = 52;
 
 impl<const C: usize> Polynomial<C> {
     /// The first x in [0, 1] after which the polynomial is negative; 0 if it starts negative, None if it is nowhere negative.
-    #[inline(always)]
+    #[inline]
     pub fn first_root(&self) -> Option<f64> {
         let (before, after) =
             self.coefficients().split_at(self.coefficients().iter().position(|&c| c < 0.0)?);
@@ -65,7 +65,7 @@ struct Interval<const C: usize> {
 }
 
 impl<const C: usize> Interval<C> {
-    #[inline(always)]
+    #[inline]
     fn whole(p: &Polynomial<C>) -> Self {
         Self { p: *p, size: p.magnitude(), noise: 0.0, from: 0.0, to: 1.0, depth: 0 }
     }
