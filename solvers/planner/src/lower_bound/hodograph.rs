@@ -55,7 +55,7 @@ pub struct Distances<const M: usize> {
 
 impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     /// From control points and weights (all equal, or empty: polynomial).
-    #[inline(always)]
+    #[inline]
     pub fn new(control: &[[f64; M]], weights: &[f64]) -> Self {
         let d = control.len() - 1;
         let mut this = Self {
@@ -112,7 +112,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         self.count > 0
     }
 
-    #[inline(always)]
+    #[inline]
     pub fn station(&self, t: f64) -> Station<M> {
         let n = self.degree;
         let (g, c) = if n == 0 {
@@ -149,7 +149,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 
     /// The rate at t and the order of the common zero of all g_k, up to 2.
-    #[inline(always)]
+    #[inline]
     fn leading(&self, t: f64, g: &[f64; M]) -> ([f64; M], usize) {
         let is_zero = |row: &[f64; M]| row.iter().all(|&value| value == 0.0);
         if !is_zero(g) || (t != 0.0 && t != 1.0) {
@@ -166,7 +166,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 
     /// Whether axis k moves in opposite directions at `a` and `b`.
-    #[inline(always)]
+    #[inline]
     pub fn turns(&self, k: usize, a: &Station<M>, b: &Station<M>) -> bool {
         a.g[k] * b.g[k] < 0.0 && a.g[k].abs() > self.noise[k] && b.g[k].abs() > self.noise[k]
     }
@@ -191,7 +191,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 
     /// The distances between two stations, `a` before `b`.
-    #[inline(always)]
+    #[inline]
     pub fn distances(&self, a: &Station<M>, b: &Station<M>) -> Distances<M> {
         let h = b.t - a.t;
         let (mut sum, mut sizes) = ([0.0; M], [0.0; M]);
@@ -230,7 +230,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 
     /// Bernstein coefficients of g on [from, to].
-    #[inline(always)]
+    #[inline]
     pub fn part(&self, from: f64, to: f64) -> [[f64; M]; C] {
         let n = self.degree;
         let mut b = self.g;
@@ -267,7 +267,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 
     /// W_jk at a station, reduced in magnitude by its error.
-    #[inline(always)]
+    #[inline]
     pub fn wronskian(&self, station: &Station<M>, j: usize, k: usize) -> f64 {
         let (gj, gk, cj, ck) = (station.g[j], station.g[k], station.c[j], station.c[k]);
         let (nj, nk, n) = (self.noise[j], self.noise[k], self.degree as f64);
@@ -289,7 +289,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     }
 }
 
-#[inline(always)]
+#[inline]
 fn lerp<const M: usize>(a: &[f64; M], b: &[f64; M], t: f64) -> [f64; M] {
     let rest = 1.0 - t;
     std::array::from_fn(|k| rest * a[k] + t * b[k])

@@ -34,7 +34,7 @@ pub struct Piece<'a, const M: usize, const C: usize, const R: usize> {
 }
 
 impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
-    #[inline(always)]
+    #[inline]
     pub fn new(task: &'a Task<'a, M>, i: usize) -> Self {
         let problem = task.problem;
         let tip_speed = problem.tip.map(|tip| {
@@ -54,7 +54,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     }
 
     /// Lower and upper bound of v²/x of the tool at a station.
-    #[inline(always)]
+    #[inline]
     pub fn speed(&self, station: &Station<M>) -> (f64, f64) {
         if let Some(tip) = &self.tip_speed {
             let (value, noise) = tip.at(station.t, station.order);
@@ -64,7 +64,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     }
 
     /// Lower and upper bound of the sum of the squared axis velocities, divided by x, at a station.
-    #[inline(always)]
+    #[inline]
     pub fn axes_speed(&self, station: &Station<M>) -> (f64, f64) {
         let (mut least, mut most) = (0.0, 0.0);
         for k in 0..M {
@@ -77,7 +77,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
     /// An upper bound of x at a station from those of the sum of the squared axis velocities and of v² of the tool. `speed` is
     /// the lower bound by `self.speed`.
-    #[inline(always)]
+    #[inline]
     pub fn x_on_entry(&self, station: &Station<M>, axes_sq: f64, tool_sq: f64, speed: f64) -> f64 {
         if axes_sq == 0.0 || tool_sq == 0.0 {
             return 0.0;
@@ -88,7 +88,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
     /// A lower bound of the square of the speed that the feed limits, divided by x, at a station. `speed` is the lower bound by
     /// `self.speed`.
-    #[inline(always)]
+    #[inline]
     fn feed_rate(&self, station: &Station<M>, speed: f64) -> f64 {
         let Some(share) = self.share else { return speed };
         let least = |k: usize| share[k] * (station.rate[k].abs() - self.curve.noise[k]).max(0.0);
@@ -96,7 +96,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     }
 
     /// An upper bound of x at a station from the limits there. `speed` is the lower bound by `self.speed`.
-    #[inline(always)]
+    #[inline]
     pub fn greatest_x(&self, station: &Station<M>, speed: f64) -> f64 {
         let (task, noise) = (self.task, &self.curve.noise);
         let mut most = self.feed_sq / self.feed_rate(station, speed);
@@ -134,7 +134,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     }
 
     /// An upper bound of the acceleration of axis k times `factor`, which has an error of at most `noise`.
-    #[inline(always)]
+    #[inline]
     fn greatest_product(&self, k: usize, factor: f64, noise: f64) -> f64 {
         let [forward, backward] = self.task.acceleration.each_ref().map(|side| side[k]);
         let (size, own) = (factor.abs(), if factor < 0.0 { backward } else { forward });
@@ -166,7 +166,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
     /// An upper bound of π at a station next to which axis k turns. After the turn, v_k² is at most 2 A_k times the distance;
     /// with c_k between two slopes on the way, π ≤ A_k |c_k|max/(|c_k|min² ω²).
-    #[inline(always)]
+    #[inline]
     fn at_turn(&self, station: &Station<M>, k: usize) -> f64 {
         let curve = &self.curve;
         let (g, c) = (station.g[k].abs() + curve.noise[k], station.c[k].abs());
@@ -186,7 +186,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
     /// An upper bound of the growth of v_k²/2 between two stations, in the direction of time or against it. The axis travels at
     /// most `most` in its main direction and at most (most − least)/2 in the other one.
-    #[inline(always)]
+    #[inline]
     fn gain(&self, k: usize, in_time: bool, distances: &Distances<M>) -> f64 {
         let side = if in_time { distances.side[k] } else { 1 - distances.side[k] };
         let (on, back) = (self.task.acceleration[side][k], self.task.acceleration[1 - side][k]);
@@ -199,7 +199,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     }
 
     /// An upper bound of x at the station `to`, which is before or after `from`, where x is at most `x`.
-    #[inline(always)]
+    #[inline]
     pub fn rise(&self, from: &Station<M>, x: f64, to: &Station<M>, distances: &Distances<M>) -> f64 {
         let mut most = f64::INFINITY;
         for k in 0..M {
@@ -215,7 +215,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
     /// A lower bound of the time [s] from `a` to `b`, where x is at most `x`. Tries first `axis`, then the length, then the other
     /// axes and the chord error, until the bound reaches `wanted`.
-    #[inline(always)]
+    #[inline]
     pub fn time(
         &self,
         (a, b): (&Station<M>, &Station<M>),
@@ -272,7 +272,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
 impl TipSpeed<'_> {
     /// D at t and its error; at a cusp of this order at an end, its leading coefficient.
-    #[inline(always)]
+    #[inline]
     fn at(&self, t: f64, order: usize) -> (f64, f64) {
         let n = self.coefficients.len() - 1;
         if order > 0 {

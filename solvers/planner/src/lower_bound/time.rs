@@ -9,7 +9,7 @@ use super::DOWN;
 /// The distance is divided in three. On the first part no motion is faster than full acceleration, on the last part none is
 /// faster than full braking, and between them none is faster than the velocity limit. Every division gives a valid bound, so its
 /// rounding does no harm; the division used is that of the fastest motion.
-#[inline(always)]
+#[inline]
 pub fn least_time(distance: f64, first_sq: f64, last_sq: f64, [gain, loss]: [f64; 2], v_sq: f64) -> f64 {
     let (first_sq, last_sq) = (first_sq.min(v_sq), last_sq.min(v_sq));
     // To the peak of a triangle: first² + 2 gain x = last² + 2 loss (distance − x).

@@ -87,7 +87,7 @@ pub struct TravelLimits<const M: usize> {
 
 impl<const M: usize> TravelLimits<M> {
     /// The limits on a part where the axes whose bits are set in `negative` move backward.
-    #[inline(always)]
+    #[inline]
     fn new(axes: &Axes<M>, negative: AxisBits) -> Self {
         let side = |k: usize| usize::from(negative >> k & 1);
         Self {
@@ -128,7 +128,7 @@ impl Part {
     }
 
     /// Limits of the axes for the forward pass.
-    #[inline(always)]
+    #[inline]
     pub fn limits<const M: usize>(&self, axes: &Axes<M>) -> TravelLimits<M> {
         TravelLimits::new(axes, self.negative)
     }
@@ -197,7 +197,7 @@ impl Part {
 
 impl<const M: usize, const C: usize> SubPiece<M, C> {
     /// The order of the common zero of all tangents at an end.
-    #[inline(always)]
+    #[inline]
     pub fn cusp_order(&self, at_end: bool) -> usize {
         usize::from(self.cusp_orders[usize::from(at_end)])
     }

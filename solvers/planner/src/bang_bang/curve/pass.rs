@@ -374,7 +374,7 @@ struct Earliest<S> {
 
 impl<S> Earliest<S> {
     /// Replaces the end if `t` is earlier.
-    #[inline(always)]
+    #[inline]
     fn offer(&mut self, t: Option<f64>, switch: S) {
         if let Some(t) = t.filter(|&t| t < self.t) {
             *self = Self { t, switch: Some(switch) };
@@ -393,7 +393,7 @@ impl<S> Earliest<S> {
 /// The first t at which the polynomial `test` falls below 0 by more than rounding; None if it does not. `size` gives the rounding
 /// errors of its coefficients. `known` roots at t = 0 are divided out first; then a value at t = 0 between −`slack` and 0
 /// counts as 0.
-#[inline(always)]
+#[inline]
 fn first_failure<const C: usize>(
     test: &Polynomial<C>,
     size: impl FnOnce() -> Polynomial<C>,

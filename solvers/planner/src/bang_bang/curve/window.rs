@@ -43,7 +43,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
     }
 
     /// The length of the window in x of the sub-piece.
-    #[inline(always)]
+    #[inline]
     pub fn length(&self) -> f64 {
         self.x1 - self.x0
     }
