@@ -9,6 +9,7 @@ pub mod interval;
 pub mod inverse_length;
 pub mod lanes;
 pub mod newton;
+pub mod parallel;
 pub mod polynomial;
 pub mod quadratic;
 pub mod spline;

@@ -13,11 +13,10 @@ mod table;
 
 use std::sync::OnceLock;
 
-use rayon::prelude::*;
-
 use self::derivatives::{chord_limit, path_points, rate, OFF_LINE};
 pub use self::derivatives::{path_point, per_feed, piece, speed_sq, straight, tool_curvature, MAX_RATE};
 use crate::path_problem::{Geometry, PathPoint, PathPoints, SpeedCap};
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::tolerance::CUSP;
 use feedplan_planner::problem::Problem;
@@ -77,11 +76,11 @@ impl<const M: usize> Measures<M> {
 
 impl<'a, const M: usize> ArcLengthPath<'a, M> {
     pub fn new(problem: &'a Problem<'a, M>, parts: &'a [Part]) -> Self {
-        let measures = |part| {
+        let measures = map(parts.len(), 16, |part| {
             problem.watch.check();
-            Measures::new(problem, part)
-        };
-        Self::measured(problem, parts, parts.par_iter().with_min_len(16).map(measures).collect())
+            Measures::new(problem, &parts[part])
+        });
+        Self::measured(problem, parts, measures)
     }
 
     fn measured(problem: &'a Problem<'a, M>, parts: &'a [Part], measures: Vec<Measures<M>>) -> Self {

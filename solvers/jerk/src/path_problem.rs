@@ -125,7 +125,7 @@ impl End {
     }
 }
 
-pub struct Problem<'a, G, const M: usize> {
+pub struct Problem<'a, G: ?Sized, const M: usize> {
     pub geometry: &'a G,
     pub limits: Limits<M>,
     /// Strictly rising in s, with speeds above 0.

@@ -10,7 +10,7 @@ use crate::s_curve::{Section, Segment};
 
 instances! {
     /// Plans of a problem within `jerk` [mm/s³] of every axis.
-    pub trait JerkLimited for [3, 6, 9] feedplan_planner::problem::Problem<'_, M> = {
+    pub trait JerkLimited for [3, 9] feedplan_planner::problem::Problem<'_, M> = {
         /// The fastest profile that the effort finds.
         fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<JerkProfile, Fault>
             = crate::jerk_limited::on_path::plan;

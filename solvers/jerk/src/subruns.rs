@@ -6,14 +6,13 @@
 
 use std::cmp::Reverse;
 
-use rayon::prelude::*;
-
 use crate::arc_length_path::{
     path_point, per_feed, piece, speed_sq, straight, tool_curvature, Part, MAX_RATE,
 };
 use crate::jerk_profile::JerkProfile;
 use crate::path_problem::Limits;
 use feedplan_geometry::bisection::boundary;
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;
@@ -52,6 +51,8 @@ const BESIDE: f64 = 1e-4;
 const UNSEEN: f64 = 5e-7;
 /// Greatest number of chains of a run that are planned together.
 const TOGETHER: usize = 64;
+/// Number of pieces that a thread cuts at a time.
+const CUT_AT_ONCE: usize = 64;
 /// The fraction of a plan's progress that this cutting takes.
 const CUTTING: f64 = 0.1;
 
@@ -80,8 +81,10 @@ pub fn over_subruns<const M: usize>(
     plan: impl Fn(&Subrun, &Limits<M>, Watch) -> Result<JerkProfile, Fault> + Sync,
 ) -> Result<JerkProfile, Fault> {
     over_chains(problem, jerk, |chains, limits, watch| {
-        let subruns = chains.par_iter().flat_map(|chain| chain.subruns);
-        subruns.map(|subrun| plan(subrun, limits, watch.part(subrun.parts.len() as f64))).collect()
+        let subruns: Vec<&Subrun> = chains.iter().flat_map(|chain| chain.subruns).collect();
+        let planned =
+            map(subruns.len(), 1, |i| plan(subruns[i], limits, watch.part(subruns[i].parts.len() as f64)));
+        planned.into_iter().collect()
     })
 }
 
@@ -98,17 +101,14 @@ pub fn over_chains<const M: usize>(
     let chains = chains(&subruns, &turns);
     // Each run is planned alone, so that its result is the same to the bit whatever other runs there are.
     let runs = chains.chunk_by(|a, b| a.subruns[0].run == b.subruns[0].run);
-    let mut together: Vec<(usize, &[Chain])> =
-        runs.flat_map(|run| run.chunks(TOGETHER)).enumerate().collect();
-    // The longest groups come first, and each free thread takes the next group: at the end no thread is left with a long one.
-    together.sort_by_key(|(_, chains)| Reverse(parts(chains)));
-    let mut planned: Vec<(usize, Vec<JerkProfile>)> = together
-        .into_iter()
-        .par_bridge()
-        .map(|(i, chains)| Ok((i, plan(chains, &limits, watch)?)))
-        .collect::<Result<_, Fault>>()?;
-    planned.sort_by_key(|(i, _)| *i);
-    let mut planned = planned.into_iter().flat_map(|(_, planned)| planned);
+    let together: Vec<&[Chain]> = runs.flat_map(|run| run.chunks(TOGETHER)).collect();
+    let order = longest_first(&together);
+    let mut planned = vec![vec![]; together.len()];
+    let results = map(order.len(), 1, |n| plan(together[order[n]], &limits, watch));
+    for (i, result) in order.into_iter().zip(results) {
+        planned[i] = result?;
+    }
+    let mut planned = planned.into_iter().flatten();
     let (mut kept, mut runs, mut lower_bound) = (vec![], vec![0], vec![]);
     for run in subruns.chunk_by(|a, b| a.run == b.run) {
         let mut own: Vec<JerkProfile> = planned.by_ref().take(run.len()).collect();
@@ -125,9 +125,14 @@ pub fn over_chains<const M: usize>(
     Ok(all)
 }
 
-/// The number of parts of pieces in some chains.
-fn parts(chains: &[Chain]) -> usize {
-    chains.iter().flat_map(|chain| chain.subruns).map(|subrun| subrun.parts.len()).sum()
+/// The indices of groups of chains, those with the most parts of pieces first: no thread is left with a long group at the end.
+fn longest_first(groups: &[&[Chain]]) -> Vec<usize> {
+    let parts = |i: &usize| -> usize {
+        groups[*i].iter().flat_map(|chain| chain.subruns).map(|subrun| subrun.parts.len()).sum()
+    };
+    let mut order: Vec<usize> = (0..groups.len()).collect();
+    order.sort_by_cached_key(|i| Reverse(parts(i)));
+    order
 }
 
 /// The limits of the axes, after a check of all numbers of the problem.
@@ -187,7 +192,7 @@ pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
         watch.count(i);
         cuts(problem, i)
     };
-    let mut all: Vec<Cuts> = (0..problem.width.len()).into_par_iter().map(places).collect();
+    let mut all: Vec<Cuts> = map(problem.width.len(), CUT_AT_ONCE, places);
     let mut out: Vec<Subrun> = vec![];
     for (run, pair) in problem.runs.windows(2).enumerate() {
         let mut rests = true;

@@ -9,13 +9,12 @@
 //! error of the derivative of an interpolant is n² times as large. Parts are halved until ε₂ is small enough. Rounding errors,
 //! some 1e-14 of the greatest |q''| of the part, are not included in ε.
 
-use rayon::prelude::*;
-
 use super::accuracy::Tolerance;
 use super::path_derivatives::{Machine, PartWork, PointWork, BLOCK};
 use super::singularities::halves;
 use super::tip::Tips;
 use super::tolerance::{DEEPEST, INTERVAL_DEPTH, INTERVAL_PARTS};
+use feedplan_geometry::parallel::map;
 
 /// Interpolants on parts, in order of the path.
 #[derive(Debug, Default)]
@@ -38,24 +37,21 @@ pub struct Nodes<'a> {
 
 /// Interpolants whose ε₂ is within the tolerance.
 pub fn interpolants(machine: Machine, tips: Tips, nodes: Nodes, tolerance: &Tolerance) -> Interpolants {
-    let blocks: Vec<Interpolants> = (0..tips.len().div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|block| {
-            let mut work = Work {
-                machine,
-                tips,
-                nodes,
-                tolerance: tolerance.clone(),
-                parts: PartWork::new(machine, tips, nodes.at.len() + 2),
-                points: PointWork::new(machine, tips, 2),
-            };
-            let mut found = Interpolants::default();
-            for piece in block * BLOCK..((block + 1) * BLOCK).min(tips.len()) {
-                work.piece(piece, &mut found);
-            }
-            found
-        })
-        .collect();
+    let blocks = map(tips.len().div_ceil(BLOCK), 1, |block| {
+        let mut work = Work {
+            machine,
+            tips,
+            nodes,
+            tolerance: tolerance.clone(),
+            parts: PartWork::new(machine, tips, nodes.at.len() + 2),
+            points: PointWork::new(machine, tips, 2),
+        };
+        let mut found = Interpolants::default();
+        for piece in block * BLOCK..((block + 1) * BLOCK).min(tips.len()) {
+            work.piece(piece, &mut found);
+        }
+        found
+    });
     let mut all = Interpolants::default();
     for block in blocks {
         all.piece.extend(block.piece);

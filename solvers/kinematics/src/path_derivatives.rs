@@ -6,13 +6,12 @@
 //! t_k(u) ∈ Σ_{j<m−k} C(k+j, j) t_{k+j}(u_m) [−r, r]^j + C(m, k) T_m [−r, r]^{m−k},   T_m ∋ t_m, r half the width
 //! ```
 
-use rayon::prelude::*;
-
 use super::expression::{Expression, Table};
 use super::number::Number;
 use super::series::MOST_ORDER;
 use super::tip::{binomial, Polygons, Tips};
 use feedplan_geometry::interval::Interval;
+use feedplan_geometry::parallel::each_part;
 
 pub const TURN: f64 = 360.0;
 const HALF_TURN: f64 = 180.0;
@@ -65,10 +64,9 @@ pub fn derivatives(machine: Machine, tips: Tips, fraction: &[f64], order: usize)
     let joints = machine.joints.outputs();
     let row = joints * (order + 1);
     let mut result = vec![0.0; fraction.len() * row];
-    result.par_chunks_mut(BLOCK * row).enumerate().for_each(|(block, rows)| {
+    each_part(&mut result, BLOCK * row, &|first, rows| {
         let mut work = PointWork::new(machine, tips, order);
-        for (i, row) in rows.chunks_exact_mut(row).enumerate() {
-            let i = block * BLOCK + i;
+        for (i, row) in (first / row..).zip(rows.chunks_exact_mut(row)) {
             work.at(i, fraction[i]);
             for (k, row) in row.chunks_exact_mut(joints).enumerate() {
                 for (joint, value) in row.iter_mut().enumerate() {
@@ -84,10 +82,10 @@ pub fn derivatives(machine: Machine, tips: Tips, fraction: &[f64], order: usize)
 pub fn positions(joints: &Expression, tips: &[f64]) -> Vec<f64> {
     let (axes, outputs) = (joints.inputs(), joints.outputs());
     let mut result = vec![0.0; tips.len() / axes * outputs];
-    let blocks = result.par_chunks_mut(BLOCK * outputs).zip(tips.par_chunks(BLOCK * axes));
-    blocks.for_each(|(rows, tips)| {
+    each_part(&mut result, BLOCK * outputs, &|first, rows| {
         let mut table = joints.table(0);
-        for (row, tip) in rows.chunks_exact_mut(outputs).zip(tips.chunks_exact(axes)) {
+        let tips = tips[first / outputs * axes..].chunks_exact(axes);
+        for (row, tip) in rows.chunks_exact_mut(outputs).zip(tips) {
             for (axis, &value) in tip.iter().enumerate() {
                 table.input(axis)[0] = value;
             }
@@ -161,10 +159,9 @@ const WHOLE: [f64; 2] = [0.0, 1.0];
 pub fn enclosures(machine: Machine, tips: Tips, parts: Option<&[[f64; 2]]>, order: usize) -> Vec<Interval> {
     let row = machine.joints.outputs() * (order + 1);
     let mut result = vec![Interval::WHOLE; tips.len() * row];
-    result.par_chunks_mut(BLOCK * row).enumerate().for_each(|(block, rows)| {
+    each_part(&mut result, BLOCK * row, &|first, rows| {
         let mut work = PartWork::new(machine, tips, order);
-        for (i, row) in rows.chunks_exact_mut(row).enumerate() {
-            let piece = block * BLOCK + i;
+        for (piece, row) in (first / row..).zip(rows.chunks_exact_mut(row)) {
             work.enclose(piece, parts.map_or(WHOLE, |parts| parts[piece]), row);
         }
     });

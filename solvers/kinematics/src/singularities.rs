@@ -8,12 +8,11 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::path_derivatives::{turns_between, Machine, PartWork, PointWork, BLOCK, TURN};
 use super::tip::Tips;
 use super::tolerance::{DEEPEST, INTERVAL_DEPTH, INTERVAL_PARTS, TRAVEL};
 use feedplan_geometry::interval::Interval;
+use feedplan_geometry::parallel::map_with;
 
 /// The order of the series over parts: second derivatives make the bounds of positions and slopes narrow.
 const ORDER: usize = 2;
@@ -65,11 +64,8 @@ pub fn joint_path(
     start: Option<&[f64]>,
 ) -> JointPath {
     let joints = machine.joints.outputs();
-    let found: Vec<(Vec<Part>, Vec<f64>)> = (0..tips.len())
-        .into_par_iter()
-        .with_min_len(BLOCK)
-        .map_init(|| PartWork::new(machine, tips, ORDER), |work, piece| smooth_parts(machine, work, piece))
-        .collect();
+    let space = || PartWork::new(machine, tips, ORDER);
+    let found = map_with(tips.len(), BLOCK, space, |work, piece| smooth_parts(machine, work, piece));
     let mut path = JointPath::default();
     for (piece, (parts, singular)) in found.into_iter().enumerate() {
         for part in parts {
@@ -88,17 +84,16 @@ pub fn joint_path(
             .chunk_by(|a, b| a == b)
             .scan(0, |end, rows| Some(std::mem::replace(end, *end + rows.len())..*end))
             .collect();
-        let overruns = rows.into_par_iter().with_min_len(BLOCK).map_init(
-            || (PartWork::new(machine, tips, ORDER), PointWork::new(machine, tips, 0)),
-            |(work, points), rows| {
-                let piece = path.piece[rows.start];
-                let parts = rows
-                    .map(|i| Part { part: path.part[i], range: path.range[i * joints..][..joints].to_vec() })
-                    .collect();
-                overruns(machine, work, points, piece, parts, travel)
-            },
-        );
-        path.overruns = overruns.flatten_iter().collect();
+        let space = || (PartWork::new(machine, tips, ORDER), PointWork::new(machine, tips, 0));
+        let overruns = map_with(rows.len(), BLOCK, space, |(work, points), n| {
+            let piece = path.piece[rows[n].start];
+            let parts = rows[n]
+                .clone()
+                .map(|i| Part { part: path.part[i], range: path.range[i * joints..][..joints].to_vec() })
+                .collect();
+            overruns(machine, work, points, piece, parts, travel)
+        });
+        path.overruns = overruns.into_iter().flatten().collect();
     }
     path
 }

@@ -19,7 +19,7 @@ use path_builder::{Axes, BuiltPath, Motion};
 
 instances! {
     /// The path of moves.
-    pub trait PathOfMoves for [3, 6, 9] moves::Moves<'_, M> = {
+    pub trait PathOfMoves for [3, 9] moves::Moves<'_, M> = {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
         fn path(&self, options: &PathOptions, axes: &Axes<M>, watch: Watch)
             -> Result<BuiltPath<M>, MoveError> = path_builder::build_path;

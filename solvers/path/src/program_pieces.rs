@@ -7,13 +7,12 @@ mod feed_cuts;
 
 use std::ops::{AddAssign, Range};
 
-use rayon::prelude::*;
-
 use crate::fit::{fit_points, FitOptions};
 use crate::moves::{MoveError, Moves, PathOptions, ARC, LINE, SPLINE};
 use crate::path_piece::{PathPiece, Shape};
 use feed_cuts::cut_at_feeds;
 use feedplan_geometry::conic::Conic;
+use feedplan_geometry::parallel::consume;
 use feedplan_geometry::watch::Watch;
 
 /// The greatest number of moves outside of chains in a task.
@@ -86,18 +85,15 @@ pub fn program_pieces<const M: usize>(
     watch: Watch,
 ) -> Result<ProgramPieces<M>, MoveError> {
     let each = watch.each(moves.kind.len());
-    let parts: Vec<_> = moves
-        .tasks()
-        .into_par_iter()
-        .map(|range| {
-            if moves.is_chain(&range) {
-                let watch = each.part(range.len() as f64);
-                return chain(moves, options, range, watch);
-            }
-            each.advance(range.len());
-            one_by_one(moves, options, range)
-        })
-        .collect::<Result<_, _>>()?;
+    let parts = consume(moves.tasks(), |_, range| {
+        if moves.is_chain(&range) {
+            let watch = each.part(range.len() as f64);
+            return chain(moves, options, range, watch);
+        }
+        each.advance(range.len());
+        one_by_one(moves, options, range)
+    });
+    let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
     let total = parts.iter().map(|part| part.pieces.len()).sum();
     let mut whole = ProgramPieces { pieces: Vec::with_capacity(total), ..ProgramPieces::default() };
     for part in parts {

@@ -22,7 +22,7 @@ type AxisBits = u16;
 
 instances! {
     /// The exact planner and its lower bound.
-    pub trait Exact for [3, 6, 9] problem::Problem<'_, M> = {
+    pub trait Exact for [3, 9] problem::Problem<'_, M> = {
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang::plan;
         /// A proven lower bound [s] of the time of every feasible profile.
         fn lower_bound(&self, hint: &Phases) -> Result<f64, Fault> = lower_bound::lower_bound;

@@ -38,11 +38,10 @@ mod piece;
 mod sweep;
 mod time;
 
-use rayon::prelude::*;
-
 use crate::phases::Phases;
 use crate::problem::{greater, Both, ChordLimit, Fault, Problem};
 use crate::runs::groups;
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::quadratic::norm;
 use intervals::Intervals;
 
@@ -109,19 +108,17 @@ pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Phases) -> Resul
         },
     };
     let last_run = problem.runs.len() - 2;
-    let times: Vec<f64> = groups(problem.runs)
-        .par_iter()
-        .map(|group| {
-            let mut space = (Intervals::default(), Intervals::default());
-            let of_run = |run: usize| {
-                let start = if run == 0 { problem.start_speed } else { 0.0 };
-                let end = if run == last_run { problem.end_speed } else { 0.0 };
-                let pieces = (problem.runs[run], problem.runs[run + 1]);
-                over_run(&task, pieces, (start * start, end * end), hint, &mut space)
-            };
-            group.clone().map(of_run).sum()
-        })
-        .collect();
+    let groups = groups(problem.runs);
+    let times: Vec<f64> = map(groups.len(), 1, |i| {
+        let mut space = (Intervals::default(), Intervals::default());
+        let of_run = |run: usize| {
+            let start = if run == 0 { problem.start_speed } else { 0.0 };
+            let end = if run == last_run { problem.end_speed } else { 0.0 };
+            let pieces = (problem.runs[run], problem.runs[run + 1]);
+            over_run(&task, pieces, (start * start, end * end), hint, &mut space)
+        };
+        groups[i].clone().map(of_run).sum()
+    });
     let rounding = problem.runs.len() as f64 * f64::EPSILON;
     Ok(times.iter().sum::<f64>() * (1.0 - rounding))
 }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::thread::LocalKey;
 
-use rayon::prelude::*;
+use feedplan_geometry::parallel::map;
 
 use crate::problem::{Fault, Problem};
 use crate::profile::Profile;
@@ -26,28 +26,27 @@ pub fn over_runs<const M: usize, W: Default>(
 ) -> Result<Profile, Fault> {
     let runs = problem.runs;
     let last_run = runs.len() - 2;
-    let plans: Result<Vec<Profile>, Fault> = groups(runs)
-        .par_iter()
-        .map(|group| {
-            let pieces = runs[group.end] - runs[group.start];
-            let mut profile = Profile::with_capacity(2 * pieces);
-            for run in group.clone() {
-                let ends = (runs[run], runs[run + 1]);
-                let start = if run == 0 { problem.start_speed } else { 0.0 };
-                let end = if run == last_run { problem.end_speed } else { 0.0 };
-                profile.runs.push(profile.phases.len() as i64);
-                space.with_borrow_mut(|space| {
-                    let planned = plan(ends, (start * start, end * end), space, &mut profile);
-                    if ends.1 - ends.0 > MOST_KEPT {
-                        *space = W::default();
-                    }
-                    planned
-                })?;
-            }
-            Ok(profile)
-        })
-        .collect();
-    Ok(Profile::join(plans?))
+    let groups = groups(runs);
+    let plans = map(groups.len(), 1, |i| {
+        let group = &groups[i];
+        let pieces = runs[group.end] - runs[group.start];
+        let mut profile = Profile::with_capacity(2 * pieces);
+        for run in group.clone() {
+            let ends = (runs[run], runs[run + 1]);
+            let start = if run == 0 { problem.start_speed } else { 0.0 };
+            let end = if run == last_run { problem.end_speed } else { 0.0 };
+            profile.runs.push(profile.phases.len() as i64);
+            space.with_borrow_mut(|space| {
+                let planned = plan(ends, (start * start, end * end), space, &mut profile);
+                if ends.1 - ends.0 > MOST_KEPT {
+                    *space = W::default();
+                }
+                planned
+            })?;
+        }
+        Ok(profile)
+    });
+    Ok(Profile::join(plans.into_iter().collect::<Result<_, Fault>>()?))
 }
 
 /// Groups of successive runs with about `GROUP` pieces each.

@@ -14,11 +14,7 @@ macro_rules! with_padded_axes {
                 const $m: usize = 3;
                 $call
             }
-            4..=6 => {
-                const $m: usize = 6;
-                $call
-            }
-            7..=9 => {
+            4..=9 => {
                 const $m: usize = 9;
                 $call
             }

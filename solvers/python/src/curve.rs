@@ -7,13 +7,13 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rayon::prelude::*;
 
 use super::arrays::{rows, Column, Table};
 use super::axes::with_padded_axes;
 use super::native::{with_object, InAxes};
 use super::views::view;
 use super::work::run;
+use feedplan_geometry::parallel::consume;
 use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
 use feedplan_geometry::spline::extract::extract;
 use feedplan_geometry::spline::knots::{check_points, Spline};
@@ -226,7 +226,7 @@ impl Curve {
             py.detach(|| blocks.into_iter().for_each(fill));
         } else {
             run(py, None, |watch| {
-                blocks.into_par_iter().for_each(|block| {
+                consume(blocks, |_, block| {
                     watch.check();
                     fill(block);
                 });

@@ -4,7 +4,6 @@ use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use rayon::prelude::*;
 
 use super::arrays::{indices, padded, padded_rows, require, row, rows, to_array2, Column, Table};
 use super::axes::with_padded_axes;
@@ -13,6 +12,7 @@ use super::memory;
 use super::moves::Moves;
 use super::native::Of;
 use super::work::run;
+use feedplan_geometry::parallel::{consume, map};
 use feedplan_geometry::spline::regular::{regular, Regular};
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
@@ -217,8 +217,7 @@ impl<const M: usize> PieceColumns<M> {
             Shape::Conic(conic) => conic.weight != 1.0,
             Shape::Spline(spline) => chunk.spline(spline, splines).is_rational(),
         };
-        let rational =
-            chunks.par_iter().any(|chunk| chunk.pieces.iter().any(|piece| is_rational(chunk, piece)));
+        let rational = chunks.iter().any(|chunk| chunk.pieces.iter().any(|piece| is_rational(chunk, piece)));
         let mut offsets = vec![0];
         offsets.extend(gather(chunks, 0, one, |chunk, piece, out| out[0] = points(chunk, piece)));
         for i in 1..offsets.len() {
@@ -291,7 +290,7 @@ fn gather<const M: usize, T: Copy + Send>(
     write: impl Fn(&Chunk<M>, &PathPiece<M>, &mut [T]) + Sync,
 ) -> Vec<T> {
     let length = |chunk: &Chunk<M>| chunk.pieces.iter().map(|piece| stride(chunk, piece)).sum();
-    let lengths: Vec<usize> = chunks.par_iter().map(length).collect();
+    let lengths: Vec<usize> = map(chunks.len(), 1, |i| length(&chunks[i]));
     let mut column = vec![initial; lengths.iter().sum()];
     let mut rest = &mut column[..];
     let mut slices = Vec::with_capacity(chunks.len());
@@ -300,10 +299,10 @@ fn gather<const M: usize, T: Copy + Send>(
         slices.push(slice);
         rest = tail;
     }
-    chunks.par_iter().zip(slices).for_each(|(chunk, mut slice)| {
-        for piece in &chunk.pieces {
-            let (out, tail) = slice.split_at_mut(stride(chunk, piece));
-            write(chunk, piece, out);
+    consume(slices, |i, mut slice| {
+        for piece in &chunks[i].pieces {
+            let (out, tail) = slice.split_at_mut(stride(&chunks[i], piece));
+            write(&chunks[i], piece, out);
             slice = tail;
         }
     });

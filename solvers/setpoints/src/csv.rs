@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rayon::prelude::*;
+use feedplan_geometry::parallel::map;
 
 /// Rows that a thread takes at a time: enough to hide the cost of the hand-over, few enough to share evenly.
 const BLOCK: usize = 4096;
@@ -12,21 +12,18 @@ const BLOCK: usize = 4096;
 /// Numbers that are not finite become `nan`, `inf` and `-inf`, which numpy and pandas read.
 pub fn rows(values: &[f64], width: usize, last: &[i32]) -> Vec<u8> {
     assert_eq!(values.len(), width * last.len(), "every row has its values");
-    let blocks: Vec<String> = values
-        .par_chunks(BLOCK * width)
-        .zip(last.par_chunks(BLOCK))
-        .map(|(values, last)| {
-            let mut text = String::with_capacity(values.len() * 20 + last.len() * 8);
-            for (row, integer) in values.chunks_exact(width).zip(last) {
-                for &value in row {
-                    push(&mut text, value);
-                    text.push(',');
-                }
-                writeln!(text, "{integer}").expect("a string takes all text");
+    let blocks = map(last.len().div_ceil(BLOCK), 1, |block| {
+        let rows = block * BLOCK..last.len().min((block + 1) * BLOCK);
+        let mut text = String::with_capacity(rows.len() * (width * 20 + 8));
+        for i in rows {
+            for &value in &values[i * width..(i + 1) * width] {
+                push(&mut text, value);
+                text.push(',');
             }
-            text
-        })
-        .collect();
+            writeln!(text, "{}", last[i]).expect("a string takes all text");
+        }
+        text
+    });
     blocks.concat().into_bytes()
 }
 

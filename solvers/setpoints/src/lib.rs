@@ -16,7 +16,7 @@ use sampling::{Chunk, Interpolator, Resume, Sampler};
 
 instances! {
     /// Setpoints of a path.
-    pub trait Sampled for [3, 6, 9] Arc<sampling::PathData<M>> = {
+    pub trait Sampled for [3, 9] Arc<sampling::PathData<M>> = {
         /// Computes the times of the setpoints of a profile from its phases, the phase offsets of its runs, and the period in s.
         /// The error is a sentence for the user.
         fn sampled(&self, phases: &Arc<Phases>, runs: &[usize], period: f64, watch: Watch)
@@ -26,7 +26,7 @@ instances! {
 
 instances! {
     /// The motion of a profile at setpoints, at times and at places; see the methods of `Sampler` that are named here.
-    pub trait States for [3, 6, 9] Sampler<M> = {
+    pub trait States for [3, 9] Sampler<M> = {
         fn setpoints(&self, range: Range<usize>, interpolator: Interpolator, resume: &mut Option<Resume>, watch: Watch)
             -> Chunk<M> = Sampler::chunk;
         fn states_at(&self, times: &[f64], watch: Watch) -> Chunk<M> = Sampler::at;

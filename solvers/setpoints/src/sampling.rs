@@ -27,14 +27,13 @@ mod time_grid;
 use std::ops::Range;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
 use self::cursor::Cursor;
 pub use self::path_data::PathData;
 use crate::phase_motion::at_once::{Moments, TIMES};
 use crate::phase_motion::{PhaseMotion, Rates, State};
+use feedplan_geometry::parallel::consume;
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
@@ -129,12 +128,10 @@ impl<const M: usize> Sampler<M> {
         let mut chunk = Chunk::with_size(range.len());
         let parts = chunk.slices(range.start).split(&self.cuts(&range, interpolator));
         let results: Vec<(Effort, Option<Resume>)> = match interpolator {
-            Interpolator::Sarfraz => {
-                parts.into_par_iter().map(|part| (self.fill_by_time(part, watch), None)).collect()
-            }
+            Interpolator::Sarfraz => consume(parts, |_, part| (self.fill_by_time(part, watch), None)),
             Interpolator::Newton => {
                 let resume = *resume;
-                parts.into_par_iter().map(|part| self.fill_by_steps(part, resume, watch)).collect()
+                consume(parts, |_, part| self.fill_by_steps(part, resume, watch))
             }
         };
         for (effort, state) in results {
@@ -149,7 +146,7 @@ impl<const M: usize> Sampler<M> {
     pub fn at(&self, times: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(times.len());
         let cuts: Vec<usize> = (0..times.len()).step_by(BLOCK).skip(1).collect();
-        chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
+        consume(chunk.slices(0).split(&cuts), |_, mut part| {
             let mut cursor = self.cursor();
             for i in 0..part.t.len() {
                 watch.check_at(i);
@@ -180,7 +177,7 @@ impl<const M: usize> Sampler<M> {
     pub fn along(&self, pieces: &[u32], u: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(pieces.len());
         let cuts: Vec<usize> = (0..pieces.len()).step_by(BLOCK).skip(1).collect();
-        chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
+        consume(chunk.slices(0).split(&cuts), |_, mut part| {
             // Places mostly come in the order of the path, many on one phase.
             let mut kept = None;
             for i in 0..part.t.len() {

@@ -3,20 +3,19 @@
 //! Panels are halved towards cusps and near-cusps. The error bound of quadratic pieces is in closed form (`QuadraticSpeed`); that
 //! of other pieces comes from `speed`.
 
-use rayon::prelude::*;
-
 use super::cusps::piece_cusps;
 use super::speed::{Coefficients, Speed};
 use super::{CompositeCurve, Piece};
 use crate::arc_length::{quadrature, tabulate, Node, QuadraticSpeed, Table};
 use crate::instances;
 use crate::inverse_length;
+use crate::parallel::map;
 use crate::tolerance::CUSP;
 use crate::watch::Watch;
 
 instances! {
     /// Curves whose lengths can be measured.
-    pub trait Measured for [3, 6, 9] CompositeCurve<M> = {
+    pub trait Measured for [3, 9] CompositeCurve<M> = {
         /// See `CurveLength::new`.
         fn lengths(&self, accuracy: f64, watch: Watch) -> CurveLength<M> = CurveLength::new;
     }
@@ -90,24 +89,18 @@ impl<const M: usize> CurveLength<M> {
                 }
             });
         }
-        let tables: Vec<(Vec<Node>, f64)> = (0..count)
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|i| {
-                watch.each(count).count(i);
-                match lengths.speeds[i] {
-                    PieceSpeed::Quadratic(f) => {
-                        let mut nodes = vec![];
-                        let allowed = accuracy * quadrature(&f, 0.0, curve.width[i]);
-                        let bound = tabulate(f, 0.0, curve.width[i], allowed, &mut nodes);
-                        (nodes, bound)
-                    }
-                    PieceSpeed::Curve(h, omega) => {
-                        table(lengths.speed(h, omega, i), &curve.piece(i), accuracy)
-                    }
+        let tables = map(count, 64, |i| {
+            watch.each(count).count(i);
+            match lengths.speeds[i] {
+                PieceSpeed::Quadratic(f) => {
+                    let mut nodes = vec![];
+                    let allowed = accuracy * quadrature(&f, 0.0, curve.width[i]);
+                    let bound = tabulate(f, 0.0, curve.width[i], allowed, &mut nodes);
+                    (nodes, bound)
                 }
-            })
-            .collect();
+                PieceSpeed::Curve(h, omega) => table(lengths.speed(h, omega, i), &curve.piece(i), accuracy),
+            }
+        });
         // Neumaier's sum: the rounding errors of many additions are carried along.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for (nodes, bound) in tables {
@@ -162,17 +155,12 @@ impl<const M: usize> CurveLength<M> {
 
     /// Lengths up to many places, in mm, computed in parallel.
     pub fn lengths(&self, pieces: &[u32], u: &[f64]) -> Vec<f64> {
-        pieces
-            .par_iter()
-            .zip(u)
-            .with_min_len(1024)
-            .map(|(&piece, &u)| self.length(piece as usize, u))
-            .collect()
+        map(pieces.len(), 1024, |i| self.length(pieces[i] as usize, u[i]))
     }
 
     /// The places at many lengths, computed in parallel.
     pub fn locate_all(&self, lengths: &[f64], tolerance: f64) -> Vec<(usize, f64)> {
-        lengths.par_iter().with_min_len(1024).map(|&length| self.locate(length, tolerance)).collect()
+        map(lengths.len(), 1024, |i| self.locate(lengths[i], tolerance))
     }
 }
 

@@ -7,12 +7,12 @@
 //! independent of one another.
 
 use feedplan_geometry::elementary::Elementary;
-use rayon::prelude::*;
 
 use super::speed_envelope::{Change, Slopes, ROUNDING};
 use crate::arc_length_path::{path_point, piece, ArcLengthPath, Junction};
 use crate::path_limits::{bounded_until, Curve, Shape};
 use crate::path_problem::{End, Geometry, Limits, PathPoint, PathPoints, SpeedCap};
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::problem::Problem;
@@ -121,7 +121,7 @@ pub fn stretches<const M: usize>(
         problem.watch.check_at(part);
         look(problem, path, limits, steepest, (part, shares[part]))
     };
-    let looks: Vec<Look> = (0..path.parts.len()).into_par_iter().with_min_len(TOGETHER).map(look).collect();
+    let looks: Vec<Look> = map(path.parts.len(), TOGETHER, look);
     let r = envelope(&looks, junctions, slopes, ends.map(|end| end.speed()));
     let mut out: Vec<Stretch> = vec![];
     let (mut from, mut state) = (0.0, ends[0]);

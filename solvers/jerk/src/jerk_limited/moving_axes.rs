@@ -78,24 +78,26 @@ fn work<G: Geometry<M>, W: Work, const M: usize>(
     moves: &[bool; M],
     work: W,
 ) -> W::Done {
+    let Problem { geometry, limits, caps, ends } = *problem;
+    let problem: Problem<dyn Geometry<M>, M> = Problem { geometry, limits, caps, ends };
     match moves.iter().filter(|&&moves| moves).count() {
-        0..=2 => by::<G, W, M, 2>(problem, moves, work),
-        3 => by::<G, W, M, 3>(problem, moves, work),
-        4 => by::<G, W, M, 4>(problem, moves, work),
-        5 => by::<G, W, M, 5>(problem, moves, work),
-        6 => by::<G, W, M, 6>(problem, moves, work),
-        _ => by::<G, W, M, M>(problem, moves, work),
+        0..=2 => by::<W, M, 2>(&problem, moves, work),
+        3 if const { M > 3 } => by::<W, M, 3>(&problem, moves, work),
+        4 if const { M > 4 } => by::<W, M, 4>(&problem, moves, work),
+        5 if const { M > 5 } => by::<W, M, 5>(&problem, moves, work),
+        6 if const { M > 6 } => by::<W, M, 6>(&problem, moves, work),
+        _ => by::<W, M, M>(&problem, moves, work),
     }
 }
 
 /// Does the work with K axes, which include all axes that move.
-fn by<G: Geometry<M>, W: Work, const M: usize, const K: usize>(
-    problem: &Problem<G, M>,
+fn by<W: Work, const M: usize, const K: usize>(
+    problem: &Problem<dyn Geometry<M> + '_, M>,
     moves: &[bool; M],
     work: W,
 ) -> W::Done {
-    let mut order: [usize; M] = std::array::from_fn(|axis| axis);
-    order.sort_by_key(|&axis| !moves[axis]);
+    let (mut order, at_rest): (Vec<usize>, Vec<usize>) = (0..M).partition(|&axis| moves[axis]);
+    order.extend(at_rest);
     let by = |all: &[f64; M]| -> [f64; K] { std::array::from_fn(|i| all[order[i]]) };
     let at = |piece: usize, s: f64| {
         let point = problem.geometry.at(piece, s);

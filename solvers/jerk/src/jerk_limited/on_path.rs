@@ -8,8 +8,6 @@
 
 use std::mem::take;
 
-use rayon::prelude::*;
-
 use super::held::{caps_between, moving, stretches, Between, Stretch};
 use super::moving_axes;
 use super::refinement;
@@ -20,6 +18,7 @@ use crate::jerk_profile::JerkProfile;
 use crate::path_problem::{self, Effort, End, Limits, SpeedCap};
 use crate::s_curve::{self, Segment};
 use crate::subruns::{over_chains, Chain, Subrun};
+use feedplan_geometry::parallel::{consume, map};
 use feedplan_planner::problem::{along, Fault, Problem};
 
 /// A junction counts as limiting the speed where the plan reaches this fraction of its cap.
@@ -116,19 +115,17 @@ impl<const M: usize> Task<'_, M> {
     /// The profiles of the subruns of some chains; unplanned after the deadline. All subruns are planned roughly first: this
     /// gives one price of an interval for all of them (`refinement`).
     pub fn chains(&self, chains: &[Chain]) -> Result<Vec<JerkProfile>, Fault> {
-        let look = |chain| (!self.effort.expired()).then(|| self.rough_chain(chain)).transpose();
-        let known: Vec<Option<RoughChain<M>>> = chains.par_iter().map(look).collect::<Result<_, _>>()?;
+        let look = |i: usize| (!self.effort.expired()).then(|| self.rough_chain(&chains[i])).transpose();
+        let known = map(chains.len(), 1, look).into_iter().collect::<Result<Vec<_>, _>>()?;
         let paths = known.iter().flatten().flat_map(|chain| &chain.known);
         let roughs = paths.flat_map(|(_, own)| &own.stretches).filter_map(RoughStretch::rough);
         let price = refinement::price(roughs.map(|rough| &rough.losses));
         let task = Task { price, ..*self };
-        let plan = |(chain, known): (&Chain, Option<_>)| match known {
-            Some(known) => task.chain(chain, known),
-            None => Ok(vec![JerkProfile::unplanned(); chain.subruns.len()]),
-        };
-        let planned: Vec<Vec<JerkProfile>> =
-            chains.par_iter().zip(known).map(plan).collect::<Result<_, _>>()?;
-        Ok(planned.into_iter().flatten().collect())
+        let planned = consume(known, |i, known| match known {
+            Some(known) => task.chain(&chains[i], known),
+            None => Ok(vec![JerkProfile::unplanned(); chains[i].subruns.len()]),
+        });
+        Ok(planned.into_iter().collect::<Result<Vec<_>, Fault>>()?.concat())
     }
 
     /// Plans a chain roughly. Between two lines the tool turns back with the greatest acceleration that all lines allow. Other
@@ -153,7 +150,7 @@ impl<const M: usize> Task<'_, M> {
             let ends = ends_of(chain, i, accelerations, &greatest);
             lines[i].is_none().then(|| (i, self.of_subrun(chain, i, |own| own.rough_path(&paths[i], ends))))
         };
-        let known = (0..lines.len()).into_par_iter().filter_map(look).collect();
+        let known = map(lines.len(), 1, look).into_iter().flatten().collect();
         Ok(RoughChain { strokes, greatest, known })
     }
 
@@ -176,14 +173,10 @@ impl<const M: usize> Task<'_, M> {
             if open.is_empty() {
                 break;
             }
-            let again: Vec<(usize, JerkProfile)> = open
-                .into_par_iter()
-                .map(|(i, known)| Ok((i, plan(i, &accelerations, known)?)))
-                .collect::<Result<_, Fault>>()?;
+            let again = consume(take(&mut open), |_, (i, known)| (i, plan(i, &accelerations, known)));
             for (i, phases) in again {
-                planned[i] = phases;
+                planned[i] = phases?;
             }
-            open = vec![];
             for i in 1..count {
                 if lines[i - 1].is_some()
                     || lines[i].is_some()
@@ -240,7 +233,7 @@ impl<const M: usize> Task<'_, M> {
         Self: 'b,
     {
         let paths: Vec<ArcLengthPath<M>> =
-            chain.subruns.par_iter().map(|subrun| ArcLengthPath::new(self.problem, &subrun.parts)).collect();
+            map(chain.subruns.len(), 1, |i| ArcLengthPath::new(self.problem, &chain.subruns[i].parts));
         let line = |(path, subrun): (&ArcLengthPath<M>, &Subrun)| self.line(path, subrun.ends);
         let lines = paths.iter().zip(chain.subruns).map(line).collect::<Result<Vec<_>, _>>()?;
         let mut accelerations = [&[0.0], chain.turns, &[0.0]].concat();
@@ -278,7 +271,7 @@ impl<const M: usize> Task<'_, M> {
             });
             RoughStretch { stretch, rough, phases: None }
         };
-        known.stretches = stretches.into_par_iter().map(look).collect();
+        known.stretches = consume(stretches, |_, stretch| look(stretch));
         known
     }
 
@@ -328,20 +321,22 @@ impl<const M: usize> Task<'_, M> {
         let mut all = take(&mut known.stretches);
         loop {
             let is_alone = all.len() == 1;
-            let plan = |RoughStretch { stretch, rough, phases }: &mut RoughStretch| {
-                if phases.is_none() {
-                    *phases = Some(self.stretch(path, stretch, rough.take(), known, is_alone)?);
-                }
-                Ok(())
-            };
-            let planned: Vec<_> = all.par_iter_mut().map(plan).collect();
+            let planned = consume(all, |_, RoughStretch { stretch, rough, phases }| match phases {
+                Some(phases) => (stretch, Ok(phases)),
+                None => (stretch, self.stretch(path, &stretch, rough, known, is_alone)),
+            });
+            all = vec![];
             let mut failed = vec![];
-            for (i, planned) in planned.into_iter().enumerate() {
-                match planned {
-                    Ok(()) => {}
-                    Err(path_problem::Fault::NoPlan { .. }) if !is_alone => failed.push(i),
+            for (i, (stretch, planned)) in planned.into_iter().enumerate() {
+                let phases = match planned {
+                    Ok(phases) => Some(phases),
+                    Err(path_problem::Fault::NoPlan { .. }) if !is_alone => {
+                        failed.push(i);
+                        None
+                    }
                     Err(fault) => return Err(fault),
-                }
+                };
+                all.push(RoughStretch { stretch, rough: None, phases });
             }
             if failed.is_empty() {
                 return Ok(all.into_iter().filter_map(|own| own.phases).collect());

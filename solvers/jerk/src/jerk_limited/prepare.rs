@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use feedplan_geometry::elementary::Elementary;
-use rayon::prelude::*;
+use feedplan_geometry::parallel::each_part;
 
 use super::constraints::Constraints;
 use super::grid::Grid;
@@ -133,9 +133,8 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     /// interval.
     fn each(&self, f: impl Fn(&Constraints, &[f64]) -> Vec<f64> + Sync) -> Vec<f64> {
         let mut out = vec![0.0; self.grid.pieces.len()];
-        out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+        each_part(&mut out, CHUNK, &|first, out| {
             self.watch.check();
-            let first = chunk * CHUNK;
             let mut rows = Constraints::new(&self.problem.limits);
             self.take(first..first + out.len(), &mut rows);
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);

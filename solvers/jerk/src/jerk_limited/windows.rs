@@ -12,8 +12,6 @@ use std::mem::take;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
-
 use super::cases;
 use super::constraints::Constraints;
 use super::exact::Exact;
@@ -29,6 +27,7 @@ use super::window::{ramps, Window, WindowReport};
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
 use crate::path_problem::{Effort, Fault, Geometry, Limits, Problem};
+use feedplan_geometry::parallel::{each_part, map, threads};
 use feedplan_geometry::watch::Watch;
 
 /// A window reaches this many stop times and intervals beyond its cuts. The number of stop times is the travel time of the first
@@ -223,14 +222,11 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
                 counts.converged = false;
                 break;
             }
-            let solved: Vec<_> = batch
-                .par_iter()
-                .map(|section| {
-                    let solved = self.solve(section);
-                    watch.advance(section.range.len());
-                    solved
-                })
-                .collect();
+            let solved = map(batch.len(), 1, |i| {
+                let solved = self.solve(&batch[i]);
+                watch.advance(batch[i].range.len());
+                solved
+            });
             for (at, (y, verdict, part)) in (first..).zip(solved) {
                 parts.extend(part);
                 let range = &sections[at].range;
@@ -280,18 +276,20 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
     fn roughly(&self, sections: &mut [Section], resolution: f64) {
         let watch = self.watch(sections);
         let effort = interior_point::Effort { tolerance: refinement::tolerance(resolution), ..self.solver() };
-        sections.par_iter_mut().for_each(|Section { range, rough, .. }| {
-            if self.effort.expired() {
-                return;
+        each_part(sections, 1, &|_, sections| {
+            for Section { range, rough, .. } in sections {
+                if self.effort.expired() {
+                    return;
+                }
+                let x = &self.prepared.x[2 * range.start..2 * range.end + 2];
+                let ends = self.ends(range, self.prepared.ends, x);
+                *rough = self.in_space(|Space { window, exact, .. }| {
+                    self.prepared.fill(range.clone(), window);
+                    window.rows.drop_at_ends(&ends);
+                    window.rough(ends, x, &effort, exact)
+                });
+                watch.advance(range.len());
             }
-            let x = &self.prepared.x[2 * range.start..2 * range.end + 2];
-            let ends = self.ends(range, self.prepared.ends, x);
-            *rough = self.in_space(|Space { window, exact, .. }| {
-                self.prepared.fill(range.clone(), window);
-                window.rows.drop_at_ends(&ends);
-                window.rough(ends, x, &effort, exact)
-            });
-            watch.advance(range.len());
         });
     }
 
@@ -329,7 +327,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
 
     /// The number of sections that are solved before their plans are joined.
     fn batch(&self) -> usize {
-        BATCH * rayon::current_num_threads()
+        BATCH * threads()
     }
 
     /// The progress of solving all sections, counted in intervals, overlaps included.

@@ -15,10 +15,9 @@
 //! * extremes whose curvature is above the threshold, and
 //! * corners whose curvature is above it, extremes or not.
 
-use rayon::prelude::*;
-
 use super::chain::{turn_cosine, Chain};
 use crate::tolerance;
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::quadratic::{dot, norm, sub, Segment};
 
 /// Greatest reach of the curvature, in points to each side.
@@ -188,7 +187,7 @@ fn curve<const M: usize>(
 ) {
     let inner = a + 1..b;
     let curvature: Vec<(f64, usize)> = match chain.parallel {
-        true => inner.into_par_iter().with_min_len(1024).map(|k| curvature(chain, a, b, k)).collect(),
+        true => map(inner.len(), 1024, |k| curvature(chain, a, b, inner.start + k)),
         false => inner.map(|k| curvature(chain, a, b, k)).collect(),
     };
     let of = |k: usize| curvature[k - a - 1];

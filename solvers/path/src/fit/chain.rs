@@ -1,7 +1,6 @@
 //! The input of the fit: points with the lengths along their polygon, the tolerance and the angle of corners.
 
-use rayon::prelude::*;
-
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
@@ -27,19 +26,14 @@ impl<'a, const M: usize> Chain<'a, M> {
 
 impl<const M: usize> Chain<'_, M> {
     /// Applies f to all items, in parallel if the chain is long; the results are in order.
-    pub fn map<T: Sync, R: Send>(
-        &self,
-        items: &[T],
-        watch: Watch,
-        f: impl Fn(&T) -> R + Sync + Send,
-    ) -> Vec<R> {
+    pub fn map<T: Sync, R: Send>(&self, items: &[T], watch: Watch, f: impl Fn(&T) -> R + Sync) -> Vec<R> {
         let each = watch.each(items.len());
         let f = |item: &T| {
             each.advance(1);
             f(item)
         };
         match self.parallel && items.len() > 1 {
-            true => items.par_iter().with_min_len(items.len().div_ceil(256)).map(f).collect(),
+            true => map(items.len(), items.len().div_ceil(256), |i| f(&items[i])),
             false => items.iter().map(f).collect(),
         }
     }

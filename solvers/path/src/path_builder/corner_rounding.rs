@@ -10,13 +10,12 @@
 //! 4. the path: blends, and the rest of the spans between them. The tool stops at a corner without a blend, unless the machine
 //!    allows a velocity jump.
 
-use rayon::prelude::*;
-
 use super::built_path::Axes;
 use super::chunk::Chunk;
 use crate::corner::{share_lengths, Rounding, Sides, TangentJump};
 use crate::path_piece::{PathPiece, Shape};
 use crate::tolerance;
+use feedplan_geometry::parallel::{map, map_with};
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
@@ -62,23 +61,15 @@ pub fn round_corners<const M: usize>(
     let whole = CornerRounding::new(pieces, splines, halt, rounding);
     let corners = 0..whole.corners.len();
     let each = watch.part(0.75).each(corners.len());
-    let wanted: Vec<f64> = corners
-        .clone()
-        .into_par_iter()
-        .map(|k| {
-            watch.check_at(k);
-            whole.wanted_length(k, axes)
-        })
-        .collect();
+    let wanted = map(corners.len(), TASK, |k| {
+        watch.check_at(k);
+        whole.wanted_length(k, axes)
+    });
     let length = share_lengths(&wanted, &whole.length);
-    let cuts: Vec<Option<Cuts>> = corners
-        .into_par_iter()
-        .with_min_len(TASK)
-        .map_init(Sides::default, |sides, k| {
-            each.count(k);
-            whole.fitting_cuts(k, &length, sides)
-        })
-        .collect();
+    let cuts = map_with(corners.len(), TASK, Sides::default, |sides, k| {
+        each.count(k);
+        whole.fitting_cuts(k, &length, sides)
+    });
     whole.assemble(&cuts, axes.jump, watch.part(0.25))
 }
 
@@ -90,7 +81,8 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
         rounding: Rounding,
     ) -> Self {
         let stop = |at| Corner { at, jump: None };
-        let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
+        let inner = map(pieces.len() - 1, TASK, |before| {
+            let at = before + 1;
             let (before, after) = (&pieces[at - 1], &pieces[at]);
             let halts = after.first > before.last && halt[before.last as usize];
             if halts || before.shape.rests()[1] || after.shape.rests()[0] {
@@ -103,7 +95,7 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
             }
         });
         let mut corners = vec![stop(0)];
-        corners.par_extend(inner);
+        corners.extend(inner.into_iter().flatten());
         corners.push(stop(pieces.len()));
 
         let mut station = Vec::with_capacity(pieces.len());
@@ -262,40 +254,37 @@ impl<'a, const M: usize> CornerRounding<'a, M> {
     /// Joins the blends and the rest of the spans between them, in order. Returns the chunks and the first piece of each run.
     fn assemble(&self, cuts: &[Option<Cuts>], jump: bool, watch: Watch) -> (Vec<Chunk<M>>, Vec<usize>) {
         let count = self.length.len();
-        let tasks: Vec<(Chunk<M>, Vec<usize>)> = (0..count.div_ceil(TASK))
-            .into_par_iter()
-            .map(|task| {
-                let spans = task * TASK..count.min((task + 1) * TASK);
-                watch.each(count).advance(spans.len());
-                let inside = self.corners[spans.end].at - self.corners[spans.start].at;
-                let mut chunk = Chunk::default();
-                chunk.pieces.reserve(inside + 2 * spans.len());
-                let (mut runs, mut sides) = (Vec::new(), Sides::default());
-                for k in spans {
-                    let start = match (cuts[k], &self.corners[k].jump) {
-                        (Some(cuts), Some(turn)) => {
-                            self.cut_sides(k, cuts, &mut sides);
-                            if let Some(corner) = sides.between_lines(turn, self.rounding) {
-                                chunk.pieces.push(corner);
-                            } else {
-                                sides.bend(turn);
-                                chunk.append(&sides);
-                            }
-                            cuts[1]
+        let tasks = map(count.div_ceil(TASK), 1, |task| {
+            let spans = task * TASK..count.min((task + 1) * TASK);
+            watch.each(count).advance(spans.len());
+            let inside = self.corners[spans.end].at - self.corners[spans.start].at;
+            let mut chunk = Chunk::default();
+            chunk.pieces.reserve(inside + 2 * spans.len());
+            let (mut runs, mut sides) = (Vec::new(), Sides::default());
+            for k in spans {
+                let start = match (cuts[k], &self.corners[k].jump) {
+                    (Some(cuts), Some(turn)) => {
+                        self.cut_sides(k, cuts, &mut sides);
+                        if let Some(corner) = sides.between_lines(turn, self.rounding) {
+                            chunk.pieces.push(corner);
+                        } else {
+                            sides.bend(turn);
+                            chunk.append(&sides);
                         }
-                        (_, turn) => {
-                            if !(jump && turn.is_some()) {
-                                runs.push(chunk.pieces.len());
-                            }
-                            0.0
+                        cuts[1]
+                    }
+                    (_, turn) => {
+                        if !(jump && turn.is_some()) {
+                            runs.push(chunk.pieces.len());
                         }
-                    };
-                    let end = cuts[k + 1].map_or(f64::INFINITY, |cuts| cuts[0]);
-                    self.append_span(k, [start, end], false, &mut chunk.pieces, &mut chunk.made);
-                }
-                (chunk, runs)
-            })
-            .collect();
+                        0.0
+                    }
+                };
+                let end = cuts[k + 1].map_or(f64::INFINITY, |cuts| cuts[0]);
+                self.append_span(k, [start, end], false, &mut chunk.pieces, &mut chunk.made);
+            }
+            (chunk, runs)
+        });
         let (mut chunks, mut runs, mut total) = (Vec::with_capacity(tasks.len()), Vec::new(), 0);
         for (chunk, starts) in tasks {
             runs.extend(starts.iter().map(|start| start + total));

@@ -14,8 +14,6 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::built_path::{Axes, BuiltPath, NotSmooth};
 use super::chords::{Chord, Chords};
 use super::chunk::Chunk;
@@ -27,6 +25,7 @@ use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 use crate::tolerance;
 use feedplan_geometry::conic::Conic;
+use feedplan_geometry::parallel::{consume, map};
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::watch::Watch;
 
@@ -91,12 +90,12 @@ pub fn build_smooth_path<const M: usize>(
     watch: Watch,
 ) -> Result<BuiltPath<M>, MoveError> {
     let each = watch.each(moves.kind.len());
-    let sections: Vec<Vec<Section<M>>> = sections(moves, tolerance::CRAWL * options.max_speed)
-        .into_par_iter()
-        .map(|range| {
-            Section::parts(moves, options, axes, range.clone(), motion, each.part(range.len() as f64))
-        })
-        .collect::<Result<_, _>>()?;
+    let ranges = sections(moves, tolerance::CRAWL * options.max_speed);
+    let sections: Vec<Vec<Section<M>>> = consume(ranges, |_, range| {
+        Section::parts(moves, options, axes, range.clone(), motion, each.part(range.len() as f64))
+    })
+    .into_iter()
+    .collect::<Result<_, _>>()?;
     let (mut chunks, mut runs, mut total) = (vec![], vec![], 0);
     let (mut fit, mut offsets, mut not_smooth) =
         (FitCounts::default(), Offsets::default(), NotSmooth::default());
@@ -178,8 +177,9 @@ impl<const M: usize> Section<M> {
         let reversal = if motion.is_some() { tolerance::FITTED_REVERSAL } else { tolerance::REVERSAL };
         let chords = moves.chords(options, range)?;
         let count = chords.chords.len();
-        let stops = |&end: &usize| end == count || chords.turn(end) > reversal || exact && !chords.meet(end);
-        let ends: Vec<usize> = (1..=count).into_par_iter().filter(stops).collect();
+        let stops = |end: usize| end == count || chords.turn(end) > reversal || exact && !chords.meet(end);
+        let ends = map(count, LEAST_PART, |i| stops(i + 1).then_some(i + 1));
+        let ends: Vec<usize> = ends.into_iter().flatten().collect();
         let mut parts = vec![];
         let (mut first, mut left) = (0, &ends[..]);
         while !left.is_empty() {
@@ -201,7 +201,7 @@ impl<const M: usize> Section<M> {
             }
             part
         };
-        Ok(parts.into_par_iter().map(part).collect())
+        Ok(consume(parts, |_, own| part(own)))
     }
 
     /// Appends a run.

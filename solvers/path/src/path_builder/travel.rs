@@ -1,15 +1,16 @@
 //! Finds the first place of a program and its path that is outside the travel of an axis.
 
-use rayon::prelude::*;
-
 use super::chunk::Chunk;
 use crate::moves::Moves;
 use crate::path_piece::Shape;
 use crate::tolerance::TRAVEL;
+use feedplan_geometry::parallel::find_first;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 
 /// The greatest number of halvings of a spline piece; each one brings the control polygon four times nearer to the curve.
 const DEPTH: u32 = 26;
+/// The number of moves that a thread checks at a time.
+const TASK: usize = 1024;
 
 /// A position outside the travel: the move, the axis and the position in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,13 +40,16 @@ pub fn outside<const M: usize>(
         let position = if least < low { least } else { greatest };
         (position < low || position > high).then_some(Outside { index, axis, position })
     };
-    let targets = moves.target.par_iter().enumerate().find_map_first(|(index, target)| {
+    let targets = find_first(moves.target.len(), TASK, |index| {
+        let target = &moves.target[index];
         (0..M).find_map(|axis| beyond(index, axis, (target[axis], target[axis]), 0.0))
     });
-    let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
+    let arcs = find_first(moves.arcs.len(), TASK, |arc| {
+        let (index, shape) = moves.arcs[arc];
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
-    let curves = chunks.par_iter().find_map_first(|chunk| {
+    let curves = find_first(chunks.len(), 1, |chunk| {
+        let chunk = &chunks[chunk];
         chunk.pieces.iter().find_map(|piece| {
             let index = piece.first as usize;
             let bulge = if piece.arc { piece.deviation } else { 0.0 };

@@ -6,11 +6,10 @@
 //! to C(u*_i) than the vertex is. So no distance is above the greatest of these bounds and of |C(u*_i) − V_i|. The proof holds
 //! for any ascending places u*_i.
 
-use rayon::prelude::*;
-
 use super::bezier::{distance_bound, is_inside, point_and_slope, speed_bound, split, Control, DEPTH};
 use super::polyline::Polyline;
 use super::spline::ORDER;
+use feedplan_geometry::parallel::map;
 use feedplan_geometry::quadratic::{dot, norm, sub};
 use feedplan_geometry::watch::Watch;
 
@@ -44,29 +43,21 @@ impl Certificate {
         watch: Watch,
     ) -> Self {
         let last = line.chords();
-        let free: Vec<f64> = (1..last)
-            .into_par_iter()
-            .with_min_len(TASK)
-            .map(|i| {
-                watch.check_at(i);
-                foot_point(line, knots, pieces, i)
-            })
-            .collect();
+        let free = map(last - 1, TASK, |i| {
+            watch.check_at(i + 1);
+            foot_point(line, knots, pieces, i + 1)
+        });
         let mut foot = Vec::with_capacity(last + 1);
         foot.push(0.0);
         for u in free {
             foot.push(u.max(foot[foot.len() - 1]));
         }
         foot.push(line.length());
-        let checked: Vec<(f64, bool)> = (0..pieces.len())
-            .into_par_iter()
-            .with_min_len(TASK)
-            .map(|j| {
-                watch.check_at(j);
-                let (deviation, good) = interval(line, knots, pieces, &foot, j);
-                (deviation, good && is_inside(&pieces[j], bounds, DEPTH))
-            })
-            .collect();
+        let checked = map(pieces.len(), TASK, |j| {
+            watch.check_at(j);
+            let (deviation, good) = interval(line, knots, pieces, &foot, j);
+            (deviation, good && is_inside(&pieces[j], bounds, DEPTH))
+        });
         let (deviation, good) = checked.into_iter().unzip();
         Self { foot, deviation, good }
     }

@@ -4,13 +4,12 @@
 //! meet, the curve may leave the tolerance tube. So the intervals around each seam are solved once more, with the coefficients at
 //! their ends held.
 
-use rayon::prelude::*;
-
 use super::band::Band;
 use super::polyline::Polyline;
 use super::problem::Problem;
 use super::rows::rows;
 use super::spline::{around, greville, Spline, DEGREE};
+use feedplan_geometry::parallel::map_with;
 use feedplan_geometry::watch::Watch;
 use std::ops::Range;
 
@@ -18,6 +17,8 @@ use std::ops::Range;
 const WINDOW: usize = 300;
 /// The number of intervals by which a window reaches over its ends, and by which a seam reaches to each side.
 const OVERLAP: usize = 20;
+/// The number of windows that a thread solves with the same memory.
+const TOGETHER: usize = 4;
 /// Long chords are straight except for this part of their length at each end.
 const BENT: f64 = 0.25;
 /// The same for a curve that is fitted to a motion: corners have more room, and the lines are still straight.
@@ -89,13 +90,10 @@ impl<'a, const D: usize> Fit<'a, D> {
 
     fn solve_windows(&mut self, windows: &[Window], watch: Watch) {
         let each = watch.each(windows.len());
-        let solved: Vec<Vec<[f64; D]>> = windows
-            .par_iter()
-            .map_init(Band::<D>::default, |band, window| {
-                each.advance(1);
-                self.window(window, band)
-            })
-            .collect();
+        let solved = map_with(windows.len(), TOGETHER, Band::<D>::default, |band, i| {
+            each.advance(1);
+            self.window(&windows[i], band)
+        });
         for (window, x) in windows.iter().zip(solved) {
             for i in window.keep.clone() {
                 if let Some(x) = x.get(i - window.intervals.start) {

@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::path_data::PathData;
 use super::BLOCK;
 use crate::phase_motion::{flaw, PiecePath, MAX_TIP};
+use feedplan_geometry::parallel::find_first;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::phases::{Phase, Phases};
@@ -55,7 +54,8 @@ pub(super) fn check<const M: usize>(
             (from..to.max(from + 1)).step_by(BLOCK).map(move |start| (r, start..to.min(start + BLOCK)))
         })
         .collect();
-    let first = parts.into_par_iter().find_map_first(|(r, part)| {
+    let first = find_first(parts.len(), 1, |n| {
+        let (r, part) = parts[n].clone();
         if part.is_empty() {
             return flaw_of_nothing(path, r);
         }
