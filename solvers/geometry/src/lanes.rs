@@ -9,6 +9,28 @@
 
 use crate::elementary::Elementary;
 
+/// `dispatch!` for vectors of four numbers: AVX-512 has the same instructions for them as AVX2, and no instance of its own.
+#[macro_export]
+macro_rules! dispatch_four {
+    ($simd:ident => $of:expr) => {{
+        let level = fearless_simd::Level::new();
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = level.as_avx2() {
+            $crate::dispatch_four!(@at simd, $simd => $of)
+        } else if let Some(simd) = level.as_sse4_2() {
+            $crate::dispatch_four!(@at simd, $simd => $of)
+        } else {
+            unreachable!("programs for x86-64-v2 run only on processors with SSE4.2")
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        fearless_simd::dispatch!(level, $simd => $of)
+    }};
+    (@at $level:expr, $simd:ident => $of:expr) => {{
+        let $simd = $level;
+        fearless_simd::Simd::vectorize($simd, #[inline(always)] || $of)
+    }};
+}
+
 /// Joins numbers by halves, in an order that does not depend on the processor.
 #[inline(always)]
 fn fold<const N: usize>(mut values: [f64; N], join: impl Fn(f64, f64) -> f64) -> f64 {

@@ -4,7 +4,7 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 
 use super::arrays::{padded, require, Column, Table};
-use super::axes::with_padded_axes;
+use super::axes::with_axes_of_audit;
 use super::curve::Curve;
 use super::memory;
 use super::moves::Moves;
@@ -250,7 +250,7 @@ pub fn audit_plan(
     let junction_speed = problem.junction_speed.as_slice()?;
     let phases = profile.as_ref().map(|profile| phases(profile, &problem)).transpose()?;
     let program = program.as_ref().map(|moves| programmed(moves, problem.axes())).transpose()?;
-    with_padded_axes!(problem.axes(), M, {
+    with_axes_of_audit!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
         run(py, progress.as_ref(), |watch| {
             let pieces = path.len();

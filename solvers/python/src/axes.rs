@@ -1,25 +1,38 @@
-//! The numbers of axes that kernels are compiled for.
+//! The numbers of axes that kernels are compiled for. Axes beyond those of the path are at rest, and change no result, so a few
+//! instances of a kernel suffice instead of nine.
 
-/// Calls a generic kernel for 3, 6 or 9 axes, those beyond `count` at rest. An axis at rest does not change results, so three
-/// instances of a kernel suffice instead of nine. For another number of axes it raises an error, or evaluates `otherwise`.
+/// Calls a generic kernel for 3 or 9 axes. For another number of axes it raises an error, or evaluates `otherwise`.
 macro_rules! with_padded_axes {
     ($count:expr, $m:ident, $call:expr) => {
-        with_padded_axes!($count, $m, $call, |count| {
+        crate::axes::with_axes!([3 9], $count, $m, $call)
+    };
+    ($count:expr, $m:ident, $call:expr, |$other:ident| $otherwise:expr) => {
+        crate::axes::with_axes!([3 9], $count, $m, $call, |$other| $otherwise)
+    };
+}
+
+/// `with_padded_axes` for the audit, whose cost depends more on the number of axes: 3, 6 or 9.
+macro_rules! with_axes_of_audit {
+    ($count:expr, $m:ident, $call:expr) => {
+        crate::axes::with_axes!([3 6 9], $count, $m, $call)
+    };
+}
+
+/// Calls a kernel for the least of these numbers that is enough.
+macro_rules! with_axes {
+    ([$($most:literal)+], $count:expr, $m:ident, $call:expr) => {
+        crate::axes::with_axes!([$($most)+], $count, $m, $call, |count| {
             Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 9 are supported")))
         })
     };
-    ($count:expr, $m:ident, $call:expr, |$other:ident| $otherwise:expr) => {
+    ([$($most:literal)+], $count:expr, $m:ident, $call:expr, |$other:ident| $otherwise:expr) => {
         match $count {
-            1..=3 => {
-                const $m: usize = 3;
+            $(1..=$most => {
+                const $m: usize = $most;
                 $call
-            }
-            4..=9 => {
-                const $m: usize = 9;
-                $call
-            }
+            })+
             $other => $otherwise,
         }
     };
 }
-pub(crate) use with_padded_axes;
+pub(crate) use {with_axes, with_axes_of_audit, with_padded_axes};

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{require, Column};
 use super::audit::{findings, phases, Findings, LimitArrays, ProblemArrays};
-use super::axes::with_padded_axes;
+use super::axes::with_axes_of_audit;
 use super::kinematics::{operation_rows, ExpressionArrays};
 use super::native::Of;
 use super::profile::Profile;
@@ -138,7 +138,7 @@ pub fn audit_joints(
     let joints = limits.axes();
     let arrays: ProblemArrays = problem.extract()?;
     let (junction_speed, phases) = (arrays.junction_speed()?, phases(&profile, &arrays)?);
-    with_padded_axes!(arrays.axes().max(joints), M, {
+    with_axes_of_audit!(arrays.axes().max(joints), M, {
         let limits = limits.limits::<M>(joints)?;
         JointWords::new(&problem, joints)?.with(&problem, joints, |path| {
             run(problem.py(), progress.as_ref(), |watch| {

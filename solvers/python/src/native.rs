@@ -1,4 +1,4 @@
-//! Gives access to the native objects of Python's records, and to their contents in 3, 6 or 9 axes.
+//! Gives access to the native objects of Python's records, and to their contents in 3 or 9 axes.
 
 use std::any::Any;
 use std::ops::Deref;

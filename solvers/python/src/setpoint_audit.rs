@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{require, Column, Table};
 use super::audit::{findings, phases, programmed, Findings, LimitArrays, ProblemArrays};
-use super::axes::with_padded_axes;
+use super::axes::with_axes_of_audit;
 use super::joint_audit::JointWords;
 use super::moves::Moves;
 use super::native::Of;
@@ -109,7 +109,7 @@ impl SetpointAudit {
             .transpose()?
             .flatten();
         let of_path = compared.as_ref().map_or(0, |(_, axes)| *axes);
-        let stream: Box<dyn AnyStream> = with_padded_axes!(
+        let stream: Box<dyn AnyStream> = with_axes_of_audit!(
             axes.max(of_path),
             M,
             Ok(Box::new(Stream::new(limits.limits::<M>(axes)?, resolution)) as _)

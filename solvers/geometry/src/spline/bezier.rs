@@ -4,10 +4,11 @@
 //! Control points are first taken relative to the nearer end of the piece. So the derivatives of a small piece far from the
 //! origin keep their digits, and both ends are exact.
 
-use fearless_simd::{dispatch, Level, Simd};
+use fearless_simd::Simd;
 
 use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
+use crate::dispatch_four;
 use crate::lanes::four::{Lanes, Register};
 
 /// Evaluates an expression with the number of control points as a constant, so that its loops are unrolled.
@@ -124,7 +125,7 @@ pub fn derivatives_at_four<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [[L
 fn axes_at_four(control: &[f64], t: [f64; 4], scale: f64, c: &mut [[Lanes; 3]]) {
     let axes = c.len();
     with_count!(control.len() / axes, N, {
-        dispatch!(Level::new(), simd => {
+        dispatch_four!(simd => {
             for (k, c) in c.iter_mut().enumerate() {
                 *c = triangle_at_four(simd, &axis::<N>(control, axes, k), t, scale);
             }
@@ -201,7 +202,7 @@ pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
 /// |C'|² with respect to t of a polynomial piece; not generic, so that it is compiled once, for any number of axes.
 fn axes_speeds_sq(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
     with_count!(control.len() / axes, N, {
-        dispatch!(Level::new(), simd => {
+        dispatch_four!(simd => {
             let t = Lanes::new(t).load(simd);
             let mut sum = Register::all(simd, 0.0);
             for k in 0..axes {
@@ -222,7 +223,7 @@ fn axes_speeds_sq(control: &[f64], axes: usize, t: [f64; 4]) -> [f64; 4] {
 fn rational_speeds_sq(control: &[f64], axes: usize, weights: &[f64], t: [f64; 4]) -> [f64; 4] {
     with_count!(weights.len(), N, {
         let of = |numbers: [f64; N]| {
-            dispatch!(Level::new(), simd => {
+            dispatch_four!(simd => {
                 let numbers = numbers.map(|number| Register::all(simd, number));
                 value_and_slope(numbers, Lanes::new(t).load(simd)).map(Register::values)
             })

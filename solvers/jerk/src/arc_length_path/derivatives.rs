@@ -5,10 +5,11 @@
 //!
 //!   u' = D^(−1/2),   u'' = −D_u / (2 D²),   u''' = D^(−1/2) (D_u² / D³ − D_uu / (2 D²))
 
-use fearless_simd::{dispatch, Level, Simd};
+use fearless_simd::Simd;
 
 use crate::path_limits::chord_speed;
 use crate::path_problem::{PathPoint, PathPoints};
+use feedplan_geometry::dispatch_four;
 use feedplan_geometry::lanes::four::{Lanes, Register};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::{self, derivatives, derivatives_at_four};
@@ -112,7 +113,7 @@ fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
 
 /// `polynomial` at four parameters.
 fn polynomial_at_four(coefficients: &[f64], width: f64, u: [f64; 4]) -> [Lanes; 3] {
-    dispatch!(Level::new(), simd => polynomial_on(simd, coefficients, width, u))
+    dispatch_four!(simd => polynomial_on(simd, coefficients, width, u))
 }
 
 #[inline(always)]
@@ -208,7 +209,7 @@ pub fn path_point<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Pat
 pub fn path_points<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) -> PathPoints<M> {
     let c = derivatives_at_four(&piece(problem, i), u);
     let rate = problem.way.map(|way| polynomial_at_four(way.of(i), problem.width[i], u));
-    let (q, [d, bend]) = dispatch!(Level::new(), simd => by_length(simd, &c, rate));
+    let (q, [d, bend]) = dispatch_four!(simd => by_length(simd, &c, rate));
     let square = match (problem.tip, problem.share(i)) {
         (Some(tip), _) => Some(polynomial_at_four(tip.speed.of(i), problem.width[i], u)[0]),
         (None, None) => None,

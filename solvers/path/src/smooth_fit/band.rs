@@ -165,7 +165,7 @@ impl<const D: usize> Band<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fearless_simd::{dispatch, Level};
+    use feedplan_geometry::dispatch_four;
 
     #[test]
     fn a_banded_system_is_solved_with_one_block_fixed() {
@@ -198,9 +198,9 @@ mod tests {
                 }
             }
             let fixed = if count == 9 { &fixed[..] } else { &[false; 20] };
-            dispatch!(Level::new(), simd => band.factor(simd, fixed));
+            dispatch_four!(simd => band.factor(simd, fixed));
         }
-        dispatch!(Level::new(), simd => band.solve(simd, &mut x));
+        dispatch_four!(simd => band.solve(simd, &mut x));
         let x: Vec<f64> = x.iter().flat_map(|x| *x.values()).collect();
         assert_eq!(x[6..8], [0.0; 2]);
         for i in (0..2 * count).filter(|&i| !fixed[i / 2]) {

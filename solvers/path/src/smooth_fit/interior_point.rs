@@ -19,7 +19,8 @@
 //! places. The step lengths of neighbouring quads differ little. Where they differ, slacks do not fit their rows exactly; the
 //! next steps correct that.
 
-use fearless_simd::{dispatch, Level, Simd};
+use fearless_simd::Simd;
+use feedplan_geometry::dispatch_four;
 use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
 
 use super::band::Band;
@@ -61,7 +62,7 @@ const NO_ENERGY: f64 = 1e-8;
 impl<const D: usize> Problem<D> {
     /// Solves the problem in place; returns the number of iterations.
     pub fn solve(&mut self, band: &mut Band<D>) -> usize {
-        dispatch!(Level::new(), simd => self.solve_on(simd, band))
+        dispatch_four!(simd => self.solve_on(simd, band))
     }
 
     #[inline(always)]
