@@ -9,7 +9,8 @@
 
 use crate::elementary::Elementary;
 
-/// `dispatch!` for vectors of four numbers: AVX-512 has the same instructions for them as AVX2, and no instance of its own.
+/// `dispatch!` for vectors of four numbers. It has no instance for AVX-512, whose vectors hold eight numbers: there it uses the
+/// instance for AVX2.
 #[macro_export]
 macro_rules! dispatch_four {
     ($simd:ident => $of:expr) => {{
