@@ -86,7 +86,7 @@ impl<const M: usize> Case<M> {
         if M <= 3 {
             Elevated::<3>::new(self, elevate).problem(self).fastest()
         } else {
-            Elevated::<6>::new(self, elevate).problem(self).fastest()
+            Elevated::<9>::new(self, elevate).problem(self).fastest()
         }
     }
 
