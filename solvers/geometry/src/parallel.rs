@@ -56,6 +56,25 @@ pub fn map_with<S, T: Send>(
     results.into_iter().flatten().collect()
 }
 
+/// `map` for work that may fail: the error is that of the least number that fails. After it no other number is begun.
+pub fn try_map<T: Send, E: Send>(
+    count: usize,
+    size: usize,
+    work: impl Fn(usize) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
+    let failed = AtomicUsize::new(usize::MAX);
+    let results = map(count, size, |i| {
+        (i < failed.load(Relaxed)).then(|| {
+            let result = work(i);
+            if result.is_err() {
+                failed.fetch_min(i, Relaxed);
+            }
+            result
+        })
+    });
+    results.into_iter().flatten().collect()
+}
+
 /// The first result of `work` for the numbers 0 to `count` − 1 that is not None. A thread does `size` numbers at a time.
 pub fn find_first<T: Send>(count: usize, size: usize, work: impl Fn(usize) -> Option<T> + Sync) -> Option<T> {
     let parts =
@@ -104,6 +123,27 @@ mod tests {
         assert_eq!(items, (0..100).collect::<Vec<_>>());
         let texts = (0..100).map(|i| i.to_string()).collect();
         assert!(consume(texts, |i, text| text == i.to_string()).into_iter().all(|same| same));
+    }
+
+    #[test]
+    fn the_error_is_that_of_the_least_number_and_ends_the_work() {
+        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        for failing in [0, 7, 400] {
+            let calls = AtomicUsize::new(0);
+            let work = |i: usize| {
+                calls.fetch_add(1, Relaxed);
+                if i < failing {
+                    Ok(i)
+                } else {
+                    Err(i)
+                }
+            };
+            assert_eq!(try_map(1000, 3, work), Err(failing));
+            calls.store(0, Relaxed);
+            assert_eq!(alone.install(|| try_map(1000, 3, work)), Err(failing));
+            assert_eq!(calls.load(Relaxed), failing + 1);
+        }
+        assert_eq!(try_map(3, 1, Ok::<usize, ()>), Ok(vec![0, 1, 2]));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::arc_length_path::{
 use crate::jerk_profile::JerkProfile;
 use crate::path_problem::Limits;
 use feedplan_geometry::bisection::boundary;
-use feedplan_geometry::parallel::map;
+use feedplan_geometry::parallel::{map, try_map};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;
@@ -82,9 +82,7 @@ pub fn over_subruns<const M: usize>(
 ) -> Result<JerkProfile, Fault> {
     over_chains(problem, jerk, |chains, limits, watch| {
         let subruns: Vec<&Subrun> = chains.iter().flat_map(|chain| chain.subruns).collect();
-        let planned =
-            map(subruns.len(), 1, |i| plan(subruns[i], limits, watch.part(subruns[i].parts.len() as f64)));
-        planned.into_iter().collect()
+        try_map(subruns.len(), 1, |i| plan(subruns[i], limits, watch.part(subruns[i].parts.len() as f64)))
     })
 }
 
@@ -104,9 +102,9 @@ pub fn over_chains<const M: usize>(
     let together: Vec<&[Chain]> = runs.flat_map(|run| run.chunks(TOGETHER)).collect();
     let order = longest_first(&together);
     let mut planned = vec![vec![]; together.len()];
-    let results = map(order.len(), 1, |n| plan(together[order[n]], &limits, watch));
+    let results = try_map(order.len(), 1, |n| plan(together[order[n]], &limits, watch))?;
     for (i, result) in order.into_iter().zip(results) {
-        planned[i] = result?;
+        planned[i] = result;
     }
     let mut planned = planned.into_iter().flatten();
     let (mut kept, mut runs, mut lower_bound) = (vec![], vec![0], vec![]);

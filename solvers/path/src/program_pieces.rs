@@ -12,7 +12,7 @@ use crate::moves::{MoveError, Moves, PathOptions, ARC, LINE, SPLINE};
 use crate::path_piece::{PathPiece, Shape};
 use feed_cuts::cut_at_feeds;
 use feedplan_geometry::conic::Conic;
-use feedplan_geometry::parallel::consume;
+use feedplan_geometry::parallel::try_map;
 use feedplan_geometry::watch::Watch;
 
 /// The greatest number of moves outside of chains in a task.
@@ -85,15 +85,16 @@ pub fn program_pieces<const M: usize>(
     watch: Watch,
 ) -> Result<ProgramPieces<M>, MoveError> {
     let each = watch.each(moves.kind.len());
-    let parts = consume(moves.tasks(), |_, range| {
+    let tasks = moves.tasks();
+    let parts = try_map(tasks.len(), 1, |i| {
+        let range = tasks[i].clone();
         if moves.is_chain(&range) {
             let watch = each.part(range.len() as f64);
             return chain(moves, options, range, watch);
         }
         each.advance(range.len());
         one_by_one(moves, options, range)
-    });
-    let parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
+    })?;
     let total = parts.iter().map(|part| part.pieces.len()).sum();
     let mut whole = ProgramPieces { pieces: Vec::with_capacity(total), ..ProgramPieces::default() };
     for part in parts {

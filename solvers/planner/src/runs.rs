@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::thread::LocalKey;
 
-use feedplan_geometry::parallel::map;
+use feedplan_geometry::parallel::try_map;
 
 use crate::problem::{Fault, Problem};
 use crate::profile::Profile;
@@ -27,7 +27,7 @@ pub fn over_runs<const M: usize, W: Default>(
     let runs = problem.runs;
     let last_run = runs.len() - 2;
     let groups = groups(runs);
-    let plans = map(groups.len(), 1, |i| {
+    let plans = try_map(groups.len(), 1, |i| {
         let group = &groups[i];
         let pieces = runs[group.end] - runs[group.start];
         let mut profile = Profile::with_capacity(2 * pieces);
@@ -46,7 +46,7 @@ pub fn over_runs<const M: usize, W: Default>(
         }
         Ok(profile)
     });
-    Ok(Profile::join(plans.into_iter().collect::<Result<_, Fault>>()?))
+    Ok(Profile::join(plans?))
 }
 
 /// Groups of successive runs with about `GROUP` pieces each.

@@ -18,7 +18,7 @@ use crate::jerk_profile::JerkProfile;
 use crate::path_problem::{self, Effort, End, Limits, SpeedCap};
 use crate::s_curve::{self, Segment};
 use crate::subruns::{over_chains, Chain, Subrun};
-use feedplan_geometry::parallel::{consume, map};
+use feedplan_geometry::parallel::{consume, map, try_map};
 use feedplan_planner::problem::{along, Fault, Problem};
 
 /// A junction counts as limiting the speed where the plan reaches this fraction of its cap.
@@ -116,7 +116,7 @@ impl<const M: usize> Task<'_, M> {
     /// gives one price of an interval for all of them (`refinement`).
     pub fn chains(&self, chains: &[Chain]) -> Result<Vec<JerkProfile>, Fault> {
         let look = |i: usize| (!self.effort.expired()).then(|| self.rough_chain(&chains[i])).transpose();
-        let known = map(chains.len(), 1, look).into_iter().collect::<Result<Vec<_>, _>>()?;
+        let known = try_map(chains.len(), 1, look)?;
         let paths = known.iter().flatten().flat_map(|chain| &chain.known);
         let roughs = paths.flat_map(|(_, own)| &own.stretches).filter_map(RoughStretch::rough);
         let price = refinement::price(roughs.map(|rough| &rough.losses));

@@ -25,7 +25,7 @@ use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 use crate::tolerance;
 use feedplan_geometry::conic::Conic;
-use feedplan_geometry::parallel::{consume, map};
+use feedplan_geometry::parallel::{consume, map, try_map};
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::watch::Watch;
 
@@ -91,11 +91,10 @@ pub fn build_smooth_path<const M: usize>(
 ) -> Result<BuiltPath<M>, MoveError> {
     let each = watch.each(moves.kind.len());
     let ranges = sections(moves, tolerance::CRAWL * options.max_speed);
-    let sections: Vec<Vec<Section<M>>> = consume(ranges, |_, range| {
-        Section::parts(moves, options, axes, range.clone(), motion, each.part(range.len() as f64))
-    })
-    .into_iter()
-    .collect::<Result<_, _>>()?;
+    let sections: Vec<Vec<Section<M>>> = try_map(ranges.len(), 1, |i| {
+        let watch = each.part(ranges[i].len() as f64);
+        Section::parts(moves, options, axes, ranges[i].clone(), motion, watch)
+    })?;
     let (mut chunks, mut runs, mut total) = (vec![], vec![], 0);
     let (mut fit, mut offsets, mut not_smooth) =
         (FitCounts::default(), Offsets::default(), NotSmooth::default());
