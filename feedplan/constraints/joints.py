@@ -3,7 +3,7 @@
 K is the map from tool to joints. Where K is affine, the control points of the joints are K of the control
 points of the tool. Elsewhere q'' is interpolated with a proven error (`feedplan.machine.joint_interpolants`),
 and the tool's pieces are cut at the same places. At every speed that the other limits allow, the acceleration
-error of an axis is below 1e-8 of its limit.
+error of an axis is some 1e-9 of its limit.
 """
 
 from __future__ import annotations
