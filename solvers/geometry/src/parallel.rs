@@ -1,5 +1,5 @@
-//! Loops on all cores. The loop itself is compiled once, not for each kind of work and each number of axes: rayon's iterators
-//! would be compiled again for each of them, which takes longer than the work.
+//! Loops on all cores. The loop itself is compiled once. An iterator of rayon would be compiled again for each kind of work and
+//! each number of axes.
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::Mutex;
@@ -56,7 +56,8 @@ pub fn map_with<S, T: Send>(
     results.into_iter().flatten().collect()
 }
 
-/// `map` for work that may fail: the error is that of the least number that fails. After it no other number is begun.
+/// `map` for work that may fail: the error is that of the least number that fails. After a failure no
+/// greater number is begun.
 pub fn try_map<T: Send, E: Send>(
     count: usize,
     size: usize,
@@ -77,9 +78,11 @@ pub fn try_map<T: Send, E: Send>(
 
 /// The first result of `work` for the numbers 0 to `count` − 1 that is not None. A thread does `size` numbers at a time.
 pub fn find_first<T: Send>(count: usize, size: usize, work: impl Fn(usize) -> Option<T> + Sync) -> Option<T> {
-    let parts =
-        map(count.div_ceil(size), 1, |part| (part * size..count.min((part + 1) * size)).find_map(&work));
-    parts.into_iter().flatten().next()
+    try_map(count.div_ceil(size), 1, |part| {
+        let found = (part * size..count.min((part + 1) * size)).find_map(&work);
+        found.map_or(Ok(()), Err)
+    })
+    .err()
 }
 
 /// The results of `work` for the items, in order; each item is moved into its call. A thread does one at a time.

@@ -3,18 +3,15 @@
 
 /// Calls a generic kernel for 3 or 9 axes. For another number of axes it raises an error, or evaluates `otherwise`.
 macro_rules! with_padded_axes {
-    ($count:expr, $m:ident, $call:expr) => {
-        crate::axes::with_axes!([3 9], $count, $m, $call)
-    };
-    ($count:expr, $m:ident, $call:expr, |$other:ident| $otherwise:expr) => {
-        crate::axes::with_axes!([3 9], $count, $m, $call, |$other| $otherwise)
+    ($($arguments:tt)+) => {
+        crate::axes::with_axes!([3 9], $($arguments)+)
     };
 }
 
 /// `with_padded_axes` for the audit, whose cost depends more on the number of axes: 3, 6 or 9.
 macro_rules! with_axes_of_audit {
-    ($count:expr, $m:ident, $call:expr) => {
-        crate::axes::with_axes!([3 6 9], $count, $m, $call)
+    ($($arguments:tt)+) => {
+        crate::axes::with_axes!([3 6 9], $($arguments)+)
     };
 }
 

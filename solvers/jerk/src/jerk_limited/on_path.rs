@@ -271,7 +271,7 @@ impl<const M: usize> Task<'_, M> {
             });
             RoughStretch { stretch, rough, phases: None }
         };
-        known.stretches = consume(stretches, |_, stretch| look(stretch));
+        known.stretches = map(stretches.len(), 1, |i| look(stretches[i]));
         known
     }
 

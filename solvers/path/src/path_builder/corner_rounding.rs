@@ -59,14 +59,14 @@ pub fn round_corners<const M: usize>(
         return (vec![], vec![0]);
     }
     let whole = CornerRounding::new(pieces, splines, halt, rounding);
-    let corners = 0..whole.corners.len();
-    let each = watch.part(0.75).each(corners.len());
-    let wanted = map(corners.len(), TASK, |k| {
+    let count = whole.corners.len();
+    let each = watch.part(0.75).each(count);
+    let wanted = map(count, TASK, |k| {
         watch.check_at(k);
         whole.wanted_length(k, axes)
     });
     let length = share_lengths(&wanted, &whole.length);
-    let cuts = map_with(corners.len(), TASK, Sides::default, |sides, k| {
+    let cuts = map_with(count, TASK, Sides::default, |sides, k| {
         each.count(k);
         whole.fitting_cuts(k, &length, sides)
     });

@@ -25,7 +25,7 @@ use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 use crate::tolerance;
 use feedplan_geometry::conic::Conic;
-use feedplan_geometry::parallel::{consume, map, try_map};
+use feedplan_geometry::parallel::{map, try_map};
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::watch::Watch;
 
@@ -200,7 +200,7 @@ impl<const M: usize> Section<M> {
             }
             part
         };
-        Ok(consume(parts, |_, own| part(own)))
+        Ok(map(parts.len(), 1, |i| part(parts[i])))
     }
 
     /// Appends a run.
