@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -63,11 +64,12 @@ def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> Float
     try:
         given = np.asarray(values)
         # Objects may be numbers, such as fractions, so they are checked one by one; NumPy would also accept
-        # texts and truth values. Masked values are not numbers.
+        # texts and truth values. Masked values are not numbers; there are none before numpy.ma is imported,
+        # and a process forked while a thread imports it would wait for ever.
         if (
             given.dtype.kind not in "iufO"
             or (given.dtype.kind == "O" and not all(map(is_number, given.flat)))
-            or np.ma.is_masked(values)
+            or ("numpy.ma" in sys.modules and np.ma.is_masked(values))
         ):
             raise TypeError
         array = np.ascontiguousarray(given, dtype=np.float64)

@@ -65,6 +65,22 @@ def test_children_plan_after_their_parent_has_planned(method: str, busy: bool, t
         assert int(done.stdout) > 1
 
 
+def test_what_a_plan_computes_later_imports_nothing(tmp_path: Path) -> None:
+    # A process that is forked while a thread imports a module waits for ever when it imports that module.
+    program = tmp_path / "program.ngc"
+    program.write_text("G21 G90\nG1 X1 F1000\nX2 Y1\nM2\n", encoding="ascii")
+    script = (
+        "import sys, feedplan\n"
+        "plan = feedplan.plan(sys.argv[1], 'mill', method='jerk-limited')\n"
+        "before = set(sys.modules)\n"
+        "plan.audit(), plan.account\n"
+        "print(*sorted(set(sys.modules) - before))\n"
+    )
+    command = [sys.executable, "-c", script, str(program)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
+
+
 def test_a_value_that_a_thread_computes_does_not_lock_another_objects() -> None:
     class Slow:
         def __init__(self, begun: threading.Event, goes_on: threading.Event) -> None:
