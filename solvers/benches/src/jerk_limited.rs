@@ -47,7 +47,8 @@ fn jerk_limited(criterion: &mut Criterion) {
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     for length in [100.0, 1_000.0, 10_000.0] {
         let geometry = Winding([0.0, length]);
-        let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
+        let problem =
+            Problem { geometry: &geometry, limits, moves: [true; 3], caps: &[], ends: [End::Rest; 2] };
         let planned = |max_iterations: usize| {
             let effort = Effort { max_iterations, ..Effort::default() };
             one.install(|| plan(&problem, &effort).expect("a plan"))

@@ -17,7 +17,7 @@ impl Geometry<PADDED> for Path<'_> {
 }
 
 /// Calls `jerk_limited::plan` with the problem in `PADDED` axes.
-pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
+pub fn plan<const M: usize>(problem: &Problem<M>, effort: &Effort) -> Result<Plan, Fault> {
     let at = |piece, s| {
         let PathPoint { first, second, third, speed_cap } = problem.geometry.at(piece, s);
         let [first, second, third] = [first, second, third].map(|values| padded(&values, 0.0));
@@ -30,6 +30,7 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
         jerk: padded(jerk, 1.0),
     };
     let geometry = Path(Box::new(at), problem.geometry.knots());
-    let padded = Problem { geometry: &geometry, limits, caps: problem.caps, ends: problem.ends };
+    let moves = std::array::from_fn(|k| k < M && problem.moves[k]);
+    let padded = Problem { geometry: &geometry, limits, moves, caps: problem.caps, ends: problem.ends };
     jerk_limited::plan(&padded, effort)
 }

@@ -18,7 +18,6 @@
 //! | `intersample_check`, `window` | the limits between the collocation points |
 //! | `refinement` | the rough plan on a coarse grid, and where shorter intervals pay |
 //! | `windows` | paths of any length |
-//! | `moving_axes` | the axes that move on a path |
 //! | `held` | where the feed is held, and the stretches between such places |
 //! | `speed_limit`, `lower_bound` | speeds that no motion exceeds; a lower bound on the time on the same grid |
 //! | `cases` | a closer lower bound where the relaxation leaves a wide gap |
@@ -46,7 +45,6 @@ mod intersample_check;
 mod levels;
 mod lower_bound;
 mod model;
-mod moving_axes;
 mod newton;
 pub mod on_path;
 mod prepare;

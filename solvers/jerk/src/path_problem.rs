@@ -125,9 +125,12 @@ impl End {
     }
 }
 
-pub struct Problem<'a, G: ?Sized, const M: usize> {
-    pub geometry: &'a G,
+pub struct Problem<'a, const M: usize> {
+    pub geometry: &'a dyn Geometry<M>,
     pub limits: Limits<M>,
+    /// Whether each axis moves on the path. The others get no rows in the solver: most pieces of most programs move two axes of
+    /// three, or three of five.
+    pub moves: [bool; M],
     /// Strictly rising in s, with speeds above 0.
     pub caps: &'a [SpeedCap],
     pub ends: [End; 2],

@@ -40,9 +40,9 @@ impl Geometry<1> for Line {
 }
 
 /// The problem from rest to rest, with the same limits for all axes.
-fn problem<G: Geometry<M>, const M: usize>(geometry: &G, [v, a, j]: [f64; 3]) -> Problem<'_, G, M> {
+fn problem<const M: usize>(geometry: &dyn Geometry<M>, [v, a, j]: [f64; 3]) -> Problem<'_, M> {
     let limits = Limits { velocity: [[v; M]; 2], acceleration: [[a; M]; 2], jerk: [j; M] };
-    Problem { geometry, limits, caps: &[], ends: [End::Rest; 2] }
+    Problem { geometry, limits, moves: [true; M], caps: &[], ends: [End::Rest; 2] }
 }
 
 const FAST: [f64; 3] = [250.0, 3000.0, 50_000.0];
@@ -51,16 +51,12 @@ fn proving() -> Effort<'static> {
     Effort { proves: true, ..Effort::default() }
 }
 
-fn planned<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Plan {
+fn planned<const M: usize>(problem: &Problem<M>) -> Plan {
     plan(problem, &proving()).expect("the path can be travelled")
 }
 
 /// The greatest excess of velocity, acceleration and jerk over the limits, at `dense` points of each interval and ramp.
-fn excess<G: Geometry<M>, const M: usize>(
-    problem: &Problem<G, M>,
-    profile: &Profile,
-    dense: usize,
-) -> [f64; 3] {
+fn excess<const M: usize>(problem: &Problem<M>, profile: &Profile, dense: usize) -> [f64; 3] {
     let knots = problem.geometry.knots();
     let limits = &problem.limits;
     let mut worst = [-1.0f64; 3];
@@ -89,7 +85,7 @@ fn excess<G: Geometry<M>, const M: usize>(
     worst
 }
 
-fn assert_held<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, profile: &Profile) {
+fn assert_held<const M: usize>(problem: &Problem<M>, profile: &Profile) {
     // With 17 points per interval, none coincides with one of the twelve points that the planner checks.
     let excess = excess(problem, profile, 17);
     assert!(excess.iter().all(|&part| part < HELD), "excess {excess:?}");

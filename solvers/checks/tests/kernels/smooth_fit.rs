@@ -300,7 +300,7 @@ fn jerk_limited_time(line: &Polyline<2>) -> f64 {
     }
     let geometry = ByLength::new(Fitted(smooth, knots.clone()), &knots, 8);
     let limits = Limits { velocity: [[100.0; 2]; 2], acceleration: [[500.0; 2]; 2], jerk: [5e4; 2] };
-    let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
+    let problem = Problem { geometry: &geometry, limits, moves: [true; 2], caps: &[], ends: [End::Rest; 2] };
     let effort = Effort { resolution: 6.0, tolerance: 1e-4, ..Effort::default() };
     plan(&problem, &effort).expect("the path can be travelled").time
 }

@@ -116,7 +116,7 @@ mod tests {
     /// Constraints on intervals of these lengths; q' is the index of the collocation point, 4 per interval.
     fn rows(lengths: &[f64]) -> Constraints {
         let limits = Limits { velocity: [[1.0]; 2], acceleration: [[1.0]; 2], jerk: [1.0] };
-        let mut rows = Constraints::new(&limits);
+        let mut rows = Constraints::new(&limits, &[true; 1]);
         for (n, &h) in lengths.iter().enumerate() {
             rows.push(h, 1.0 + n as f64);
             for p in 0..COUNT {

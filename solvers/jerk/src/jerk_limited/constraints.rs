@@ -58,6 +58,8 @@ pub struct Point {
 pub struct Constraints {
     count: usize,
     pub blocks: Vec<Block>,
+    /// The axes that move, by their numbers in the problem. All other lists of axes follow this one.
+    axes: Vec<usize>,
     /// q', q'', q''' of each axis at each collocation point of each block.
     q: Vec<[Lanes; 3]>,
     pub acceleration: Vec<Sides>,
@@ -150,22 +152,25 @@ impl Block {
 }
 
 impl Constraints {
-    /// Constraints for these limits of the axes, without intervals.
-    pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
+    /// Constraints for the limits of the axes that move, without intervals.
+    pub fn new<const M: usize>(limits: &Limits<M>, moves: &[bool; M]) -> Self {
+        let axes: Vec<usize> = (0..M).filter(|&k| moves[k]).collect();
+        let sides = Sides::of(&limits.acceleration);
         Self {
             count: 0,
             blocks: vec![],
             q: vec![],
-            acceleration: Sides::of(&limits.acceleration).to_vec(),
-            per_jerk: limits.jerk.map(|j| 1.0 / j).to_vec(),
+            acceleration: axes.iter().map(|&k| sides[k]).collect(),
+            per_jerk: axes.iter().map(|&k| 1.0 / limits.jerk[k]).collect(),
+            axes,
             accelerates: true,
         }
     }
 
-    /// The number of axes.
+    /// The number of axes that move.
     #[inline(always)]
     pub fn axes(&self) -> usize {
-        self.per_jerk.len()
+        self.axes.len()
     }
 
     #[inline(always)]
@@ -207,9 +212,12 @@ impl Constraints {
     /// The greatest r = w^(3/4) that the limits allow on an interval if |dr/ds| is at most k.
     pub fn envelope_cap<const M: usize>(&self, n: usize, limits: &Limits<M>, k: f64) -> f64 {
         let cap = |p: usize| {
-            let of = |order: usize| std::array::from_fn(|axis| self.derivatives(n, p, axis)[order]);
+            let [mut first, mut second, mut third] = [[0.0; M]; 3];
+            for (i, &axis) in self.axes.iter().enumerate() {
+                [first[axis], second[axis], third[axis]] = self.derivatives(n, p, i);
+            }
             let speed_cap = 1.0 / self.speed(n, p).sqrt();
-            limits.envelope_cap(&PathPoint { first: of(0), second: of(1), third: of(2), speed_cap }, k)
+            limits.envelope_cap(&PathPoint { first, second, third, speed_cap }, k)
         };
         cap(0).min(cap(1)).min(cap(2)).min(cap(3))
     }
@@ -245,8 +253,9 @@ impl Constraints {
 
     /// Constraints with the same limits of the axes but without intervals; memory for `room` intervals is reserved.
     pub fn emptied(&self, room: usize) -> Self {
-        let (acceleration, per_jerk) = (self.acceleration.clone(), self.per_jerk.clone());
-        let mut empty = Self { blocks: vec![], q: vec![], acceleration, per_jerk, ..*self };
+        let (axes, acceleration, per_jerk) =
+            (self.axes.clone(), self.acceleration.clone(), self.per_jerk.clone());
+        let mut empty = Self { blocks: vec![], q: vec![], axes, acceleration, per_jerk, ..*self };
         empty.clear(room);
         empty
     }
@@ -303,7 +312,7 @@ impl Constraints {
     /// is tightened by `jerk_factor[n]`. `station_cap` is the additional speed cap at a station in mm/s, infinite if it has none.
     pub fn sample<const M: usize>(
         &mut self,
-        geometry: &impl Geometry<M>,
+        geometry: &dyn Geometry<M>,
         limits: &Limits<M>,
         stations: &[f64],
         pieces: &[u32],
@@ -312,6 +321,7 @@ impl Constraints {
     ) {
         self.clear(pieces.len());
         self.accelerates = true;
+        let axes = self.axes.clone();
         for (n, &piece) in pieces.iter().enumerate() {
             let (start, end) = (stations[n], stations[n + 1]);
             let h = end - start;
@@ -327,7 +337,8 @@ impl Constraints {
                 };
                 let speed = limits.per_speed_sq(&point).max(1.0 / (cap * cap));
                 let of_path = 1.0 / (point.speed_cap * point.speed_cap);
-                self.set(p, [speed, of_path], 1.0, |k| [point.first[k], point.second[k], point.third[k]]);
+                let derivatives = |k: usize| [point.first[k], point.second[k], point.third[k]];
+                self.set(p, [speed, of_path], 1.0, |i| derivatives(axes[i]));
             }
         }
     }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::constraints::Constraints;
 use super::window_end::WindowEnd;
-use crate::path_problem::{Geometry, Problem, SpeedCap};
+use crate::path_problem::{Problem, SpeedCap};
 
 /// r counts as changing where its slope is more than this fraction of its greatest slope.
 const CHANGING: f64 = 0.02;
@@ -120,12 +120,7 @@ impl Grid {
     }
 
     /// Sets `rows` to the constraints on a range of intervals.
-    pub fn sample<G: Geometry<M>, const M: usize>(
-        &self,
-        problem: &Problem<G, M>,
-        range: Range<usize>,
-        rows: &mut Constraints,
-    ) {
+    pub fn sample<const M: usize>(&self, problem: &Problem<M>, range: Range<usize>, rows: &mut Constraints) {
         let stations = &self.stations[range.start..=range.end];
         let (pieces, jerk_factor) = (&self.pieces[range.clone()], &self.jerk_factor[range.clone()]);
         let cap = |station| self.cap(range.start + station);
@@ -216,7 +211,7 @@ mod tests {
     use super::super::rest_ramp::Ramp;
     use super::super::speed_envelope::sample_envelope;
     use super::*;
-    use crate::path_problem::{Limits, PathPoint};
+    use crate::path_problem::{Geometry, Limits, PathPoint};
     use feedplan_geometry::watch::Watch;
 
     struct Line;

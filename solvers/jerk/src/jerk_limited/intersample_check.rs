@@ -67,28 +67,31 @@ pub struct IntersampleCheck {
 /// The limits of an axis.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
+    /// The number of the axis in the problem.
+    number: usize,
     velocity: Sides,
     acceleration: Sides,
     per_jerk: f64,
 }
 
 impl IntersampleCheck {
-    /// A check without samples, for these limits of the axes.
-    pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
+    /// A check without samples, for the limits of the axes that move.
+    pub fn new<const M: usize>(limits: &Limits<M>, moves: &[bool; M]) -> Self {
         let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::of);
         let axis = |k: usize| Axis {
+            number: k,
             velocity: velocity[k],
             acceleration: acceleration[k],
             per_jerk: 1.0 / limits.jerk[k],
         };
-        Self { axes: (0..M).map(axis).collect(), blocks: vec![], q: vec![] }
+        Self { axes: (0..M).filter(|&k| moves[k]).map(axis).collect(), blocks: vec![], q: vec![] }
     }
 
     /// Evaluates the path at the samples between `stations` (in mm). The values at collocation points, w_max at stations and the
     /// factors of jerk are copied from `rows`.
     pub fn sample<const M: usize>(
         &mut self,
-        geometry: &impl Geometry<M>,
+        geometry: &dyn Geometry<M>,
         stations: &[f64],
         pieces: &[u32],
         rows: &Constraints,
@@ -96,14 +99,15 @@ impl IntersampleCheck {
         self.blocks.clear();
         self.blocks.reserve(rows.blocks.len());
         // Only the last block needs clearing: all lanes of all others are set below.
-        self.q.truncate(rows.blocks.len().saturating_sub(1) * M);
-        self.q.resize(rows.blocks.len() * M, [[Lanes::ZERO; 3]; SAMPLES]);
+        let axes = self.axes.len();
+        self.q.truncate(rows.blocks.len().saturating_sub(1) * axes);
+        self.q.resize(rows.blocks.len() * axes, [[Lanes::ZERO; 3]; SAMPLES]);
         let knots = geometry.knots();
         let error = ROUNDINGS * f64::EPSILON * (knots[knots.len() - 1] - knots[0]);
         for (b, own) in rows.blocks.iter().enumerate() {
             let first = b * LANES;
             let mut caps = [Lanes::ZERO; SAMPLES];
-            let samples = &mut self.q[b * M..(b + 1) * M];
+            let samples = &mut self.q[b * axes..(b + 1) * axes];
             for (p, point) in own.points.iter().enumerate() {
                 caps[STEPS * p] = point.cap;
                 for (samples, q) in samples.iter_mut().zip(rows.q(b, p)) {
@@ -115,8 +119,8 @@ impl IntersampleCheck {
                 let s = |i: usize| start + h * (i as f64 / (SAMPLES - 1) as f64);
                 for first in (1..SAMPLES).step_by(STEPS) {
                     let points = geometry.at_four(piece as usize, std::array::from_fn(|i| s(first + i)));
-                    for (samples, of_axis) in samples.iter_mut().zip(&points.q) {
-                        for (order, values) in of_axis.iter().enumerate() {
+                    for (samples, axis) in samples.iter_mut().zip(&self.axes) {
+                        for (order, values) in points.q[axis.number].iter().enumerate() {
                             for (i, value) in values.values().iter().enumerate() {
                                 samples[first + i][order].values_mut()[lane] = *value;
                             }
@@ -159,7 +163,7 @@ impl IntersampleCheck {
             let at_stations = (u[0] * from).max(u[2] * to);
             let mut worst = [peak(&uses, [1.0; 2]).max(at_stations).max(zero).sqrt(), zero, zero];
             let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
-            for (Axis { velocity, acceleration, per_jerk }, q) in axes {
+            for (Axis { velocity, acceleration, per_jerk, .. }, q) in axes {
                 for i in 0..SAMPLES {
                     uses[i] = motion[i][3] * q[i][0] * velocity.per_mean;
                 }
@@ -240,7 +244,7 @@ impl IntersampleCheck {
             let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
             let mut loss = zero;
             for (k, (axis, q)) in axes.enumerate() {
-                let Axis { velocity, acceleration: most, per_jerk } = axis;
+                let Axis { velocity, acceleration: most, per_jerk, .. } = axis;
                 let [mut a, mut j] = [zero; 2];
                 for i in 0..SAMPLES {
                     let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
@@ -378,7 +382,7 @@ mod tests {
         let limits = Limits { velocity: [[1e9]; 2], acceleration: [[1e9]; 2], jerk: [1.0] };
         let used = |length: f64| {
             let (line, stations) = (Line([0.0, length]), [0.0, 1.0]);
-            let mut window = Window::new(&limits);
+            let mut window = Window::new(&limits, &[true; 1]);
             window.rows.sample(&line, &limits, &stations, &[0], &[1.0], |_| f64::INFINITY);
             window.check.sample(&line, &stations, &[0], &window.rows);
             window.check.utilisation(&window.rows, &[1.0, 0.0, 2.0, 2.0])[0][2]
@@ -457,9 +461,15 @@ mod tests {
             acceleration: [[3000.0, 2000.0], [2500.0; 2]],
             jerk: [50_000.0; 2],
         };
-        let problem = Problem { geometry: &Winding::new(1.0), limits, caps: &[], ends: [End::Rest; 2] };
+        let problem = Problem {
+            geometry: &Winding::new(1.0),
+            limits,
+            moves: [true; 2],
+            caps: &[],
+            ends: [End::Rest; 2],
+        };
         let prepared = Prepared::new(&problem, &Effort::default()).expect("a first plan");
-        let mut window = Window::new(&limits);
+        let mut window = Window::new(&limits, &[true; 2]);
         // One interval alone is in the last block.
         prepared.fill(0..LANES * 6 + 1, &mut window);
         let (rows, check) = (&window.rows, &window.check);

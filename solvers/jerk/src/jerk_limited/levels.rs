@@ -48,7 +48,7 @@ fn levels() -> Vec<Level> {
 }
 
 /// All numbers that the interior-point method leaves after a solution, as bits.
-fn solved<X: Model>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Constraints) -> Vec<u64> {
+fn solved<X: Model>(level: Level, prepared: &Prepared<'_, 3>, rows: &Constraints) -> Vec<u64> {
     let effort = Effort {
         tolerance: 1e-7,
         max_iterations: 60,
@@ -86,9 +86,9 @@ fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints, between: &Intersampl
 fn results_are_the_same_on_every_level() {
     let limits = Limits { velocity: [[250.0; 3]; 2], acceleration: [[3000.0; 3]; 2], jerk: [50_000.0; 3] };
     let geometry = Winding([0.0, 60.0]);
-    let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
+    let problem = Problem { geometry: &geometry, limits, moves: [true; 3], caps: &[], ends: [End::Rest; 2] };
     let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
-    let mut window = Window::new(&limits);
+    let mut window = Window::new(&limits, &[true; 3]);
     prepared.fill(0..prepared.grid.pieces.len(), &mut window);
     let (rows, between) = (&window.rows, &window.check);
     let found = |level: Level| {

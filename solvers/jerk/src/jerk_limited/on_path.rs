@@ -9,7 +9,6 @@
 use std::mem::take;
 
 use super::held::{caps_between, moving, stretches, Between, Stretch};
-use super::moving_axes;
 use super::refinement;
 use super::turns::{lower, Line};
 use super::windows::Rough;
@@ -265,9 +264,7 @@ impl<const M: usize> Task<'_, M> {
         let mut known = RoughPath { junctions, caps, resolution, stretches: vec![] };
         let look = |stretch: Stretch| {
             let rough = stretch.held.is_none().then(|| {
-                self.on_stretch(path, &stretch, &known, |_, problem, moves, effort| {
-                    moving_axes::rough(problem, moves, effort)
-                })
+                self.on_stretch(path, &stretch, &known, |_, problem, effort| Rough::new(problem, effort))
             });
             RoughStretch { stretch, rough, phases: None }
         };
@@ -370,17 +367,17 @@ impl<const M: usize> Task<'_, M> {
             self.kinks(path, known, |_| feed * feed, ends, &mut phases);
             return Ok(phases);
         }
-        self.on_stretch(path, stretch, known, |own, problem, moves, effort| {
+        self.on_stretch(path, stretch, known, |own, problem, effort| {
             let mut price = self.price;
             let rough = rough.unwrap_or_else(|| {
-                let rough = moving_axes::rough(problem, moves, effort)?;
+                let rough = Rough::new(problem, effort)?;
                 price = rough.price();
                 Ok(rough)
             });
             let plan = rough.and_then(|rough| {
                 // Joined with its neighbours, a stretch finds a first plan sooner than on a finer grid.
                 if is_alone || rough.is_planned() {
-                    moving_axes::plan(problem, moves, rough, price, effort)
+                    rough.plan(problem, price, effort)
                 } else {
                     Err(path_problem::Fault::NoPlan { s: own.within(ends[0]) })
                 }
@@ -402,25 +399,26 @@ impl<const M: usize> Task<'_, M> {
         })
     }
 
-    /// Does `work` on a stretch as a problem of its own, with the axes that move on it and its share of the effort.
+    /// Does `work` on a stretch as a problem of its own, with its share of the effort.
     fn on_stretch<T>(
         &self,
         path: &ArcLengthPath<M>,
         &Stretch { ends, states, .. }: &Stretch,
         known: &RoughPath,
-        work: impl FnOnce(&Between<M>, &path_problem::Problem<Between<M>, M>, &[bool; M], &Effort) -> T,
+        work: impl FnOnce(&Between<M>, &path_problem::Problem<M>, &Effort) -> T,
     ) -> T {
         let own = Between::new(path, ends);
         let within = |cap: &SpeedCap| SpeedCap { s: own.within(cap.s), ..*cap };
         let caps: Vec<SpeedCap> = caps_between(&known.caps, ends).iter().map(within).collect();
+        let moves = moving(self.problem, path, ends);
         let problem =
-            path_problem::Problem { geometry: &own, limits: self.limits, caps: &caps, ends: states };
+            path_problem::Problem { geometry: &own, limits: self.limits, moves, caps: &caps, ends: states };
         // Short intervals leave room below the limits for the rounding errors of such lengths.
         let few_digits = ends[1] - ends[0] < FEW_DIGITS * path.total();
         let resolution = if few_digits { FINER_THERE } else { 1.0 } * known.resolution;
         let watch = self.effort.watch.part((ends[1] - ends[0]) / path.total());
         let effort = Effort { resolution, watch, ..*self.effort };
-        work(&own, &problem, &moving(self.problem, path, ends), &effort)
+        work(&own, &problem, &effort)
     }
 
     /// Adds to `phases.kinks` the pieces that begin at those junctions between two arc lengths where a jump of q'' limits the
@@ -518,11 +516,8 @@ impl<const M: usize> Task<'_, M> {
         let speeds = ends.map(|end| end.speed());
         let possible = |speeds: [f64; 2]| {
             let ends = speeds.map(|speed| end_of(speed, [0.0; 2]));
-            let problem = path_problem::Problem { geometry: path, limits: self.limits, caps, ends };
-            let plan = moving_axes::rough(&problem, &moves, &effort).and_then(|rough| {
-                let price = rough.price();
-                moving_axes::plan(&problem, &moves, rough, price, &effort)
-            });
+            let problem = path_problem::Problem { geometry: path, limits: self.limits, moves, caps, ends };
+            let plan = super::plan(&problem, &effort);
             plan.is_ok()
         };
         // The end is at fault if the start alone can be met.

@@ -13,7 +13,7 @@ use super::rest_ramp::{self, Ramp};
 use super::speed_envelope::{sample_envelope, Slopes};
 use super::window::Window;
 use super::window_end::WindowEnd;
-use crate::path_problem::{Effort, End, Fault, Geometry, Limits, Problem};
+use crate::path_problem::{Effort, End, Fault, Limits, Problem};
 use feedplan_geometry::watch::Watch;
 
 /// Intervals that one thread takes at a time.
@@ -24,8 +24,8 @@ const ROUNDS: usize = 12;
 pub const PREPARING: f64 = 0.1;
 
 /// A problem on its grid.
-pub struct Prepared<'a, G, const M: usize> {
-    pub problem: &'a Problem<'a, G, M>,
+pub struct Prepared<'a, const M: usize> {
+    pub problem: &'a Problem<'a, M>,
     pub grid: Grid,
     pub ends: [WindowEnd; 2],
     /// The ends for the lower bound, which holds for every motion between these ends.
@@ -42,8 +42,8 @@ pub struct Prepared<'a, G, const M: usize> {
     watch: Watch<'a>,
 }
 
-impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
-    pub fn new(problem: &'a Problem<'a, G, M>, effort: &Effort<'a>) -> Result<Self, Fault> {
+impl<'a, const M: usize> Prepared<'a, M> {
+    pub fn new(problem: &'a Problem<'a, M>, effort: &Effort<'a>) -> Result<Self, Fault> {
         check(problem)?;
         let knots = problem.geometry.knots();
         let total = knots[knots.len() - 1];
@@ -72,14 +72,14 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     }
 
     fn on(
-        problem: &'a Problem<'a, G, M>,
+        problem: &'a Problem<'a, M>,
         grid: Grid,
         [ends, bound_ends]: [[WindowEnd; 2]; 2],
         slopes: Slopes,
         effort: &Effort<'a>,
     ) -> Self {
         let whole = || {
-            let mut rows = Constraints::new(&problem.limits);
+            let mut rows = Constraints::new(&problem.limits, &problem.moves);
             grid.sample(problem, 0..grid.pieces.len(), &mut rows);
             rows
         };
@@ -135,7 +135,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let mut out = vec![0.0; self.grid.pieces.len()];
         each_part(&mut out, CHUNK, &|first, out| {
             self.watch.check();
-            let mut rows = Constraints::new(&self.problem.limits);
+            let mut rows = Constraints::new(&self.problem.limits, &self.problem.moves);
             self.take(first..first + out.len(), &mut rows);
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);
             out.copy_from_slice(&f(&rows, x));
@@ -170,12 +170,12 @@ pub struct Start {
 impl Start {
     /// The problem on a finer grid, in which interval n is split into `parts[n]` equal parts. The first plan is kept if it is
     /// valid there, else a new one is made.
-    pub fn refined<'a, G: Geometry<M>, const M: usize>(
+    pub fn refined<'a, const M: usize>(
         &self,
-        problem: &'a Problem<'a, G, M>,
+        problem: &'a Problem<'a, M>,
         parts: &[u32],
         effort: &Effort<'a>,
-    ) -> Prepared<'a, G, M> {
+    ) -> Prepared<'a, M> {
         let mut fine = Prepared::on(problem, self.grid.refined(parts), self.ends, self.slopes, effort);
         if !self.x.is_empty() {
             let counts = parts.iter().map(|&parts| parts as usize);
@@ -191,7 +191,7 @@ impl Start {
 }
 
 /// The known values at both ends of a path, for the plan and for the lower bound.
-fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [[WindowEnd; 2]; 2] {
+fn window_ends<const M: usize>(problem: &Problem<M>) -> [[WindowEnd; 2]; 2] {
     let knots = problem.geometry.knots();
     let (pieces, limits) = (knots.len() - 1, &problem.limits);
     let total = knots[pieces];
@@ -230,7 +230,7 @@ fn rising(numbers: impl Iterator<Item = f64> + Clone) -> bool {
 }
 
 /// Checks the problem's numbers; the fault names the first wrong one.
-fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), Fault> {
+fn check<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
     let wrong = |what: String| Err(Fault::Input(what));
     let knots = problem.geometry.knots();
     if knots.len() < 2 || !rising(knots.iter().copied()) {

@@ -108,11 +108,11 @@ pub fn random() -> impl FnMut() -> f64 {
 }
 
 /// Plans a path in one window, and calls `work` with the input of the lower bound and the effort.
-pub fn planned(geometry: &impl Geometry<2>, work: impl Fn(&Planned, &Effort)) {
+pub fn planned(geometry: &dyn Geometry<2>, work: impl Fn(&Planned, &Effort)) {
     let limits = Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
-    let problem = Problem { geometry, limits, caps: &[], ends: [End::Rest; 2] };
+    let problem = Problem { geometry, limits, moves: [true; 2], caps: &[], ends: [End::Rest; 2] };
     let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
-    let mut window = Window::new(&limits);
+    let mut window = Window::new(&limits, &[true; 2]);
     prepared.fill(0..prepared.grid.pieces.len(), &mut window);
     let rows = window.rows.clone();
     let mut x = prepared.x.clone();

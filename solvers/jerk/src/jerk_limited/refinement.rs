@@ -143,10 +143,16 @@ mod tests {
     fn losses(turn: f64, resolution: f64) -> (Vec<f64>, f64) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
-        let problem = Problem { geometry: &Winding::new(turn), limits, caps: &[], ends: [End::Rest; 2] };
+        let problem = Problem {
+            geometry: &Winding::new(turn),
+            limits,
+            moves: [true; 2],
+            caps: &[],
+            ends: [End::Rest; 2],
+        };
         let effort = path_problem::Effort { resolution, ..Default::default() };
         let prepared = Prepared::new(&problem, &effort).expect("a first plan");
-        let mut window = Window::new(&limits);
+        let mut window = Window::new(&limits, &[true; 2]);
         prepared.fill(0..prepared.grid.pieces.len(), &mut window);
         window.rows.drop_at_ends(&prepared.ends);
         let (barrier, watch) = (1.0, Watch::default());

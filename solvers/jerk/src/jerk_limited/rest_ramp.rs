@@ -76,7 +76,7 @@ pub fn length<const M: usize>(limits: &Limits<M>, point: &PathPoint<M>, path: f6
 
 /// The greatest w in mm²/s² that the limits allow at the end of a ramp; `end` is 0 at the start of the path and 1 at its end.
 pub fn greatest<const M: usize>(
-    geometry: &impl Geometry<M>,
+    geometry: &dyn Geometry<M>,
     limits: &Limits<M>,
     caps: &[SpeedCap],
     Ramp { length: ramp, power }: Ramp,

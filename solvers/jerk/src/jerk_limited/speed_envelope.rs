@@ -203,7 +203,7 @@ impl Slopes {
 /// Samples on the pieces from s = `from` to `to`, and the greatest slopes of their envelope. Fails if no speed above 0 is
 /// possible at a sample.
 pub fn sample_envelope<const M: usize>(
-    geometry: &impl Geometry<M>,
+    geometry: &dyn Geometry<M>,
     limits: &Limits<M>,
     caps: &[SpeedCap],
     [from, to]: [f64; 2],

@@ -267,7 +267,7 @@ mod tests {
         let limits =
             Limits { velocity: [[1e3; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };
         let stations: Vec<f64> = (0..=40).map(|n| 0.05 * n as f64).collect();
-        let mut rows = Constraints::new(&limits);
+        let mut rows = Constraints::new(&limits, &[true; 2]);
         rows.sample(&Clothoid(c), &limits, &stations, &[0; 40], &[1.0; 40], cap);
         lower(&mut rows);
         (0..rows.count()).map(|n| 1.0 / rows.speed(n, 0)).collect()
@@ -291,7 +291,7 @@ mod tests {
     fn rounding_at_a_knot_is_no_limit() {
         let limits = Limits { velocity: [[1e3; 2]; 2], acceleration: [[1e3; 2]; 2], jerk: [50_000.0; 2] };
         let stations = [0.0, 0.5, 1.0, 1.5, 2.0];
-        let mut rows = Constraints::new(&limits);
+        let mut rows = Constraints::new(&limits, &[true; 2]);
         rows.sample(&Rounded, &limits, &stations, &[0, 0, 1, 1], &[1.0; 4], |_| f64::INFINITY);
         lower(&mut rows);
         for n in 0..rows.count() {

@@ -55,9 +55,9 @@ pub struct WindowReport {
 }
 
 impl Window {
-    /// A window without intervals, for these limits of the axes.
-    pub fn new<const M: usize>(limits: &Limits<M>) -> Self {
-        Self { rows: Constraints::new(limits), check: IntersampleCheck::new(limits) }
+    /// A window without intervals, for the limits of the axes that move.
+    pub fn new<const M: usize>(limits: &Limits<M>, moves: &[bool; M]) -> Self {
+        Self { rows: Constraints::new(limits, moves), check: IntersampleCheck::new(limits, moves) }
     }
 
     /// Improves the valid plan x in place, with starts near the rough plan if there is one. The caller has dropped the limits at
@@ -273,9 +273,15 @@ mod tests {
     fn planned(acceleration: f64, says: Option<bool>) -> (f64, bool) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };
-        let problem = Problem { geometry: &Winding::new(1.0), limits, caps: &[], ends: [End::Rest; 2] };
+        let problem = Problem {
+            geometry: &Winding::new(1.0),
+            limits,
+            moves: [true; 2],
+            caps: &[],
+            ends: [End::Rest; 2],
+        };
         let prepared = Prepared::new(&problem, &path_problem::Effort::default()).expect("a first plan");
-        let mut window = Window::new(&limits);
+        let mut window = Window::new(&limits, &[true; 2]);
         prepared.fill(0..prepared.grid.pieces.len(), &mut window);
         window.rows.drop_at_ends(&prepared.ends);
         let (barrier, watch) = (1.0, Watch::default());

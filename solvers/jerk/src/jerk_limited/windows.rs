@@ -26,7 +26,7 @@ use super::rest_ramp;
 use super::window::{ramps, Window, WindowReport};
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
-use crate::path_problem::{Effort, Fault, Geometry, Limits, Problem};
+use crate::path_problem::{Effort, Fault, Problem};
 use feedplan_geometry::parallel::{each_part, map, threads};
 use feedplan_geometry::watch::Watch;
 
@@ -53,7 +53,7 @@ const BLENDS: [usize; 4] = [8, 4, 2, 1];
 const BLENDED: f64 = 1.0 + 5e-7;
 
 /// The plan of least time.
-pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Effort) -> Result<Plan, Fault> {
+pub fn plan<const M: usize>(problem: &Problem<M>, effort: &Effort) -> Result<Plan, Fault> {
     let rough = Rough::new(problem, effort)?;
     let price = rough.price();
     rough.plan(problem, price, effort)
@@ -69,10 +69,7 @@ pub struct Rough {
 
 impl Rough {
     /// Plans a problem roughly; `effort` is the effort of the final plan.
-    pub fn new<G: Geometry<M>, const M: usize>(
-        problem: &Problem<G, M>,
-        effort: &Effort,
-    ) -> Result<Self, Fault> {
+    pub fn new<const M: usize>(problem: &Problem<M>, effort: &Effort) -> Result<Self, Fault> {
         let coarse = Effort {
             resolution: effort.resolution / f64::from(COARSE),
             // A window has more intervals on the final grid.
@@ -99,9 +96,9 @@ impl Rough {
     }
 
     /// The plan of least time on the grid that results from this price of an interval, in s.
-    pub fn plan<G: Geometry<M>, const M: usize>(
+    pub fn plan<const M: usize>(
         self,
-        problem: &Problem<G, M>,
+        problem: &Problem<M>,
         price: f64,
         effort: &Effort,
     ) -> Result<Plan, Fault> {
@@ -180,18 +177,18 @@ struct Space {
 }
 
 impl Space {
-    fn new<const M: usize>(limits: &Limits<M>) -> Self {
+    fn new<const M: usize>(Problem { limits, moves, .. }: &Problem<M>) -> Self {
         Self {
-            window: Window::new(limits),
-            loose: Constraints::new(limits),
+            window: Window::new(limits, moves),
+            loose: Constraints::new(limits, moves),
             exact: InteriorPoint::default(),
             relaxed: InteriorPoint::default(),
         }
     }
 }
 
-struct Run<'a, G, const M: usize> {
-    prepared: &'a Prepared<'a, G, M>,
+struct Run<'a, const M: usize> {
+    prepared: &'a Prepared<'a, M>,
     effort: &'a Effort<'a>,
     stations: &'a [f64],
     /// Working spaces that no thread uses at present, kept because the allocation of some MB takes long.
@@ -206,8 +203,8 @@ struct Drive {
     speed: f64,
 }
 
-impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
-    fn new(prepared: &'a Prepared<'a, G, M>, effort: &'a Effort<'a>) -> Self {
+impl<'a, const M: usize> Run<'a, M> {
+    fn new(prepared: &'a Prepared<'a, M>, effort: &'a Effort<'a>) -> Self {
         Self { prepared, effort, stations: &prepared.grid.stations, idle: Mutex::default() }
     }
 
@@ -412,7 +409,7 @@ impl<'a, G: Geometry<M>, const M: usize> Run<'a, G, M> {
     /// Does work in a working space that no other thread uses.
     fn in_space<T>(&self, work: impl FnOnce(&mut Space) -> T) -> T {
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut space = idle().pop().unwrap_or_else(|| Space::new(&self.prepared.problem.limits));
+        let mut space = idle().pop().unwrap_or_else(|| Space::new(self.prepared.problem));
         let done = work(&mut space);
         idle().push(space);
         done

@@ -6,6 +6,7 @@
 //! diagonal are not used.
 
 use fearless_simd::Simd;
+use feedplan_geometry::dispatch_four;
 use feedplan_geometry::lanes::four::{Lanes, Register, LANES};
 
 use super::spline::ORDER;
@@ -42,7 +43,6 @@ impl<const D: usize> Band<D> {
 
     /// Writes the rows. The rows and columns of `fixed` unknowns become those of the unit matrix. `inverse` gets the pivot below
     /// which an unknown does not move.
-    #[inline(always)]
     fn write(&mut self, fixed: &[bool]) {
         let count = fixed.len();
         let tiles = (count * D).div_ceil(LANES);
@@ -79,9 +79,13 @@ impl<const D: usize> Band<D> {
     }
 
     /// Factors the matrix, in which `fixed` unknowns do not move.
-    #[inline(always)]
-    pub fn factor<S: Simd>(&mut self, simd: S, fixed: &[bool]) {
+    pub fn factor(&mut self, fixed: &[bool]) {
         self.write(fixed);
+        dispatch_four!(simd => self.factor_on(simd));
+    }
+
+    #[inline(always)]
+    fn factor_on<S: Simd>(&mut self, simd: S) {
         for (tile, inverse) in self.inverse.iter_mut().enumerate() {
             let (own, below) =
                 self.rows[tile * LANES..].split_first_chunk_mut::<LANES>().expect("zeros after the last");
@@ -125,8 +129,12 @@ impl<const D: usize> Band<D> {
     }
 
     /// Solves in place; x is extended by zeros.
+    pub fn solve(&self, x: &mut Vec<Lanes>) {
+        dispatch_four!(simd => self.solve_on(simd, x));
+    }
+
     #[inline(always)]
-    pub fn solve<S: Simd>(&self, simd: S, x: &mut Vec<Lanes>) {
+    fn solve_on<S: Simd>(&self, simd: S, x: &mut Vec<Lanes>) {
         let tiles = self.inverse.len();
         x.resize(tiles + Self::VECTORS, Lanes::ZERO);
         for tile in 0..tiles {
@@ -165,7 +173,6 @@ impl<const D: usize> Band<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use feedplan_geometry::dispatch_four;
 
     #[test]
     fn a_banded_system_is_solved_with_one_block_fixed() {
@@ -198,9 +205,9 @@ mod tests {
                 }
             }
             let fixed = if count == 9 { &fixed[..] } else { &[false; 20] };
-            dispatch_four!(simd => band.factor(simd, fixed));
+            band.factor(fixed);
         }
-        dispatch_four!(simd => band.solve(simd, &mut x));
+        band.solve(&mut x);
         let x: Vec<f64> = x.iter().flat_map(|x| *x.values()).collect();
         assert_eq!(x[6..8], [0.0; 2]);
         for i in (0..2 * count).filter(|&i| !fixed[i / 2]) {

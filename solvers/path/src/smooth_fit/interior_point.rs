@@ -62,23 +62,21 @@ const NO_ENERGY: f64 = 1e-8;
 impl<const D: usize> Problem<D> {
     /// Solves the problem in place; returns the number of iterations.
     pub fn solve(&mut self, band: &mut Band<D>) -> usize {
-        dispatch_four!(simd => self.solve_on(simd, band))
-    }
-
-    #[inline(always)]
-    fn solve_on<S: Simd>(&mut self, simd: S, band: &mut Band<D>) -> usize {
         let mut newton = Newton::new(self, band);
-        newton.approximate(simd);
-        newton.begin(simd);
+        newton.approximate();
+        dispatch_four!(simd => newton.begin(simd));
         let mut iteration = 0;
         while iteration < MOST_ITERATIONS {
-            let residuals = newton.linearise(simd);
+            let residuals = dispatch_four!(simd => newton.linearise(simd));
             if newton.is_solved(&residuals) {
                 break;
             }
-            newton.band.factor(simd, &newton.problem.fixed);
-            newton.predict(simd, newton.least_mu(&residuals));
-            newton.correct(simd);
+            newton.band.factor(&newton.problem.fixed);
+            newton.downhill(true);
+            dispatch_four!(simd => newton.predict(simd, newton.least_mu(&residuals)));
+            dispatch_four!(simd => newton.centre(simd));
+            newton.downhill(false);
+            dispatch_four!(simd => newton.correct(simd));
             if !newton.length.iter().all(|length| length.is_finite()) {
                 break;
             }
@@ -239,8 +237,16 @@ impl<'a, const D: usize> Newton<'a, D> {
     /// Moves x to the weighted least-squares approximation of all targets, with the energy as a slight smoothing. If the
     /// intervals at a corner are too long, so that the problem has no solution, the bends of the same window are then close to
     /// their targets.
+    fn approximate(&mut self) {
+        dispatch_four!(simd => self.weigh(simd));
+        self.band.factor(&self.problem.fixed);
+        self.downhill(false);
+        self.x.add_parts(&self.step, |_| 1.0);
+    }
+
+    /// The matrix and the gradient of that approximation.
     #[inline(always)]
-    fn approximate<S: Simd>(&mut self, simd: S) {
+    fn weigh<S: Simd>(&mut self, simd: S) {
         self.band.clear(self.quads.count() + BEYOND);
         self.quads.energy_gradient(simd, &self.x, &mut self.gradient);
         for quad in 0..self.quads.count() {
@@ -259,9 +265,6 @@ impl<'a, const D: usize> Newton<'a, D> {
             self.quads.add_forms(simd, quad, &self.shares, self.band);
             self.quads.add_forces(simd, quad, &self.shares, 0, &mut self.gradient);
         }
-        self.band.factor(simd, &self.problem.fixed);
-        self.downhill(simd, false);
-        self.x.add_parts(&self.step, |_| 1.0);
     }
 
     /// Sets the slacks of x, at least START_SLACK of their limits, and multipliers with s λ = START_MU units.
@@ -382,11 +385,10 @@ impl<'a, const D: usize> Newton<'a, D> {
         LEAST_MU.min(0.1 * GAP * residuals.energy.max(self.least_energy) / self.whole)
     }
 
-    /// The predictor: the pure Newton step. Its length gives the μ to aim at; the products of its steps of s and λ are stored for
-    /// the corrector.
+    /// After the predictor, the pure Newton step: its length gives the μ to aim at; the products of its steps of s and λ are
+    /// stored for the corrector.
     #[inline(always)]
     fn predict<S: Simd>(&mut self, simd: S, least_mu: f64) {
-        self.downhill(simd, true);
         let zero = Register::all(simd, 0.0);
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
@@ -420,9 +422,9 @@ impl<'a, const D: usize> Newton<'a, D> {
         between_neighbours(&mut self.mu, |mu, beside| mu.max(beside / MU_RATIO));
     }
 
-    /// The corrector: the step towards s λ = μ in units, with the second-order term of the predictor, and the step lengths.
+    /// Adds to the gradient what leads the corrector to s λ = μ in units, with the second-order term of the predictor.
     #[inline(always)]
-    fn correct<S: Simd>(&mut self, simd: S) {
+    fn centre<S: Simd>(&mut self, simd: S) {
         let zero = Register::all(simd, 0.0);
         for quad in 0..self.quads.count() {
             for (i, share) in self.quads.range(quad).zip(&mut self.shares) {
@@ -441,7 +443,11 @@ impl<'a, const D: usize> Newton<'a, D> {
             }
             self.quads.add_forces(simd, quad, &self.shares, 0, &mut self.gradient);
         }
-        self.downhill(simd, false);
+    }
+
+    /// After the corrector: its steps of slacks and multipliers, and the step lengths.
+    #[inline(always)]
+    fn correct<S: Simd>(&mut self, simd: S) {
         for quad in 0..self.quads.count() {
             let step = self.step.around(simd, quad);
             let mut most = Register::all(simd, 1e-300);
@@ -480,8 +486,7 @@ impl<'a, const D: usize> Newton<'a, D> {
     }
 
     /// Solves for the step: minus the inverse of Newton's matrix times the gradient, or times gradient plus predictor terms.
-    #[inline(always)]
-    fn downhill<S: Simd>(&mut self, simd: S, predictor: bool) {
+    fn downhill(&mut self, predictor: bool) {
         let fixed = &self.problem.fixed;
         let mut unknowns = std::mem::take(&mut self.unknowns);
         unknowns.clear();
@@ -499,7 +504,7 @@ impl<'a, const D: usize> Newton<'a, D> {
                 unknowns[place / LANES].values_mut()[place % LANES] = -sum;
             }
         }
-        self.band.solve(simd, &mut unknowns);
+        self.band.solve(&mut unknowns);
         for i in 0..fixed.len() {
             for k in 0..D {
                 let place = i * D + k;
