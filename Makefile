@@ -8,6 +8,8 @@ INSTALL := $(BIN)/pip install --quiet --no-compile --constraint constraints.txt
 CARGO := MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target
 MANYLINUX := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux_2_28)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Packages and pages are installed while cargo compiles; native tests, lint and pytest run at the same time.
+MAKEFLAGS += --jobs=4
 # With this variable Python would compile modules again at each start, which takes a tenth of a second.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -18,8 +20,7 @@ demo: $(VENV)/built $(PAGE)
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
-# The prerequisites are built first; with several jobs (`.ci/run`) these three then run in parallel.
-test: native lint pytest
+test: pytest native lint
 
 # The first command compiles the test files once, so that not every process does it. Tests wait half of the time for services
 # and programs that they start, so there are two processes per processor. The tests of a file share servers, clusters and a
@@ -110,15 +111,27 @@ campaign: $(VENV)/dev $(PAGE) docs wheel
 clean:
 	rm -rf $(VENV) out solvers/target page/node_modules $(dir $(PAGE))
 
+$(VENV)/built: $(VENV)/module $(VENV)/packages
+	@touch $@
+
 # The native module is built again only if its sources have changed; the native tests link the same crates.
-$(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
-	$(CARGO) $(INSTALL) --no-build-isolation --editable .
+$(VENV)/module: $(VENV)/maturin $(NATIVE) | cargo
+	$(CARGO) $(INSTALL) --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# The packages that `dependencies` lists.
+$(VENV)/packages: pyproject.toml constraints.txt | $(VENV)/maturin
+	@sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)",$$/\1/p' pyproject.toml >$@.txt
+	$(INSTALL) --requirement $@.txt
 	@touch $@
 
 # The additional packages for tests and lint, and those for the documentation.
 $(VENV)/dev $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/built
 	$(INSTALL) "feedplan[$(@F)]"
 	@touch $@
+
+# Two installations at a time would write the same packages.
+$(VENV)/docs: | $(VENV)/dev
 
 $(VENV)/zig: constraints.txt | $(VENV)/maturin
 	$(INSTALL) ziglang
