@@ -27,7 +27,7 @@ use pyo3::prelude::*;
 
 /// The native module of feedplan.
 #[pymodule]
-mod _solvers {
+pub mod _solvers {
     use super::*;
 
     #[pymodule_export]
