@@ -24,10 +24,11 @@ test: pytest native lint
 
 # The first command compiles the test files once, so that not every process does it. Tests wait half of the time for services
 # and programs that they start, so there are two processes per processor. The tests of a file share servers, clusters and a
-# browser, so one process runs all tests of a file.
+# browser, so one process runs all tests of a file. No test needs NumPy's threads for linear algebra, which would start with each
+# of a thousand processes.
 pytest: $(VENV)/dev $(PAGE) $(filter linuxcnc,$(MAKECMDGOALS))
 	@$(BIN)/pytest --collect-only --quiet --quiet >/dev/null
-	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile --no-loadscope-reorder
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile --no-loadscope-reorder
 
 # The native tests link the crates that have been compiled for the module. The module is built first, because the tests in
 # Python wait for it.
