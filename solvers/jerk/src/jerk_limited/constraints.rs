@@ -59,7 +59,7 @@ pub struct Constraints {
     count: usize,
     pub blocks: Vec<Block>,
     /// The axes that move, by their numbers in the problem. All other lists of axes follow this one.
-    axes: Vec<usize>,
+    pub axes: Vec<usize>,
     /// q', q'', q''' of each axis at each collocation point of each block.
     q: Vec<[Lanes; 3]>,
     pub acceleration: Vec<Sides>,

@@ -67,8 +67,6 @@ pub struct IntersampleCheck {
 /// The limits of an axis.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
-    /// The number of the axis in the problem.
-    number: usize,
     velocity: Sides,
     acceleration: Sides,
     per_jerk: f64,
@@ -79,7 +77,6 @@ impl IntersampleCheck {
     pub fn new<const M: usize>(limits: &Limits<M>, moves: &[bool; M]) -> Self {
         let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::of);
         let axis = |k: usize| Axis {
-            number: k,
             velocity: velocity[k],
             acceleration: acceleration[k],
             per_jerk: 1.0 / limits.jerk[k],
@@ -119,8 +116,8 @@ impl IntersampleCheck {
                 let s = |i: usize| start + h * (i as f64 / (SAMPLES - 1) as f64);
                 for first in (1..SAMPLES).step_by(STEPS) {
                     let points = geometry.at_four(piece as usize, std::array::from_fn(|i| s(first + i)));
-                    for (samples, axis) in samples.iter_mut().zip(&self.axes) {
-                        for (order, values) in points.q[axis.number].iter().enumerate() {
+                    for (samples, &axis) in samples.iter_mut().zip(&rows.axes) {
+                        for (order, values) in points.q[axis].iter().enumerate() {
                             for (i, value) in values.values().iter().enumerate() {
                                 samples[first + i][order].values_mut()[lane] = *value;
                             }
@@ -163,7 +160,7 @@ impl IntersampleCheck {
             let at_stations = (u[0] * from).max(u[2] * to);
             let mut worst = [peak(&uses, [1.0; 2]).max(at_stations).max(zero).sqrt(), zero, zero];
             let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
-            for (Axis { velocity, acceleration, per_jerk, .. }, q) in axes {
+            for (Axis { velocity, acceleration, per_jerk }, q) in axes {
                 for i in 0..SAMPLES {
                     uses[i] = motion[i][3] * q[i][0] * velocity.per_mean;
                 }
@@ -244,7 +241,7 @@ impl IntersampleCheck {
             let axes = self.axes.iter().zip(&self.q[b * self.axes.len()..]);
             let mut loss = zero;
             for (k, (axis, q)) in axes.enumerate() {
-                let Axis { velocity, acceleration: most, per_jerk, .. } = axis;
+                let Axis { velocity, acceleration: most, per_jerk } = axis;
                 let [mut a, mut j] = [zero; 2];
                 for i in 0..SAMPLES {
                     let ([w, half, bend, v], [q1, q2, q3]) = (motion[i], q[i]);
@@ -358,10 +355,10 @@ fn top<S: Simd>([before, here, after]: [Register<S>; 3]) -> Register<S> {
 #[cfg(test)]
 mod tests {
     use super::super::prepare::Prepared;
-    use super::super::profiles::{random, Winding};
+    use super::super::profiles::{problem, random, Winding};
     use super::super::window::Window;
     use super::*;
-    use crate::path_problem::{Effort, End, PathPoint, Problem};
+    use crate::path_problem::{Effort, PathPoint};
 
     /// A line between two arc lengths, in mm.
     struct Line([f64; 2]);
@@ -461,13 +458,8 @@ mod tests {
             acceleration: [[3000.0, 2000.0], [2500.0; 2]],
             jerk: [50_000.0; 2],
         };
-        let problem = Problem {
-            geometry: &Winding::new(1.0),
-            limits,
-            moves: [true; 2],
-            caps: &[],
-            ends: [End::Rest; 2],
-        };
+        let path = Winding::new(1.0);
+        let problem = problem(&path, limits);
         let prepared = Prepared::new(&problem, &Effort::default()).expect("a first plan");
         let mut window = Window::new(&limits, &[true; 2]);
         // One interval alone is in the last block.

@@ -9,10 +9,11 @@ use super::intersample_check::IntersampleCheck;
 use super::lower_bound::lagrangian_on;
 use super::model::Model;
 use super::prepare::Prepared;
+use super::profiles::problem;
 use super::relaxed::Relaxed;
 use super::window::Window;
 use super::working_space::InteriorPoint;
-use crate::path_problem::{End, Geometry, Limits, PathPoint, Problem};
+use crate::path_problem::{Geometry, Limits, PathPoint};
 use feedplan_geometry::lanes::eight::Lanes;
 use feedplan_geometry::watch::Watch;
 
@@ -86,7 +87,7 @@ fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints, between: &Intersampl
 fn results_are_the_same_on_every_level() {
     let limits = Limits { velocity: [[250.0; 3]; 2], acceleration: [[3000.0; 3]; 2], jerk: [50_000.0; 3] };
     let geometry = Winding([0.0, 60.0]);
-    let problem = Problem { geometry: &geometry, limits, moves: [true; 3], caps: &[], ends: [End::Rest; 2] };
+    let problem = problem(&geometry, limits);
     let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
     let mut window = Window::new(&limits, &[true; 3]);
     prepared.fill(0..prepared.grid.pieces.len(), &mut window);

@@ -107,10 +107,15 @@ pub fn random() -> impl FnMut() -> f64 {
     }
 }
 
+/// The problem from rest to rest, in which all axes move.
+pub fn problem<const M: usize>(geometry: &dyn Geometry<M>, limits: Limits<M>) -> Problem<'_, M> {
+    Problem { geometry, limits, moves: [true; M], caps: &[], ends: [End::Rest; 2] }
+}
+
 /// Plans a path in one window, and calls `work` with the input of the lower bound and the effort.
 pub fn planned(geometry: &dyn Geometry<2>, work: impl Fn(&Planned, &Effort)) {
     let limits = Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
-    let problem = Problem { geometry, limits, moves: [true; 2], caps: &[], ends: [End::Rest; 2] };
+    let problem = problem(geometry, limits);
     let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
     let mut window = Window::new(&limits, &[true; 2]);
     prepared.fill(0..prepared.grid.pieces.len(), &mut window);

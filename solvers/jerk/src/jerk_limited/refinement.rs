@@ -132,24 +132,19 @@ mod tests {
     use super::super::hermite::duration;
     use super::super::interior_point::Effort;
     use super::super::prepare::Prepared;
-    use super::super::profiles::Winding;
+    use super::super::profiles::{problem, Winding};
     use super::super::window::Window;
     use super::super::working_space::InteriorPoint;
     use super::*;
-    use crate::path_problem::{self, End, Limits, Problem};
+    use crate::path_problem::{self, Limits};
     use feedplan_geometry::watch::Watch;
 
     /// The losses of a path on an even grid of this resolution, and the time in s.
     fn losses(turn: f64, resolution: f64) -> (Vec<f64>, f64) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
-        let problem = Problem {
-            geometry: &Winding::new(turn),
-            limits,
-            moves: [true; 2],
-            caps: &[],
-            ends: [End::Rest; 2],
-        };
+        let path = Winding::new(turn);
+        let problem = problem(&path, limits);
         let effort = path_problem::Effort { resolution, ..Default::default() };
         let prepared = Prepared::new(&problem, &effort).expect("a first plan");
         let mut window = Window::new(&limits, &[true; 2]);

@@ -263,9 +263,9 @@ fn inside(x: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::prepare::Prepared;
-    use super::super::profiles::Winding;
+    use super::super::profiles::{problem, Winding};
     use super::*;
-    use crate::path_problem::{self, End, Problem};
+    use crate::path_problem;
     use feedplan_geometry::watch::Watch;
 
     /// Plans a winding path with this acceleration limit in mm/s². Returns its time in s, and whether the acceleration has rows
@@ -273,13 +273,8 @@ mod tests {
     fn planned(acceleration: f64, says: Option<bool>) -> (f64, bool) {
         let limits =
             Limits { velocity: [[250.0; 2]; 2], acceleration: [[acceleration; 2]; 2], jerk: [50_000.0; 2] };
-        let problem = Problem {
-            geometry: &Winding::new(1.0),
-            limits,
-            moves: [true; 2],
-            caps: &[],
-            ends: [End::Rest; 2],
-        };
+        let path = Winding::new(1.0);
+        let problem = problem(&path, limits);
         let prepared = Prepared::new(&problem, &path_problem::Effort::default()).expect("a first plan");
         let mut window = Window::new(&limits, &[true; 2]);
         prepared.fill(0..prepared.grid.pieces.len(), &mut window);
