@@ -57,10 +57,12 @@ def test_curves_that_broke_the_exact_planner_or_its_audit(seed: int) -> None:
     assert faults(seed, "bang-bang") == []
 
 
-# Turns finer than any grid: a single one (71), one in a piece that is straight to 3e-12 mm (255). A stop at
-# the same rounded place as the motion to it (194); durations of arcs that begin at rest (21, 275).
+# Turns finer than any grid: a single one (71), one in a piece that is straight to 3e-12 mm (255), some where
+# |C'| is a thousandth to a millionth of its value elsewhere on the piece (82, 83, 1181, 2093). A stop at the
+# same rounded place as the motion to it (194, 744); durations of arcs that begin at rest (21, 275); segments
+# that are short and far from the origin (440, 465).
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve"])
-@pytest.mark.parametrize("seed", [21, 71, 194, 255, 275])
+@pytest.mark.parametrize("seed", [21, 71, 82, 83, 194, 255, 275, 440, 465, 744, 1181, 2093])
 def test_curves_that_broke_planners_with_a_limit_of_jerk_or_their_audit(seed: int, method: str) -> None:
     assert faults(seed, method) == []
 

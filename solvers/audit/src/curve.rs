@@ -196,23 +196,16 @@ pub struct Curve<const M: usize> {
     hodographs: Hodographs<M>,
     width: f64,
     per_width: f64,
-    /// The magnitudes that the rounding errors of the first three derivatives are relative to, for each axis; and their lengths.
+    /// See `derivative_sizes` and `size_length`.
     sizes: [[f64; M]; 3],
-    size_lengths: [f64; 3],
+    size_length: f64,
 }
 
 impl<const M: usize> Curve<M> {
     /// A point at the origin.
     fn none() -> Self {
         let (polygon, sizes) = (Polygon::new([[0.0; M]].into_iter(), &[]), [[0.0; M]; 3]);
-        Self {
-            polygon,
-            hodographs: Hodographs::none(),
-            width: 0.0,
-            per_width: 0.0,
-            sizes,
-            size_lengths: [0.0; 3],
-        }
+        Self { polygon, hodographs: Hodographs::none(), width: 0.0, per_width: 0.0, sizes, size_length: 0.0 }
     }
 
     pub fn new(polygon: Polygon<M>, width: f64) -> Self {
@@ -226,7 +219,7 @@ impl<const M: usize> Curve<M> {
         (self.polygon, self.width, self.per_width) = (polygon, width, 1.0 / width);
         self.hodographs.set(&self.polygon);
         self.sizes = by_width(*self.hodographs.sizes(), self.per_width);
-        self.size_lengths = self.sizes.each_ref().map(length);
+        self.size_length = length(&self.sizes[0]);
     }
 
     /// Length of the parameter interval, in mm.
@@ -348,16 +341,23 @@ impl<const M: usize> Curve<M> {
         inner(&slope, &slope).root()
     }
 
-    /// For each axis the magnitudes that the rounding errors of the first three derivatives are relative to.
+    /// For each axis the magnitudes that the rounding errors of the first three derivatives at u are relative to.
+    #[inline(always)]
+    pub fn derivative_sizes_at<T: Number>(&self, u: T) -> [[T; M]; 3] {
+        let (t, rest) = self.parts(u);
+        by_width(self.hodographs.sizes_at(self.polygon.steps(), t, rest), self.per_width)
+    }
+
+    /// `derivative_sizes_at` the places of the piece where they are greatest, or more.
     #[inline]
     pub fn derivative_sizes(&self) -> &[[f64; M]; 3] {
         &self.sizes
     }
 
-    /// The lengths of the vectors of `derivative_sizes`.
+    /// The length of the first vector of `derivative_sizes`.
     #[inline]
-    pub fn size_lengths(&self) -> [f64; 3] {
-        self.size_lengths
+    pub fn size_length(&self) -> f64 {
+        self.size_length
     }
 
     /// Upper bounds of the lengths of the second to the fifth derivative; infinite on pieces with weights.

@@ -29,6 +29,9 @@ const BINOMIALS: [[f64; MOST + 1]; MOST + 1] = {
     rows
 };
 
+/// Steps are even if the longest one is at most this multiple of the shortest one.
+const EVEN: f64 = 16.0;
+
 /// Evaluates an expression with the degree of a piece as a constant if it is 5, the degree of most pieces, so that loops are
 /// unrolled.
 macro_rules! with_degree {
@@ -50,8 +53,10 @@ pub struct Hodographs<const M: usize> {
     /// Coefficients of N and its first three derivatives by t; and, on rational pieces, those of ω.
     rows: [Rows<M>; 4],
     weights: Option<Box<[Rows<1>; 4]>>,
-    /// For each axis the magnitudes that the rounding errors of the first three derivatives are relative to.
+    /// See `sizes`.
     sizes: [[f64; M]; 3],
+    /// Whether the steps of the polygon have similar lengths, see `EVEN`.
+    is_even: bool,
     /// Upper bounds of the lengths of the second to the fifth derivative; infinite on rational pieces.
     bounds: [f64; 4],
 }
@@ -60,7 +65,8 @@ impl<const M: usize> Hodographs<M> {
     /// A point at the origin.
     pub fn none() -> Self {
         let (rows, bounds) = ([[[0.0; M]; MOST + 1]; 4], [0.0; 4]);
-        Self { start: [0.0; M], degree: 0, rows, weights: None, sizes: [[0.0; M]; 3], bounds }
+        let (start, sizes) = ([0.0; M], [[0.0; M]; 3]);
+        Self { start, degree: 0, rows, weights: None, sizes, is_even: true, bounds }
     }
 
     /// Takes the coefficients of another polygon.
@@ -69,13 +75,17 @@ impl<const M: usize> Hodographs<M> {
         let (steps, weights) = (polygon.steps(), polygon.weights());
         let degree = steps.len();
         let (mut ways, mut longest) = ([[0.0; M]; MOST + 1], [0.0_f64; M]);
+        let (mut least_sq, mut most_sq) = (f64::INFINITY, 0.0_f64);
         for (i, step) in steps.iter().enumerate() {
+            let square = inner(step, step);
+            (least_sq, most_sq) = (least_sq.min(square), most_sq.max(square));
             for k in 0..M {
                 ways[i + 1][k] = ways[i][k] + step[k];
                 longest[k] = longest[k].max(step[k].abs());
             }
         }
         (self.start, self.degree) = (polygon.start, degree);
+        self.is_even = most_sq <= EVEN * EVEN * least_sq;
         let mut ratio = 1.0;
         if polygon.is_rational() {
             let (mut of_weights, mut found) = ([[0.0]; MOST + 1], Box::new([[[0.0]; MOST + 1]; 4]));
@@ -231,7 +241,36 @@ impl<const M: usize> Hodographs<M> {
         c
     }
 
-    /// For each axis the magnitudes that the rounding errors of the first three derivatives are relative to.
+    /// For each axis the magnitudes that the rounding errors of the first three derivatives at t are relative to: the derivatives
+    /// are sums of the polygon's steps, and the magnitudes are these sums with absolute values. Where the steps are even, and on
+    /// rational pieces, they are those of the whole piece.
+    #[inline(always)]
+    pub fn sizes_at<T: Number>(&self, steps: &[[f64; M]], t: T, rest: T) -> [[T; M]; 3] {
+        let mut sizes = self.sizes.map(|of| of.map(|size| t.filled(size)));
+        if self.is_even || self.weights.is_some() {
+            return sizes;
+        }
+        let mut rows = [[0.0; M]; MOST];
+        for (row, step) in rows.iter_mut().zip(steps) {
+            *row = step.map(f64::abs);
+        }
+        let mut factor = 1.0;
+        for order in 0..self.degree.min(3) {
+            let last = self.degree - order - 1;
+            factor *= (last + 1) as f64;
+            let mut terms = rows;
+            for i in 0..=last {
+                terms[i] = vector_of(|k| factor * BINOMIALS[last][i] * rows[i][k]);
+            }
+            sizes[order] = sum(&terms[..=last], t, rest);
+            for i in 0..last {
+                rows[i] = vector_of(|k| rows[i][k] + rows[i + 1][k]);
+            }
+        }
+        sizes
+    }
+
+    /// For each axis upper bounds of `sizes_at`.
     pub fn sizes(&self) -> &[[f64; M]; 3] {
         &self.sizes
     }

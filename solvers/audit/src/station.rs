@@ -12,7 +12,7 @@ use super::speed_by_length::Pace;
 use super::vectors::vector_of;
 use super::{EPS, ROUNDINGS};
 
-/// If |C'| is not above this share of its magnitude (`Curve::size_lengths`), the piece has no usable direction.
+/// If |C'| is not above this share of its magnitude (`Curve::size_length`), the piece has no usable direction.
 pub const STILL: f64 = 1e-6;
 
 /// A vector, and bounds of the rounding errors of its numbers.
@@ -138,7 +138,7 @@ impl<const M: usize> Station<M> {
     #[inline(always)]
     pub fn by(curve: &Curve<M>, u: f64, derivatives: &[[f64; M]; 3]) -> Option<Self> {
         let station = Self::anywhere(u, derivatives);
-        (station.slope > STILL * curve.size_lengths()[0]).then_some(station)
+        (station.slope > STILL * curve.size_length()).then_some(station)
     }
 
     pub fn jerk(&self, Pace { v, a, j }: Pace) -> [f64; M] {
@@ -256,8 +256,8 @@ impl<const M: usize, T: Number> Roundings<M, T> {
     /// derivatives.
     #[inline(always)]
     pub fn new(curve: &Curve<M>, station: &Station<M, T>, [c1, c2, c3]: &[[T; M]; 3]) -> Self {
-        let [size1, size2, size3] = curve.derivative_sizes();
-        let [most1, most2, most3] = curve.size_lengths();
+        let [size1, size2, size3] = &curve.derivative_sizes_at(station.u);
+        let [most1, most2, most3] = [size1, size2, size3].map(|size| inner(size, size).root());
         let (per, direction) = (station.slope.filled(1.0) / station.slope, &station.first);
         let (per2, per3) = (per * per, per * per * per);
         let (along2, along3) = (inner(direction, c2), inner(direction, c3));
@@ -271,7 +271,7 @@ impl<const M: usize, T: Number> Roundings<M, T> {
         let felt2 = felt * felt;
         let along = along2.size() * per;
         let of_change = (turned + (bent * along2).size() + along3.size()) * per;
-        let most_change = felt * (felt * 4.0 * most2 * most2 * per + most3);
+        let most_change = felt * (felt * most2 * most2 * 4.0 * per + most3);
         let unit = ROUNDINGS * EPS;
         let (unit1, unit2, unit3) = (per * unit, per2 * unit, per3 * unit);
         let mut roundings = Self { first: *c1, second: *c1, third: *c1 };
@@ -339,5 +339,24 @@ mod tests {
         let roundings = Roundings::new(&curve, &station, &curve.derivatives(1.0));
         let least = distance(&station.jerk(pace), &jerk).max(EPS * length(&jerk));
         assert!((least..1e-11).contains(&length(&roundings.jerk(pace))), "{roundings:?}");
+    }
+
+    #[test]
+    fn roundings_of_a_turn_are_relative_to_the_steps_beside_it_and_not_to_the_longest_one() {
+        // Beside the end the steps are 1e-5 of the first ones, and turn by 1e-4 rad.
+        let steps = [[0.3, 0.2], [0.7, 0.5], [7e-6, 5.001e-6], [7e-6, 5.001e-6], [7e-6, 5.001e-6]];
+        let mut points = vec![[0.0; 2]];
+        for [x, y] in steps {
+            let [from_x, from_y] = points[points.len() - 1];
+            points.push([from_x + x, from_y + y]);
+        }
+        let curve = Curve::new(Polygon::new(points.into_iter(), &[]), 1.0);
+        let derivatives = curve.derivatives(0.97);
+        let station = Station::anywhere(0.97, &derivatives);
+        let roundings = Roundings::new(&curve, &station, &derivatives);
+        for (of, rounding) in [(station.second, roundings.second), (station.third, roundings.third)] {
+            let share = length(&rounding) / length(&of);
+            assert!((1e-14..1e-8).contains(&share), "{share}");
+        }
     }
 }

@@ -64,7 +64,7 @@ impl<const M: usize> Together<'_, M> {
     pub fn still(&self) -> f64 {
         match self.joints {
             Some(_) => f64::NEG_INFINITY,
-            None => STILL * self.curve.size_lengths()[0],
+            None => STILL * self.curve.size_length(),
         }
     }
 

@@ -22,8 +22,8 @@ use feedplan_geometry::tolerance::CUSP;
 use feedplan_planner::problem::Problem;
 pub use junctions::Junction;
 use junctions::Meeting;
-pub use table::Part;
-use table::{around, panel, panel_of, Halving, Row};
+use table::{around, panel_of, Halving, Row};
+pub use table::{panel, Part};
 
 /// Greatest number of steps to locate an arc length: mostly one or two Newton steps; next to a cusp, where these go astray, as
 /// many bisections as u has bits.

@@ -63,6 +63,14 @@ pub trait Geometry<const M: usize>: Sync {
     }
 }
 
+/// Lengths below this fraction of the path's length are spoiled by the rounding of arc lengths.
+pub const SHORTEST: f64 = 1e-11;
+/// The shortest part, in mm, into which a path of this length is cut. Paths below 1 mm count as 1 mm, because numbers of 1e-12 mm
+/// are the smallest that profiles of segments accept.
+pub fn shortest_part(path: f64) -> f64 {
+    SHORTEST * path.max(1.0)
+}
+
 /// Greatest number of axes of a path.
 pub const MOST_AXES: usize = 9;
 

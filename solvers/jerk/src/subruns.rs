@@ -7,10 +7,10 @@
 use std::cmp::Reverse;
 
 use crate::arc_length_path::{
-    path_point, per_feed, piece, speed_sq, straight, tool_curvature, Part, MAX_RATE,
+    panel, path_point, per_feed, piece, speed_sq, straight, tool_curvature, Part, MAX_RATE,
 };
 use crate::jerk_profile::JerkProfile;
-use crate::path_problem::Limits;
+use crate::path_problem::{shortest_part, Limits};
 use feedplan_geometry::bisection::boundary;
 use feedplan_geometry::parallel::{map, try_map};
 use feedplan_geometry::polynomial::Polynomial;
@@ -32,9 +32,12 @@ const TIGHT_TURN: f64 = 10.0;
 pub const MOMENT: f64 = 0.1;
 /// A point is slow if |C'(u)|² is below this fraction of its maximum on the piece.
 const SLOW: f64 = 0.25;
+/// A piece is cut where |C'(u)|² is one of these fractions of its maximum, each 1/64 of the one before. Beside a slow point a
+/// millionth of the length may have half of the parameter's range, and turns that samples of the whole piece by length do not see.
+const LEVELS: [f64; 4] = [1e-3, 1.6e-5, 2.4e-7, 3.8e-9];
 /// A turn beside a slow point is searched for at this many distances, each half the one before, and then by this many rounds of
 /// ternary search. It counts if its curvature exceeds that of the slow point by this factor.
-const LEVELS: i32 = 40;
+const REACHES: i32 = 40;
 const ROUNDS: usize = 20;
 const SHARPER: f64 = 2.0;
 /// To both sides of a slow point |C'(u)|² must rise by more than this fraction: less may be the rounding of a constant speed,
@@ -186,9 +189,10 @@ fn turn<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, before: &Subru
 
 pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
     let watch = problem.watch.part(CUTTING).each(problem.width.len());
+    let shortest = shortest_part(extent(problem));
     let places = |i: usize| {
         watch.count(i);
-        cuts(problem, i)
+        cuts(problem, i, shortest)
     };
     let mut all: Vec<Cuts> = map(problem.width.len(), CUT_AT_ONCE, places);
     let mut out: Vec<Subrun> = vec![];
@@ -232,25 +236,55 @@ struct Cuts {
     cusped: [bool; 2],
 }
 
-fn cuts<const M: usize>(problem: &Problem<M>, i: usize) -> Cuts {
-    let (cusps, cusped) = cusps(problem, i);
+/// The diagonal of the box around all control points, in mm.
+fn extent<const M: usize>(problem: &Problem<M>) -> f64 {
+    let diagonal: [f64; M] = std::array::from_fn(|k| {
+        let axis = || problem.control.iter().map(|point| point[k]);
+        axis().fold(f64::NEG_INFINITY, f64::max) - axis().fold(f64::INFINITY, f64::min)
+    });
+    dot(&diagonal, &diagonal).sqrt()
+}
+
+/// Where piece `i` is cut: no part is shorter than `shortest`, in mm.
+fn cuts<const M: usize>(problem: &Problem<M>, i: usize, shortest: f64) -> Cuts {
+    let (cusps, mut cusped) = cusps(problem, i);
     let mut cuts: Vec<(f64, bool)> = cusps.into_iter().map(|u| (u, true)).collect();
     let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
-    for u in slow_points(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
+    let slow = SlowPlaces::new(&slope_sq(problem, i), problem.width[i]);
+    for u in slow.points.into_iter().filter(|&u| !at_cusp(u)) {
         cuts.push((u, turn_speed(problem, i, u) < CREEP));
         let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
         cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
     }
+    // A line has no turns. Beside a place of rest the ramps see them, and the tool would creep along such short parts.
+    let rests = cusped != [false; 2] || cuts.iter().any(|(_, rests)| *rests);
+    if !slow.levels.is_empty() && !rests && !is_line(problem, i) {
+        cuts.extend(slow.levels.into_iter().map(|u| (u, false)));
+    }
     cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
     let inside = AT_END * problem.width[i]..=(1.0 - AT_END) * problem.width[i];
     cuts.retain(|(u, _)| inside.contains(u));
+    let is_short = |from: f64, to: f64| panel(problem, i, from, to) < shortest;
+    cuts.retain(|&(u, rests)| {
+        let at_end = [is_short(0.0, u), is_short(u, problem.width[i])];
+        for end in 0..2 {
+            cusped[end] |= rests && at_end[end];
+        }
+        at_end == [false; 2]
+    });
     cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
     cuts.dedup_by(|b, a| {
-        let same = b.0 - a.0 <= AT_END * problem.width[i];
+        let same = b.0 - a.0 <= AT_END * problem.width[i] || is_short(a.0, b.0);
         a.1 |= same && b.1;
         same
     });
     Cuts { inside: cuts, cusped }
+}
+
+/// Whether piece `i` is straight, and the feed counts the length of the axes' path.
+fn is_line<const M: usize>(problem: &Problem<M>, i: usize) -> bool {
+    let own = piece(problem, i);
+    problem.way.is_none() && straight(&own, 0.5 * own.width).is_some()
 }
 
 /// Parameters inside piece `i` at which the tool must rest, and whether it must rest at the start and at the end.
@@ -260,10 +294,9 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
     if points.is_empty() {
         return (points, [false; 2]);
     }
-    let line = problem.way.is_none() && straight(&own, 0.5 * own.width).is_some();
     let ends =
         [points.first().is_some_and(|&t| t < AT_END), points.last().is_some_and(|&t| t > 1.0 - AT_END)];
-    if line {
+    if is_line(problem, i) {
         // A line that does not turn back has no cusp inside. At its ends a speed above 0 would need an infinite u̇².
         let tangent = |t: f64| derivatives(&own, t * own.width)[1];
         points.retain(|&t| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0);
@@ -272,33 +305,52 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
     (points.iter().map(|t| t * own.width).collect(), ends)
 }
 
-/// Parameters of piece `i` where |C'(u)| has a low minimum: the path may turn sharply there, or beside it.
-fn slow_points<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
-    let square: Polynomial<MAX_RATE> = match problem.way {
-        Some(way) => Polynomial::from_bernstein(way.of(i).iter().copied()),
-        None => {
-            let hodograph = Hodograph::new(&piece(problem, i));
-            let axis = |k: usize| -> Polynomial<MAX_RATE> {
-                Polynomial::from_bernstein(hodograph.coefficients().iter().map(|row| row[k]))
-            };
-            (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
-        }
-    };
-    let (least, greatest) = square.range();
-    if least >= SLOW * greatest {
-        return vec![];
+/// |C'|² of the axes' path on piece `i` by t in [0, 1], times a factor.
+fn slope_sq<const M: usize>(problem: &Problem<M>, i: usize) -> Polynomial<MAX_RATE> {
+    if let Some(way) = problem.way {
+        return Polynomial::from_bernstein(way.of(i).iter().copied());
     }
-    let mut turns = vec![0.0];
-    square.derivative().sign_changes(&mut |t| turns.push(t));
-    turns.push(1.0);
-    let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
-    let is_low = |n: usize| {
-        let least = speeds[n];
-        least < SLOW * greatest
-            && (n == 0 || rises(least, speeds[..n].iter().rev()))
-            && (n + 1 == speeds.len() || rises(least, speeds[n + 1..].iter()))
+    let hodograph = Hodograph::new(&piece(problem, i));
+    let axis = |k: usize| -> Polynomial<MAX_RATE> {
+        Polynomial::from_bernstein(hodograph.coefficients().iter().map(|row| row[k]))
     };
-    (0..turns.len()).filter(|&n| is_low(n)).map(|n| turns[n] * problem.width[i]).collect()
+    (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
+}
+
+/// Parameters of a piece with C'(u) much smaller than elsewhere on it.
+#[derive(Default)]
+struct SlowPlaces {
+    /// Where |C'|² has a low minimum: the path may turn sharply there, or beside it.
+    points: Vec<f64>,
+    /// Where |C'|² is at one of the `LEVELS`.
+    levels: Vec<f64>,
+}
+
+impl SlowPlaces {
+    /// By |C'|² as a polynomial of t in [0, 1], times any factor.
+    fn new(square: &Polynomial<MAX_RATE>, width: f64) -> Self {
+        let (least, greatest) = square.range();
+        if least >= SLOW * greatest {
+            return Self::default();
+        }
+        let mut levels = vec![];
+        for level in LEVELS.map(|level| level * greatest).into_iter().take_while(|&level| level > least) {
+            let above = square.combine(1.0, &Polynomial::constant(1.0), -level);
+            above.sign_changes(&mut |t| levels.push(t * width));
+        }
+        let mut turns = vec![0.0];
+        square.derivative().sign_changes(&mut |t| turns.push(t));
+        turns.push(1.0);
+        let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
+        let is_low = |n: usize| {
+            let least = speeds[n];
+            least < SLOW * greatest
+                && (n == 0 || rises(least, speeds[..n].iter().rev()))
+                && (n + 1 == speeds.len() || rises(least, speeds[n + 1..].iter()))
+        };
+        let points = (0..turns.len()).filter(|&n| is_low(n)).map(|n| turns[n] * width).collect();
+        Self { points, levels }
+    }
 }
 
 /// Parameters of piece `i` to either side of a slow point where the tool's path turns the most, if it turns more there than at
@@ -316,7 +368,7 @@ fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Ve
     };
     let sharpest = |reach: f64| {
         let at = |n: i32| slow + reach * 0.5_f64.powi(n);
-        let n = (1..LEVELS).max_by(|&a, &b| curvature(at(a)).total_cmp(&curvature(at(b))))?;
+        let n = (1..REACHES).max_by(|&a, &b| curvature(at(a)).total_cmp(&curvature(at(b))))?;
         let (mut low, mut high) = (at(n + 1), at(n - 1));
         for _ in 0..ROUNDS {
             let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);

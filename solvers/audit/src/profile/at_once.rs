@@ -365,7 +365,7 @@ impl<const M: usize> Judge<'_, M> {
         let slopes = [joined(&slope, f64x8::min), joined(&slope, f64x8::max)];
         let (share, doubts) = integral(&slope);
         let is_good = agree(share, doubts);
-        let is_still = slopes[0].simd_le(of_each(simd, on, |piece| piece.on.curve.size_lengths()[0]) * STILL);
+        let is_still = slopes[0].simd_le(of_each(simd, on, |piece| piece.on.curve.size_length()) * STILL);
         let length = share * width;
         // The motion along the path.
         let ends: [Lanes; 2] = [(slope[0] * slope[0]).into(), (slope[PLACES - 1] * slope[PLACES - 1]).into()];

@@ -5,7 +5,7 @@
 use feedplan_geometry::elementary::Elementary;
 use std::ops::Range;
 
-use crate::path_problem::{Geometry, Limits, PathPoint, SpeedCap};
+use crate::path_problem::{Geometry, Limits, PathPoint, SpeedCap, SHORTEST};
 use feedplan_planner::problem::lesser;
 
 /// The length of a ramp, as a fraction of the length on which constant jerk reaches the limit of acceleration or of speed,
@@ -13,7 +13,6 @@ use feedplan_planner::problem::lesser;
 const RAMP: f64 = 1.0 / 90.0;
 /// The least and the greatest length of a ramp, as fractions of the path's length: the rounding of s would spoil a shorter ramp.
 const PARTS: [f64; 2] = [SHORTEST, 1.0 / 400.0];
-pub const SHORTEST: f64 = 1e-11;
 /// On each piece under a ramp, the range of t (see `LEAST_TIME`) is halved recursively, to depths in this range …
 const DEPTH: Range<u32> = 4..40;
 /// … while the second difference of ln c exceeds `CHANGE` and the points are further apart than the fraction `APART` of t.

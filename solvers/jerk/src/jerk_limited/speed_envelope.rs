@@ -2,9 +2,8 @@
 //! the variable r = w^(3/4), at samples dense enough to place the stations of the grid. r is linear in s under constant jerk from
 //! rest.
 
-use super::rest_ramp;
 use super::window_end::WindowEnd;
-use crate::path_problem::{Fault, Geometry, Limits, PathPoint, SpeedCap};
+use crate::path_problem::{Fault, Geometry, Limits, PathPoint, SpeedCap, SHORTEST};
 use feedplan_geometry::elementary::Elementary;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, lesser, Both};
@@ -100,7 +99,7 @@ impl Slopes {
                 RISE * least(up, ahead).min(least(down, back)),
                 RISE * least(up, back).min(least(down, ahead)),
             ],
-            shortest: rest_ramp::SHORTEST * path,
+            shortest: SHORTEST * path,
         }
     }
 

@@ -22,11 +22,10 @@ use super::prepare::{Prepared, Start, PREPARING};
 use super::profile::{Plan, Profile};
 use super::refinement::{self, Losses, RoughPlan, COARSE};
 use super::relaxed::Relaxed;
-use super::rest_ramp;
 use super::window::{ramps, Window, WindowReport};
 use super::window_end::WindowEnd;
 use super::working_space::InteriorPoint;
-use crate::path_problem::{Effort, Fault, Problem};
+use crate::path_problem::{self, Effort, Fault, Problem};
 use feedplan_geometry::parallel::{each_part, map, threads};
 use feedplan_geometry::watch::Watch;
 
@@ -41,7 +40,7 @@ const EASE: usize = 20;
 const LONG: f64 = 36.0;
 /// Least length of the parts into which an interval is split, as a fraction of the path's length: rounding of the arc lengths
 /// spoils shorter ones.
-const SHORTEST: f64 = rest_ramp::SHORTEST / 16.0;
+const SHORTEST: f64 = path_problem::SHORTEST / 16.0;
 /// The fraction of the progress that the rough plans take.
 const ROUGH: f64 = 0.3;
 /// Windows per thread that are solved before their plans are joined.

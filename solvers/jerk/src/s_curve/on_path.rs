@@ -12,11 +12,12 @@ use crate::feed;
 use crate::jerk_limited::on_path::Task;
 use crate::jerk_profile::JerkProfile;
 use crate::path_limits::{allowable, bounded, greatest, Allowable, Curve, Shape};
-use crate::path_problem::{Effort, Geometry, Limits, PathPoint, SpeedCap};
+use crate::path_problem::{shortest_part, Effort, Geometry, Limits, PathPoint, SpeedCap};
 use crate::s_curve::{self, Section, Segment, SegmentEnd};
 use crate::subruns::{checked, over_subruns, subruns, Subrun, CREEP, MOMENT};
+use feedplan_geometry::quadratic::sub;
 use feedplan_geometry::spline::bezier::split;
-use feedplan_geometry::spline::CompositeCurve;
+use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{greater, Fault, Problem};
 
@@ -276,6 +277,9 @@ impl<'a, const M: usize> Parts<'a, M> {
         around: &Around,
         depth: u32,
     ) {
+        if to - from < 2.0 * shortest_part(self.path.total()) {
+            return self.push([from, to], whole, around.share);
+        }
         let middle = 0.5 * (from + to);
         let halves = [[from, middle], [middle, to]].map(|ends| {
             let (shape, cap) = shape(self.problem, self.path, part, ends);
@@ -387,7 +391,10 @@ fn shape<const M: usize>(
         let own = piece(problem, i);
         let (a, b) = (path.locate(part, from), path.locate(part, to));
         let mut pieces = CompositeCurve::default();
-        split(&own, &[a, b], &mut pieces);
+        // Relative to the nearer end of the piece: far from the origin a short part would lose the digits of its derivatives.
+        let end = if a + b <= own.width { 0 } else { own.degree() };
+        let local: Vec<[f64; M]> = own.control.iter().map(|point| sub(point, &own.control[end])).collect();
+        split(&Piece { control: &local, ..own }, &[a, b], &mut pieces);
         let middle = pieces.piece(1);
         let shape = bounded(&Curve { joints: middle.control, tip: None, weight: middle.weights }, ACCURACY);
         return (shape, feed::on(problem, i, &middle).min(path.chord_speed(shape.curvature)));
