@@ -348,7 +348,7 @@ impl<const M: usize> Curve<M> {
         by_width(self.hodographs.sizes_at(self.polygon.steps(), t, rest), self.per_width)
     }
 
-    /// `derivative_sizes_at` the places of the piece where they are greatest, or more.
+    /// Upper bounds of `derivative_sizes_at` on the piece.
     #[inline]
     pub fn derivative_sizes(&self) -> &[[f64; M]; 3] {
         &self.sizes

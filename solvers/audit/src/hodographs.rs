@@ -270,7 +270,7 @@ impl<const M: usize> Hodographs<M> {
         sizes
     }
 
-    /// For each axis upper bounds of `sizes_at`.
+    /// Upper bounds of `sizes_at` on the piece.
     pub fn sizes(&self) -> &[[f64; M]; 3] {
         &self.sizes
     }

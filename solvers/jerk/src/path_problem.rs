@@ -65,8 +65,9 @@ pub trait Geometry<const M: usize>: Sync {
 
 /// Lengths below this fraction of the path's length are spoiled by the rounding of arc lengths.
 pub const SHORTEST: f64 = 1e-11;
-/// The shortest part, in mm, into which a path of this length is cut. Paths below 1 mm count as 1 mm, because numbers of 1e-12 mm
-/// are the smallest that profiles of segments accept.
+
+/// The length, in mm, of the shortest part into which a path of this length is cut. Paths below 1 mm count as 1 mm, because a
+/// segment of `s_curve` is at least 1e-12 mm long.
 pub fn shortest_part(path: f64) -> f64 {
     SHORTEST * path.max(1.0)
 }

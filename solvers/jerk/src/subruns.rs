@@ -33,7 +33,7 @@ pub const MOMENT: f64 = 0.1;
 /// A point is slow if |C'(u)|² is below this fraction of its maximum on the piece.
 const SLOW: f64 = 0.25;
 /// A piece is cut where |C'(u)|² is one of these fractions of its maximum, each 1/64 of the one before. Beside a slow point a
-/// millionth of the length may have half of the parameter's range, and turns that samples of the whole piece by length do not see.
+/// millionth of the length may have half of the range of u; samples at equal distances on the whole piece miss the turns there.
 const LEVELS: [f64; 4] = [1e-3, 1.6e-5, 2.4e-7, 3.8e-9];
 /// A turn beside a slow point is searched for at this many distances, each half the one before, and then by this many rounds of
 /// ternary search. It counts if its curvature exceeds that of the slow point by this factor.
@@ -256,7 +256,7 @@ fn cuts<const M: usize>(problem: &Problem<M>, i: usize, shortest: f64) -> Cuts {
         let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
         cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
     }
-    // A line has no turns. Beside a place of rest the ramps see them, and the tool would creep along such short parts.
+    // A line does not turn. Beside a place of rest the ramp is computed from many points; on shorter parts the tool would creep.
     let rests = cusped != [false; 2] || cuts.iter().any(|(_, rests)| *rests);
     if !slow.levels.is_empty() && !rests && !is_line(problem, i) {
         cuts.extend(slow.levels.into_iter().map(|u| (u, false)));
